@@ -1,7 +1,7 @@
-"""`python bench/costs.py`: what must stay cheap whatever is given, in CPU seconds; exit code 1 where something does not.
+"""CPU time of operations that must stay cheap for any input: `python bench/costs.py`; exit code 1 if a limit is exceeded.
 
-Hostile texts and decks, for which a careless search takes a time that grows with the square of their length, and the check of
-a mesh beside the assembly of its stiffness (2.5 assemblies of hexahedra once).
+The inputs are hostile texts and decks, for which a naive search takes quadratic time, and the check of a mesh compared with
+the assembly of its stiffness (2.5 assemblies for hexahedra in an earlier version).
 """
 
 import contextlib

@@ -2,11 +2,10 @@
 
 Usage: python bench/covered.py [--workers N] [--data FOLDER] [--again] [--missing]
 
-Runs the tests that `tests/modes/coverage.toml` names, commands that they start included, and once more without compiling
-(NUMBA_DISABLE_JIT=1) those that it names for the lines of kernels, which a compiled one does not tell. Ends with
-exit code 1 if less than 95 % is covered, or if a line or a branch is not covered that the same file does not list with
-its reason. `--missing` prints such lines in the form of that list, for a reason to be written; `--again` looks at the
-data of the last run.
+Runs the tests that `tests/modes/coverage.toml` names, including the commands that they start, and a second time without
+compilation (NUMBA_DISABLE_JIT=1) those that it names for the lines of kernels. Exit code 1 if less than 95 % is covered, or
+if a line or branch is uncovered that the same file does not list with its reason. `--missing` prints such lines in the
+format of that list; `--again` evaluates the data of the last run.
 """
 
 from __future__ import annotations

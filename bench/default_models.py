@@ -1,4 +1,4 @@
-"""Models for `defaults.py`: every kind of contact that the mesh generators make, and the truth about each."""
+"""Models for `defaults.py`: every kind of contact that the mesh generators support, with reference results."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Open validation specs by each choice: ``python bench/default_specs.py DIR [DIR ...]``.
+"""Validation specs with each formulation: ``python bench/default_specs.py DIR [DIR ...]``.
 
-The specs (JSON, with MED meshes) are read by the runner of tests/verification; of each run, told are the values out of the
-tolerance of the spec, of all, and by how many times the worst exceeds it.
+The runner of tests/verification reads the specs (JSON, with MED meshes). For each run the table gives the number of values
+outside the tolerance of the spec, the number of all values, and the largest ratio of deviation to tolerance.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""The default formulation against every other: ``python bench/defaults.py [plane|space|obstacle ...] [--match TEXT]``.
+"""The default formulation compared with all others: ``python bench/defaults.py [plane|space|obstacle ...] [--match TEXT]``.
 
-Every problem of `default_models` is solved by each choice on the same mesh. Printed are the errors of force and pressure
-(of its maximum; where it is uniform the largest error of any closed node) in per cent of the truth and, in brackets, the
-geometry updates. ``error`` stands for an exception, whose text follows. A table at the end counts by kind of problem.
+Each formulation solves every problem of `default_models` on the same mesh. The table gives the errors of force and pressure
+(of its maximum; for a uniform pressure the largest error of any closed node) in percent and, in brackets, the geometry
+updates. ``error`` marks an exception, whose text follows. A final table counts failures by kind of problem.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Assembly and stress recovery by element, in one thread and in two: ``python bench/elements.py [ELEMENT ...] [--runs 9]``.
+"""Assembly and stress recovery by element, with one and two threads: ``python bench/elements.py [ELEMENT ...] [--runs 9]``.
 
-Millions of cells a second, best of the runs, which take turns. Assembly fills a matrix of known pattern; recovery gives
-stresses at the nodes from those in the cells, their average included. ``mean dilatation`` is the time of both with it, as for
-nu = 0.4999, in that without, by one thread. ``first touch`` is the time the operating system
-takes to hand out the memory of the matrix, in that of the assembly by one thread: several threads take hardly less of it.
+Prints millions of cells per second, the best of alternating runs. Assembly fills a matrix of known pattern; recovery
+computes nodal stresses from displacements, averaging included. ``mean dilatation`` is the time of both with mean dilatation,
+as for nu = 0.4999, relative to the time without, with one thread. ``first touch`` is the time in which the operating system
+provides the memory of the matrix, relative to the assembly with one thread; more threads hardly reduce it.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What a first run compiles: ``python bench/first_run.py run data/cases/forma04a.toml`` runs a command with an empty cache.
+"""Compilation in a first run: ``python bench/first_run.py run data/cases/forma04a.toml`` runs a command with an empty cache.
 
-CPU seconds of the process, in one thread and thus without helpers; the kernels it compiled, how many of them for others, and
-those compiled for more than one set of types.
+Prints CPU seconds of the process with one thread, and thus without helper processes, the compiled kernels, how many of them
+are called by other kernels, and those compiled for several sets of types.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Whole-process cost of the training case: CPU seconds and peak memory of ``fastcontact run``, kernels cached.
+"""Whole-process cost of the training case: CPU seconds and peak memory of ``fastcontact run`` with cached kernels.
 
 Usage: python bench/forma04.py [--runs N] [CASE.toml ...]
 """

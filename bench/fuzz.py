@@ -1,12 +1,13 @@
-"""Read thousands of damaged files: does each give a right result or one clear error?
+"""Read thousands of damaged files: each must give a correct result or one clear error.
 
     python bench/fuzz.py [--count 10000] [--seed 1] [--workers 2] [--failures FOLDER]
         [--formats .deck .msh ...] [--only NUMBER ...]
 
-Starts from small valid files of every format (tests/fuzz/fuzz_seeds.py), damages them byte by byte or inside (HDF5,
-TOML), and reads them in processes that may take 1 GiB more memory and 10 s of CPU time. The same seed gives the same
-files. Prints a table, a line a format: read; refused by a clear error; and what must not be: other errors, messages of
-several lines, more memory, files touched elsewhere, crashes, hangs. Those files are kept; exit code 1 if there are any.
+Starts from small valid files of every format (tests/fuzz/fuzz_seeds.py), damages them byte by byte or in their structure
+(HDF5, TOML), and reads them in processes with at most 1 GiB of additional memory and 10 s of CPU time. The same seed gives
+the same files. Prints a table with a line for each format: files read, files refused with a clear error, and failures: other
+errors, messages of several lines, more memory, other files touched, crashes, hangs. Failing files are kept; exit code 1 if
+there are any.
 """
 
 from __future__ import annotations

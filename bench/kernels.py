@@ -1,7 +1,7 @@
-"""Which kernels the usual kinds of runs call: writes ``fastcontact/_jit/kernels.json``, from which they are compiled ahead.
+"""Record the kernels that typical runs call in ``fastcontact/_jit/kernels.json``, from which they are compiled ahead of time.
 
-Run it after a change of a kernel's arguments: ``python bench/kernels.py``. It solves a small model of each kind, in a
-process of its own and with kernels that stay Python, and notes what is called, with which types, in which order.
+Run it after a change of a kernel's arguments: ``python bench/kernels.py``. It solves a small model of each kind in a separate
+process without compilation, and records the called kernels with their types, in order.
 """
 
 from __future__ import annotations

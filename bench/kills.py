@@ -1,11 +1,11 @@
-"""Kill runs at random instants: does every file open, is every step right, does every run end right when it is resumed?
+"""Kill runs at random instants: every file must open, every step be correct, and every resumed run end correctly.
 
     python bench/kills.py [--kills 200] [--seed 1] [--cases forma04c friction] [--signals KILL TERM] [--failures FOLDER]
 
-By default half of the kills fall on FORMA04 C, half on a case in three dimensions with friction (tests/kills/kill_cases.py);
-`--cases features` takes all that has a history, from plasticity to heat (tests/kills/feature_cases.py). Six in
-ten fall while a step is written, the others anywhere between start and end; three in ten runs are killed again when they
-are resumed. Prints what was found, a column a case; files that went wrong are kept; exit code 1 if there are any.
+By default half of the kills are for FORMA04 C and half for a 3D case with friction (tests/kills/kill_cases.py);
+`--cases features` uses all features with a history, from plasticity to heat (tests/kills/feature_cases.py). Six in ten kills
+occur while a step is written, the others at any time; three in ten runs are killed again after resuming. Prints the
+outcomes, a column for each case; failing files are kept; exit code 1 if there are any.
 """
 
 from __future__ import annotations

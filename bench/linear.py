@@ -1,14 +1,13 @@
-"""Multigrid and contact on top of it: what a linear solution costs, and a contact analysis in units of it.
+"""Multigrid and contact: cost of a linear solution, and of a contact analysis relative to it.
 
 Usage: python bench/linear.py [--problem box|blocks|sphere] [--dofs N ...] [--steps 20] [--pyamg] [--json FILE]
 
-``box``: a cube of hex8 held at its base, pressed at its top: set-up, linear solution, bandwidth. ``blocks``: two cubes
-with meshes that do not match, tied where they touch. ``sphere``: a quarter of a half-sphere on a block, a cold step to
-the full load and 20 steps, geometry converged.
+``box``: a cube of hex8, fixed at its base and pressed at its top: set-up, linear solution, bandwidth. ``blocks``: two tied
+cubes with non-matching meshes. ``sphere``: a quarter of a half-sphere on a block, a cold step to the full load and 20 steps
+with converged geometry.
 
-CPU seconds are those of the process. L is one linear solution of the same mesh to the same tolerance without set-up,
-measured in the same run; ``triad`` is the memory bandwidth of a core then. A small problem runs first and compiles
-the kernels.
+Times are CPU seconds of the process. L is a linear solution of the same mesh to the same tolerance, without set-up, measured
+in the same run; ``triad`` is the memory bandwidth of a core. A small problem runs first and compiles the kernels.
 """
 
 from __future__ import annotations

@@ -1,18 +1,18 @@
-"""A run of many steps, killed and resumed at random: the same bits, flat memory, steps that stay as cheap?
+"""A run of many steps, killed and resumed at random: same bits, constant memory, constant cost of a step.
 
     python bench/long_run.py [--steps 10000] [--kills 12] [--seed 1]
     python bench/long_run.py --unknowns 1e6 --hours 2 [--folder FOLDER]
 
-Two small blocks, or a quarter of a sphere on a block of about as many unknowns as are asked for, are pressed together and
-half released again, over and over: 20 steps a cycle, so that every part of the run has the same work. The run is made once
-undisturbed, in a process that notes every hundred steps (of the sphere, every cycle) what it has used; and once more by
-`fastcontact run --resume`, which is killed at random instants and started again until it is done. With `--hours` the first
-half of the time is for the undisturbed run, which then does as many steps as it can.
+Two small blocks, or a quarter of a sphere on a block with about the given number of unknowns, are pressed together and half
+released again in cycles of 20 steps, so that every part of the run has the same work. The run is done once without
+interruption, in a process that records its resources every hundred steps (for the sphere, every cycle), and once by
+`fastcontact run --resume`, which is killed at random instants and restarted until it is complete. With `--hours`, the
+uninterrupted run does as many steps as it can in the first half of the time.
 
-Both files are read step by step and compared bit by bit. Of the undisturbed run the second tenth and the last are compared:
-CPU time, bytes and calls of writing for a step, objects and memory. Every step is on the disk before the next one begins.
-Prints one line a bar; exit code 1 if a bar is missed. The files of a million unknowns take tens of gigabytes: the run stops
-at once where the folder has no room for them.
+The files are compared bit by bit. The second and the last tenth of the uninterrupted run are compared in CPU time, bytes and
+calls of writing per step, objects and memory. Every step is on the disk before the next one begins. Prints a line for each
+criterion; exit code 1 if one is not met. The files of a million unknowns take tens of gigabytes: the run stops at once if
+the folder has too little space.
 """
 
 from __future__ import annotations

@@ -1,13 +1,12 @@
-"""Take the package's checks away one by one: does a test notice each?
+"""Remove the checks of the package one by one: a test should fail each time.
 
     python bench/mutate_checks.py [--work FOLDER] [--collect TESTS ...] [--files PATTERN ...] [--sample N] [--again]
 
-A check is a `raise` of an error of the package (or of a ValueError that becomes one); it is replaced by `pass` in a copy
-of the project, and the tests that reached it are run there, the quickest first. A check that no test reaches has
-survived. A mutant may do what its check forbids, such as replace a device: it refuses to run with the rights of root.
-First, or with --collect, the tests are run once to see which checks they reach; what they reach is added to what is
-known. Goes on where it was stopped; --again judges survivors anew, with tests as they are now. Prints what survived and
-the figures; exit code 1 if anything did.
+A check is a `raise` of an error of the package (or of a ValueError that becomes one). It is replaced by `pass` in a copy of
+the project, and the tests that reach it are run there, the fastest first. A check that no test reaches has survived. Since a
+mutant may do what its check forbids, such as replacing a device, the script refuses to run as root. The first run, or
+--collect, records which checks each test reaches; records are accumulated. An interrupted run continues; --again repeats
+survivors with the current tests. Prints survivors and figures; exit code 1 if there are survivors.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Prices of nonlinear bodies: user CPU seconds of whole processes, ours and a peer's in turn on the same machine.
+"""Cost of nonlinear bodies: user CPU seconds of whole processes, alternating with another program on the same machine.
 
-``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8, drawn by a tenth of its
-height and sheared by as much. FElupe solves by conjugate gradients with Jacobi's preconditioner, which takes less than its
+``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8, stretched by a tenth of
+its height and sheared by as much. FElupe uses conjugate gradients with a Jacobi preconditioner, which are faster than its
 default, SuperLU.
 
 ``python bench/nonlinear.py indentation [SIZE] [STEPS] [RADIUS]``: a rigid ball of quad8 pressed into an elastic-plastic block
-of quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default, and cells are as small up to RADIUS, 0.6
-by default. CalculiX (``ccx``) takes the same mesh, CAX8R, and surface-to-surface contact by a penalty, in as many fixed
-increments; ours has mortar.
+of quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default, up to RADIUS, 0.6 by default. CalculiX
+(``ccx``) uses the same mesh (CAX8R), surface-to-surface penalty contact and the same number of fixed increments; fastcontact
+uses mortar.
 """
 
 from __future__ import annotations

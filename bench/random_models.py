@@ -1,14 +1,15 @@
-"""Random models: does each end in a result that is right, or in an error of our own?
+"""Random models: each must end in a correct result or in an error of the package.
 
     python bench/random_models.py [--count 2000] [--first 0] [--workers 1] [--limit 120] [--json FILE]
     python bench/random_models.py --seed 137 --show
 
-Each seed is a model (tests/random_models): two- and three-dimensional, one to three contact pairs, any element, materials
-of any contrast, rigid obstacles that move and turn, clearances, friction, meshes shifted, turned, graded, partly covered,
-cyclic sectors and periods, plates, orthotropic rings, bolts, couplings, heat. What must hold for any result is checked
-(tests/mechanics.py), and that the same model in other words (turned, renumbered, its supports along normals, along axes, as
-relations) has the same answer; "told" are those that fail what a warning says. Printed are counts by dimension, formulation,
-words and outcome, errors by their first words, and the seeds of all findings; exit code 1 if there are any.
+Each seed is a model (tests/random_models): two- and three-dimensional, one to three contact pairs, any element, materials of
+any contrast, moving and rotating rigid obstacles, clearances, friction, shifted, rotated, graded and partly covered meshes,
+cyclic sectors and periods, plates, orthotropic rings, bolts, couplings, heat. The invariants of any result are checked
+(tests/mechanics.py), and that an equivalent model (rotated, renumbered, with supports along normals, along axes, or as
+multi-point constraints) has the same result. "told" counts results that fail a check but carry a warning about it. Prints
+counts by dimension, formulation, equivalent model and outcome, errors by their first words, and the seeds of all findings;
+exit code 1 if there are any.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""A study of many small runs in one process: does the memory stay flat, are files closed, does a run stay as fast?
+"""A study of many small runs in one process: memory must stay constant, files be closed, and runs stay as fast.
 
     python bench/thousand.py [--runs 1000]
 
-Each run reads a case, changes its approach, solves it and writes a result file. Memory is the resident size of the
-process; growth is counted from run 50 on, when all kernels and caches are warm. Prints a table and one line a bar; exit
-code 1 if a bar is missed.
+Each run reads a case, changes its approach, solves it and writes a result file. Memory is the resident size of the process;
+growth is counted from run 50 on, when all kernels and caches are warm. Prints a table and a line for each criterion; exit
+code 1 if one is not met.
 """
 
 from __future__ import annotations

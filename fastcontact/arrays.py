@@ -1,6 +1,6 @@
-"""Types of arrays by what they hold, and masked arrays, which are refused.
+"""Types of arrays by content, and a check for masked arrays, which are refused.
 
-Most functions of NumPy hand on what lies behind a mask as if it were valid.
+Most NumPy functions treat masked entries as if they were valid.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
-# Places in other arrays; numbers of points and cells, as meshes hold them; numbers of any kind.
+# Indices into other arrays; numbers of points and cells in meshes; arrays of any kind.
 Indices: TypeAlias = NDArray[np.intp]
 Numbers: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
@@ -22,7 +22,7 @@ REFUSAL = "has entries that are masked, and masks are not kept: fill them first,
 
 
 def is_masked(value: Any) -> bool:
-    """Return whether an array, or one in a series or by name at any depth, has masked entries."""
+    """Return whether an array, or one nested in sequences or dictionaries, has masked entries."""
     if isinstance(value, np.ndarray):
         return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
     if isinstance(value, Mapping):

@@ -10,11 +10,11 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import contextmanager
 from typing import Any
 
-LONGEST = 1500  # characters of a message
+LONGEST = 1500  # largest number of characters of a message
 
 
 def printable(text: str) -> str:
-    """Return a text with all characters that control or format replaced by their escapes, but for the ends of lines."""
+    """Return a text in which control and format characters, except line ends, are replaced by escapes."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
@@ -24,17 +24,17 @@ class FastcontactError(Exception):
     """Base class of every error that fastcontact raises on purpose; its message is one line."""
 
     def __str__(self) -> str:
-        # Names and values from files may hold anything: line ends, what steers a terminal, thousands of characters.
+        # Names and values from files may contain anything: line ends, terminal control codes, thousands of characters.
         text = printable(" ".join(super().__str__().splitlines()))
         return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 3 :]}"
 
 
 class MeshError(FastcontactError):
-    """The mesh cannot be used: a bad cell, a missing group, a wrong number."""
+    """The mesh cannot be used: an invalid cell, a missing group, a wrong number."""
 
 
 class ModelError(FastcontactError):
-    """The model is incomplete or contradicts itself (materials, supports, loads)."""
+    """The model is incomplete or contradictory (materials, supports, loads)."""
 
 
 class ContactError(FastcontactError):
@@ -57,7 +57,7 @@ class ConvergenceError(FastcontactError):
     history : list of dict
         One entry per iteration of the failed step: residual, active constraints, displacement change.
     smaller_steps_help : bool
-        Whether the step may converge in parts.
+        Whether smaller load steps may converge.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class ConvergenceError(FastcontactError):
 
 
 class FastcontactWarning(UserWarning):
-    """Something doubtful about a model or its result, with its number."""
+    """A doubtful model or result; the message states a number."""
 
     def __str__(self) -> str:
         return printable(super().__str__())
@@ -77,7 +77,7 @@ class FastcontactWarning(UserWarning):
 
 @contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Name a file, or a place in one, at the beginning of the package's errors that do not."""
+    """Prefix errors of the package from the block with a file name, or a location in it, unless they have one."""
     try:
         yield
     except FastcontactError as error:
@@ -87,7 +87,7 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def warn(text: str) -> None:
-    """Give a FastcontactWarning at the line outside the package that called it."""
+    """Issue a FastcontactWarning at the calling line outside the package."""
     package = os.path.dirname(__file__) + os.sep
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
@@ -95,22 +95,24 @@ def warn(text: str) -> None:
     warnings.warn(text, FastcontactWarning, stacklevel=level)
 
 
-# Number of characters that a message shows of an unknown name.
+# Largest number of characters that a message shows of an unknown name.
 LONGEST_NAME = 120
 
 
 def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:
     """Return the error for a name that a module does not have, with the nearest ones."""
     text = f"module '{module}' has no attribute '{name}'"
-    if name.startswith("_"):  # what tools look for
+    if name.startswith("_"):  # a name probed by tools
         return AttributeError(text)
     near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
     remedy = ": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
-    return AttributeError(text + remedy, name=name, obj=text)  # of a text: Python adds no names of the module again
+    return AttributeError(
+        text + remedy, name=name, obj=text
+    )  # with a text as object, Python does not append its own suggestions
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a module with some public names."""
+    """Return ``__getattr__`` and ``__dir__`` of a module with lazily loaded public names."""
 
     def missing(name: str) -> object:
         raise no_attribute(module, name, known)
@@ -118,10 +120,12 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
     return missing, lambda: known
 
 
-def check_known(kind: str, name: object, known: Collection[str], error: type[FastcontactError]) -> None:
-    """Raise `error` for a name that is not among the `known` ones, with the nearest of them."""
-    if name not in known:
-        raise error(unknown(kind, str(name), known))
+def check_known(
+    kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
+) -> None:
+    """Raise `error` for a name that is not among the `known` ones, with the nearest of them, and `about` before its text."""
+    if not isinstance(name, str) or name not in known:
+        raise error(about + unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:

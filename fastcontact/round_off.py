@@ -1,17 +1,20 @@
-"""Relative sizes of round-off: what is smaller counts as zero."""
+"""Relative bounds of round-off: smaller values count as zero."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Entries that cancel or are rotated, relative to the largest.
+# Entries after cancellation or rotation, relative to the largest entry.
 ROUND_OFF = 1e-12
-# Lengths, and energies, directions and shape functions that follow from coordinates of meshes, which files keep to about ten
-# digits, relative to their size.
+# Lengths, energies, directions and shape functions computed from coordinates of meshes, which files store with about ten
+# digits, relative to their magnitude.
 LENGTH_ROUND_OFF = 1e-9
-# Coordinates and vectors that files or users may give in single precision, relative to their size.
+# Coordinates and vectors that may be given in single precision, relative to their magnitude.
 SINGLE_PRECISION = 1e-6
-# Of a sum, in units of the sum of the sizes of its terms.
+# Round-off of a sum, relative to the sum of the magnitudes of its terms.
 SUM_ROUND_OFF = 16 * float(np.finfo(float).eps)
+# Step of central differences, relative to the size of the argument: their error of second order is then about what round-off
+# makes of them.
+DIFFERENCES = float(np.finfo(float).eps) ** (1.0 / 3.0)
 # In place of a divisor that may be zero.
 TINY = 1e-300

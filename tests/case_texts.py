@@ -1,4 +1,4 @@
-"""Texts of decks and case files that tests of many rooms begin with."""
+"""Texts of decks and case files shared by many tests."""
 
 
 def square(first, height):

@@ -1,4 +1,4 @@
-"""What all tests share: where the validation cases lie, and small models."""
+"""Shared fixtures: locations of validation cases, and small models."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What must hold for any result: balance, complementarity, Coulomb's cone, moments, pressures that carry the force.
+"""Invariants of any result: balance, complementarity, Coulomb's cone, moments, integral of the pressure.
 
 Each function returns numbers that vanish in an exact solution, relative to the sizes that it names; tests and
 ``bench/random_models.py`` say how far they may be from zero.

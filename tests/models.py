@@ -1,4 +1,4 @@
-"""Models that tests of many rooms begin with."""
+"""Models shared by many tests."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Few of many cases: of a product of parameters, those that hold every pair of values; the others are slow.
+"""Covering arrays: of a product of parameters, the cases that contain every pair of values; the others are slow.
 
 Almost all faults show with one or two parameters (Kuhn, Wallace and Gallo, IEEE Trans. Software Eng. 30, 2004). A test
 with the mark `pairwise` runs a covering array of its cases by default, all of them with ``-m ''``. A test with the mark
@@ -9,9 +9,17 @@ pairs (those of elements and formulations: `test_every_solver` and the patch tes
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Sequence
 from itertools import combinations
+from typing import Any
 
 import pytest
+
+
+def first_of(count: int, cases: Sequence[Any]) -> list[Any]:
+    """Return the cases of one parameter, or of several in tuples, those after the first `count` marked as slow."""
+    rest = (pytest.param(*(c if isinstance(c, tuple) else (c,)), marks=pytest.mark.slow) for c in cases[count:])
+    return [*cases[:count], *rest]
 
 
 def covering(cases: list[dict[str, str]], strength: int = 2) -> list[int]:

@@ -1,4 +1,4 @@
-"""Load steps one by one, for tests that look inside an analysis."""
+"""Single load steps, for tests of the analysis."""
 
 from __future__ import annotations
 

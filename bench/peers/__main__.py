@@ -1,6 +1,6 @@
-"""The same contact problem by several programs, each as a whole process: ``python bench/peers PROBLEM [...]``.
+"""The same contact problem solved by several programs, each as a whole process: ``python bench/peers PROBLEM [...]``.
 
-See bench/README.md for what is measured and how the programs are got.
+bench/README.md describes the problems and lists the results.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """CalculiX: ``python3 calculix_deck.py PROBLEM.npz STEPS ANSWER.json`` writes a deck, runs ``ccx`` and reads its results.
 
-Problem ``forma04``: CAX4, which CalculiX expands to hexahedra; surface-to-surface contact by a penalty, the only one of
-its contacts that gets to the end here: node-to-surface diverges, mortar refuses the nodes of expanded elements. The
-stress on the axis is wrong there, while the next nodes along the arc are right; so is the force.
+Problem ``forma04``: CAX4, which CalculiX expands to hexahedra; surface-to-surface penalty contact, its only contact that
+completes here: node-to-surface diverges, and mortar refuses the nodes of expanded elements. The stress on the axis is wrong,
+but the next nodes along the arc and the force are correct.
 """
 
 import json

@@ -1,9 +1,9 @@
-"""dolfinx and PETSc, a primal-dual active set by hand: ``python3 dolfinx_active_set.py PROBLEM.npz STEPS ANSWER.json``.
+"""dolfinx and PETSc with a primal-dual active set: ``python3 dolfinx_active_set.py PROBLEM.npz STEPS ANSWER.json``.
 
-Problems ``octant`` and ``half``: one body on the rigid plane y = 0. The strongest competitor: K is assembled once and
-GAMG set up once, on K without contact. Nodes in contact keep their `y` by a projection: conjugate gradients run on the
-other unknowns only, with the operator P K P and the preconditioner P M P, so that no matrix is copied or changed.
-Solutions get more exact as the active set settles (Hintermueller, Ito and Kunisch, 2002, for the set itself).
+Problems ``octant`` and ``half``: one body on the rigid plane y = 0. K is assembled once, and GAMG is set up once for K
+without contact. A projection fixes `y` of the nodes in contact: conjugate gradients run on the other unknowns only, with the
+operator P K P and the preconditioner P M P, so that no matrix is copied or changed. Solutions become more accurate as the
+active set converges (Hintermueller, Ito and Kunisch, 2002).
 """
 
 import json

@@ -1,8 +1,8 @@
 """fastcontact through its public functions: ``python fastcontact_api.py PROBLEM.npz STEPS ANSWER.json [again|SOLVER]``.
 
-Geometry converged in every step, relative residual of iterative solvers 1e-8, stresses recovered in every step. With
-``again`` the same is done twice, and the CPU time of the second time, model included, is told in place of that of the
-process: what another analysis costs in a program that uses the library. SOLVER is a linear solver in place of "auto".
+The geometry converges in every step, the relative residual of iterative solvers is 1e-8, and stresses are recovered in every
+step. With ``again`` the analysis is done twice, and the CPU time of the second one, model included, is reported instead of
+that of the process: the cost of a further analysis in a program that uses the library. SOLVER replaces "auto".
 """
 
 import json

@@ -1,9 +1,9 @@
 """GetFEM: ``python3 getfem_bricks.py PROBLEM.npz STEPS ANSWER.json [rest|deformed]``.
 
-Problem ``forma04``: a mesh for each body, axisymmetric elasticity in the assembly language (no brick offers it), contact
-by multipliers in augmented form. ``rest`` is the cheapest of GetFEM's contact bricks, with the geometry of the bodies at
-rest, and comes out 2 % low in force; ``deformed`` follows the deformation, as everybody else does. Newton's method
-starts each step from the last one; MUMPS factors every tangent.
+Problem ``forma04``: a mesh for each body, axisymmetric elasticity in the assembly language (no brick offers it), contact by
+Lagrange multipliers in augmented form. ``rest`` is the cheapest contact brick, with the undeformed geometry, whose force is
+2 % too low; ``deformed`` follows the deformation, like the other programs. Newton's method starts each step from the last
+one; MUMPS factorises every tangent.
 """
 
 import json

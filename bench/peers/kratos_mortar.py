@@ -1,9 +1,9 @@
-"""Kratos: ``python3 kratos_mortar.py PROBLEM.npz STEPS ANSWER.json`` writes a model part, solves it and asks its nodes.
+"""Kratos: ``python3 kratos_mortar.py PROBLEM.npz STEPS ANSWER.json`` writes a model part, solves it and reads nodal results.
 
-Problem ``forma04``: axisymmetric elements and frictionless mortar contact with augmented Lagrangian multipliers. With its
-axisymmetric contact conditions the matrix cannot be factored, so the contact is that of plane problems: the multiplier
-is then the force by length of the meridian. AMGCL is the cheapest of the linear solvers in the wheel. Normals that follow
-the deformation cost more iterations and change the force by one in a million.
+Problem ``forma04``: axisymmetric elements and frictionless mortar contact with augmented Lagrangian multipliers. With
+axisymmetric contact conditions the matrix cannot be factorised, so that the contact conditions are those of plane problems:
+the multiplier is then the force per length of the meridian. AMGCL is the cheapest linear solver in the wheel. Normals that
+follow the deformation cost more iterations and change the force by 1e-6.
 """
 
 import json

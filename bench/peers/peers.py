@@ -1,4 +1,4 @@
-"""The programs that solve the problems: where each is looked for, how it is started, in how many threads."""
+"""The programs that solve the problems: where they are searched, how they are started, and with how many threads."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""The problems that all programs solve, as plain arrays in one file, so that everybody stands on the same mesh.
+"""The problems for all programs, as plain arrays in one file, so that all programs use the same mesh.
 
 ``python problems.py NAME DOFS PROBLEM.npz`` writes one and prints the number of its displacement components.
 
-``points`` (n, dim) [length], ``cells`` (m, 4 or 8) in VTK's order, ``E`` [pressure], ``nu``, ``approach`` [length] of
-the whole load, and by name: ``nodes_*`` numbers of points, ``facets_*`` (k, 2 or 4) of the contact surfaces, ``POLE``
-the point of first contact.
+``points`` (n, dim) [length], ``cells`` (m, 4 or 8) in VTK's order, ``E`` [pressure], ``nu``, ``approach`` [length] at full
+load, and by name: ``nodes_*``, point numbers; ``facets_*`` (k, 2 or 4) of the contact surfaces; ``POLE``, the point of
+first contact.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Assembly of a cube of hex8: values alone and with the pattern, in products with the matrix."""
+"""Assembly of a cube of hex8, values alone and with the pattern, in units of a product with the matrix."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Write a result file of 5 steps and read it again, in copies of the same stresses to a plain NumPy file."""
+"""Writing and reading a result file of 5 steps, in units of copying the same stresses to a plain NumPy file."""
 
 import tempfile
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""One linear solution of a cube of hex8 with its preparation: direct, pyamg and our multigrid (see bench/linear.py too)."""
+"""Preparation and linear solution of a cube of hex8 by the direct solver, pyamg and multigrid (see also bench/linear.py)."""
 
 import numpy as np
 

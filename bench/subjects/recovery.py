@@ -1,4 +1,4 @@
-"""Recovery of nodal stresses in a cube of hex8, in assemblies of the same mesh."""
+"""Recovery of nodal stresses in a cube of hex8, in units of the assembly of the same mesh."""
 
 import numpy as np
 

@@ -1,10 +1,9 @@
-"""Multigrid under contact: iterations, price and residual against mesh, contact, friction, materials and cells.
+"""Multigrid under contact: iterations, cost and residual for various meshes, contacts, friction, materials and cells.
 
-Two blocks that do not match are pressed together, and with friction pushed along each other. One thing at a time is varied,
-each without friction and with it. A row tells the iterations of a linear solution of the same mesh without contact, those of
-a whole cold contact step, what the step costs in units of that linear solution (L, from assembly on,
-see `suite.whole`), and the largest force out of balance over the largest nodal contact force, with a stiffness assembled
-anew.
+Two non-matching blocks are pressed together and, with friction, sheared. One property is varied at a time, without and with
+friction. A row gives the iterations of a linear solution of the same mesh without contact, those of a whole cold contact
+step, the cost of the step in units of that linear solution (L, from assembly on, see `suite.whole`), and the largest
+out-of-balance force relative to the largest nodal contact force, with a newly assembled stiffness.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
-"""Closest facets of a wavy surface or line, in nearest-point queries of SciPy's cKDTree, as many; everything shuffled.
+"""Closest facets of a wavy surface or line, in units of as many nearest-point queries of SciPy's cKDTree, in random order.
 
-Ours include the tree over the facets, the queries do not: building theirs is told apart.
+The search includes the construction of its tree, the queries do not: the construction of the cKDTree is reported separately.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Whole processes with cached kernels, in ``import numpy``: imports, and the training case."""
+"""Whole processes with cached kernels, in units of ``import numpy``: imports and the training case."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Mesh-convergence study of FORMA04 C in one process, by its number of levels, in runs of its coarsest mesh alone."""
+"""Mesh-convergence study of FORMA04 C in one process, by number of levels, in units of its coarsest mesh alone."""
 
 from pathlib import Path
 

@@ -1,11 +1,11 @@
-"""Steps of a contact analysis on one, two, four ... threads, each in a process of its own.
+"""Steps of a contact analysis on one, two, four ... threads, each in a separate process.
 
-A sphere on a block, solved by multigrid, mesh left out, assembly included. A run is timed as it is, and once more under
-Python's profiler, which tells the wall time of every stage in the main thread. A stage is a function of the package with
-what it calls outside of it. From its wall times on N threads follows its serial part by Amdahl's law, ``t(N) = s + p / N``,
-s and p not negative, in least squares. Where the main thread waits for others, waiting is work of the stage that shares it.
-Memory that gets no faster with more threads counts as serial, too: beside it stand the bytes that a product with the finest
-matrix reads in a second, and those that a sum over a long array does.
+A sphere on a block, solved by multigrid, mesh excluded, assembly included. A run is timed without and with Python's
+profiler, which gives the wall time of every stage in the main thread. A stage is a function of the package with its calls
+outside the package. Its serial part follows from the wall times on N threads by Amdahl's law, ``t(N) = s + p / N`` with
+nonnegative s and p, in the least-squares sense. Waiting of the main thread belongs to the stage that distributes the work.
+Limited memory bandwidth counts as serial, too: for comparison, the table gives the bytes per second of a product with the
+finest matrix and of a sum over a long array.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""The runner behind `fastcontact bench`; what it measures lies in ``bench/subjects``, one file each."""
+"""The runner of `fastcontact bench`; the subjects are in ``bench/subjects``, one file each."""

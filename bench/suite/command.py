@@ -1,4 +1,4 @@
-"""What `fastcontact bench` does: run subjects, print the table, write figures and pictures."""
+"""The command `fastcontact bench`: run subjects, print the table, write figures and pictures."""
 
 import json
 from pathlib import Path

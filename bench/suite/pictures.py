@@ -1,4 +1,4 @@
-"""Scaling of a benchmark: time and memory against the number of unknowns."""
+"""Scaling of a benchmark: time and memory over the number of unknowns."""
 
 from __future__ import annotations
 

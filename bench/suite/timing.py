@@ -1,4 +1,4 @@
-"""How a benchmark is timed: warm, medians, CPU seconds of all threads and child processes beside the wall clock."""
+"""Timing of a benchmark: warm-up, medians, CPU seconds of all threads and child processes, and wall time."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""A whole linear solution, L, and a whole contact step: from assembly on, by the same solver, measured in turn.
+"""A whole linear solution, L, and a whole contact step: from assembly on, by the same solver, measured alternately.
 
-L is what the same model costs without its contact: assembly, preparation of the linear solver, one solution. A contact step
-is all from assembly to recovered stresses. Checks of models, which cost both the same, are left out. Both are CPU seconds of
-the process, the least of so many runs, one after the other in turn: what else the machine does then slows both down alike.
+L is the cost of the same model without contact: assembly, preparation of the linear solver, one solution. A contact step
+comprises everything from assembly to recovered stresses. Checks of the model, equal for both, are excluded. Both are CPU
+seconds of the process, the minimum of alternating runs, so that other load on the machine affects both alike.
 """
 
 from __future__ import annotations

@@ -1,1 +1,1 @@
-"""Compilation of kernels, their cache on disk, and threads."""
+"""Kernels: compilation, cache on disk, and threads."""

@@ -1,10 +1,10 @@
-"""Kernels compiled ahead of the run that needs them, side by side in processes of their own.
+"""Compilation of kernels ahead of the run that needs them, in parallel helper processes.
 
-`kernels.json` tells which kernels the usual kinds of runs call, with the types of their arguments, in the order of the calls;
-``python bench/kernels.py`` makes it. Helpers begin with those that Python does not run in their place (`interpreting`), and
-tell the run which ones they are at. The run waits for a kernel that a helper is compiling, and meanwhile compiles one that
-none has begun; it tells the helpers which. Of a kernel that the table lacks, or knows otherwise than it is, comes no more
-than a compilation in the run.
+`kernels.json` lists the kernels called by the usual kinds of runs, with the types of their arguments, in the order of the
+calls; ``python bench/kernels.py`` makes it. Helpers begin with the kernels that cannot run in Python (`interpreting`), and
+report to the run which ones they are compiling. The run waits for a kernel that a helper is compiling, and meanwhile compiles
+one that no helper has begun, and reports it to the helpers. A kernel that is missing in the table, or listed with outdated
+types, is simply compiled in the run.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from fastcontact._jit import compiling
 
 TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
-# Helpers of a run, each as large as Python with Numba.
+# Number of helpers of a run; each takes the memory of Python with Numba.
 MOST = 3
-# Kernels not found compiled before a process gets help: a single new one is no reason to start others.
+# Number of uncompiled kernels after which helpers start: a single new kernel does not justify them.
 ALONE = 2
-# Kinds of runs that this process has had help with: later runs of these find their kernels.
+# Kinds of runs already compiled by helpers in this process: later runs of these find their kernels.
 _helped: set[str] = set()
 
 
@@ -46,37 +46,36 @@ _helped: set[str] = set()
 def table() -> dict[str, Any]:
     """Return ``{"kernels": [[module, name, [type, ...]], ...], "runs": {name: [[number, ...], [number, ...]]}}``.
 
-    The second numbers are those of kernels that Python may run in their place.
+    The second list of a run contains the kernels that may run in Python instead.
     """
     read: dict[str, Any] = json.loads(TABLE.read_text(encoding="utf-8"))
     return read
 
 
 def compiled_of(runs: Sequence[str]) -> list[int]:
-    """Return the numbers of the kernels that some kinds of runs have to compile, of all kinds if none are named."""
+    """Return the numbers of the kernels that must be compiled for some kinds of runs, by default for all kinds."""
     known = table()["runs"]
     return list(dict.fromkeys(number for run in runs or known for number in known.get(run, [[]])[0]))
 
 
 def kernels_of(runs: Sequence[str]) -> list[int]:
-    """Return the same and, after them, those that Python may run in their place."""
+    """Return the numbers of `compiled_of`, followed by those of the kernels that may run in Python."""
     known = table()["runs"]
     others = [number for run in runs or known for number in known.get(run, [[], []])[1]]
     return list(dict.fromkeys([*compiled_of(runs), *others]))
 
 
-def numba_type(given: Any) -> Any:
-    """Return the Numba type that an entry of the table tells.
+def numba_type(entry: Any) -> Any:
+    """Return the Numba type of an entry of the table.
 
-    A string is a scalar, as NumPy writes its kind and bytes; a list ``[scalar, dimensions]`` a contiguous array that may be
-    written, one with a third item "r" one that may not; ``{"class": [type, ...]}`` a named tuple, and a plain one where the
-    class is empty.
+    A string is a scalar in NumPy's notation of kind and bytes. A list ``[scalar, dimensions]`` is a contiguous array; it is
+    read-only with a third item "r". ``{"class": [type, ...]}`` is a named tuple, or a plain tuple if the class is empty.
     """
-    if isinstance(given, str):
-        return from_dtype(dtype(given))
-    if isinstance(given, list):
-        return types.Array(numba_type(given[0]), given[1], "C", readonly=len(given) > 2)
-    ((name, members),) = given.items()
+    if isinstance(entry, str):
+        return from_dtype(dtype(entry))
+    if isinstance(entry, list):
+        return types.Array(numba_type(entry[0]), entry[1], "C", readonly=len(entry) > 2)
+    ((name, members),) = entry.items()
     inside = [numba_type(member) for member in members]
     if not name:
         return types.Tuple(inside)
@@ -87,20 +86,20 @@ def numba_type(given: Any) -> Any:
 
 
 def compile_kernel(number: int) -> None:
-    """Compile a kernel of the table, or find it on disk."""
-    module, name, given = table()["kernels"][number]
-    getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, given)))
+    """Compile a kernel of the table, or load it from disk."""
+    module, name, signature = table()["kernels"][number]
+    getattr(importlib.import_module(module), name).compile(tuple(map(numba_type, signature)))
 
 
 def _is_kept(number: int) -> bool:
-    """Return whether a kernel of the table is found compiled, for any types."""
+    """Return whether a compiled version of a kernel of the table is on disk, for any types."""
     module, name, _ = table()["kernels"][number]
-    found = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
-    return found is not None and found.exist()
+    files = kernel_files.files.get(getattr(importlib.import_module(module), name).py_func)
+    return files is not None and files.exist()
 
 
 def _file_name(number: int) -> str:
-    """Return how the file of a kernel of the table begins."""
+    """Return the beginning of the file name of a kernel of the table."""
     module, name, _ = table()["kernels"][number]
     return f"{module.rpartition('.')[2]}.{name}"
 
@@ -108,9 +107,9 @@ def _file_name(number: int) -> str:
 def start(
     runs: Sequence[str], helpers: int, output: int = subprocess.PIPE, errors: int = subprocess.DEVNULL
 ) -> list[subprocess.Popen[str]]:
-    """Start processes that share the kernels of some kinds of runs.
+    """Start helper processes that share the compilation of the kernels of some kinds of runs.
 
-    Each writes to `output` which one it is at, and to `errors` why one was not compiled.
+    Each writes the kernel it begins to `output`, and the reason of a failed compilation to `errors`.
     """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
@@ -126,14 +125,14 @@ def start(
 
 
 def _end(processes: list[subprocess.Popen[str]]) -> None:
-    """End helpers that are still at work; what they have compiled is complete."""
+    """End helpers that are still running; the kernels they have compiled are complete."""
     for process in processes:
         process.terminate()
         process.wait()
 
 
 class Help:
-    """Helpers of a run, seen from the run.
+    """Interface of a run to its helpers.
 
     Parameters
     ----------
@@ -145,13 +144,13 @@ class Help:
 
     def __init__(self, runs: Sequence[str], processes: list[subprocess.Popen[str]]) -> None:
         self._processes, self._left, self._needed = processes, kernels_of(runs), compiled_of(runs)
-        self._current: dict[int, int] = {}  # kernel of each helper at work
+        self._current: dict[int, int] = {}  # kernel being compiled by each helper
         self._changed = threading.Condition()
         for number in range(len(processes)):
             threading.Thread(target=self._listen, args=(number,), daemon=True).start()
 
     def _listen(self, number: int) -> None:
-        """Note what a helper tells until it ends."""
+        """Record the reports of a helper until it ends."""
         lines = self._processes[number].stdout
         for line in lines or ():
             self._note(number, int(line))
@@ -166,9 +165,9 @@ class Help:
             self._changed.notify_all()
 
     def wait(self, name: str) -> bool:
-        """Wait while a helper compiles a kernel of this name; return whether one did.
+        """Wait while a helper compiles a kernel of this name; return whether a helper has compiled it.
 
-        Meanwhile kernels are compiled here that none has begun; if it is this one that none has, helpers leave it alone.
+        Meanwhile this process compiles kernels that no helper has begun. If none has begun this one, helpers skip it.
         """
         with self._changed:
             at_work = [(helper, kernel) for helper, kernel in self._current.items() if _file_name(kernel) == name]
@@ -184,7 +183,7 @@ class Help:
         return bool(at_work)
 
     def _compile_next(self) -> bool:
-        """Compile a kernel that the run will need and no helper has begun; return whether there is one."""
+        """Compile a needed kernel that no helper has begun; return whether there was one."""
         numbers = [number for number in self._left if number in self._needed][:1]
         self._take(numbers)
         for number in numbers:
@@ -192,7 +191,7 @@ class Help:
         return bool(numbers)
 
     def _take(self, numbers: list[int]) -> None:
-        """Tell helpers which kernels are compiled here."""
+        """Report to the helpers which kernels this process compiles."""
         with self._changed:
             self._left = [number for number in self._left if number not in numbers]
         for process, number in itertools.product(self._processes, numbers):
@@ -201,12 +200,12 @@ class Help:
 
 
 def expect(runs: Sequence[str]) -> None:
-    """Let helpers compile what some kinds of runs need as soon as this process lacks more than a few kernels.
+    """Let helpers compile the kernels of some kinds of runs as soon as this process lacks more than a few of them.
 
-    They start if one of these is no kernel that Python may run: a run after the first one needs no help.
+    They start only if one of these kernels cannot run in Python: later runs of the same kind need no helpers. There are no
 
-    Not in a process that works for another one, nor where threads are limited to one, kernels are not kept, or the
-    interpreter is part of another program.
+    helpers in worker processes, with a single thread, without a kernel cache, or if the interpreter is embedded in another
+    program.
     """
     new, helpers = [run for run in runs if run not in _helped], min(numba.get_num_threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
@@ -217,9 +216,9 @@ def expect(runs: Sequence[str]) -> None:
         if compiling.count > ALONE and begin in compiling.helpers:
             compiling.helpers.remove(begin)
             _helped.update(new)
-            if all(map(_is_kept, compiled_of(new))):  # what is left Python runs in their place
+            if all(map(_is_kept, compiled_of(new))):  # the remaining ones may run in Python
                 return
-            with contextlib.suppress(OSError):  # the run compiles alone
+            with contextlib.suppress(OSError):  # the run compiles without helpers
                 compiling.waiters.append(Help(new, start(new, helpers)).wait)
 
     compiling.helpers[:] = [begin]
@@ -227,20 +226,20 @@ def expect(runs: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: what a helper does.
+    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: the task of a helper.
 
-    Return the number of those that cannot be compiled.
+    Return the number of kernels that failed to compile.
     """
     n, first, *runs = arguments
-    taken: set[int] = set()
+    compiled_elsewhere: set[int] = set()
     failed = 0
-    threading.Thread(target=lambda: taken.update(map(int, sys.stdin)), daemon=True).start()
+    threading.Thread(target=lambda: compiled_elsewhere.update(map(int, sys.stdin)), daemon=True).start()
     for number in kernels_of(runs)[int(first) :: int(n)]:
         print(number, flush=True)
-        if number not in taken:
+        if number not in compiled_elsewhere:
             try:
                 compile_kernel(number)
-            except Exception as error:  # the run will tell, if it needs the kernel
+            except Exception as error:  # the run reports it if it needs the kernel
                 failed += 1
                 print(
                     f"{_file_name(number)}: {type(error).__name__}: {error}".split("\n")[0], file=sys.stderr, flush=True
@@ -249,4 +248,4 @@ def main(arguments: Sequence[str]) -> int:
 
 
 if __name__ == "__main__":
-    os._exit(min(main(sys.argv[1:]), 1))  # Python would not end beside a thread that reads its standard input
+    os._exit(min(main(sys.argv[1:]), 1))  # a normal exit would wait for the thread that reads standard input

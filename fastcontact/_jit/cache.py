@@ -1,8 +1,8 @@
-"""Cache of compiled kernels on disk: a file is used only if intact, owned by the user and built from the present sources.
+"""Cache of compiled kernels on disk: a file is used only if intact, owned by the user and built from the current sources.
 
-Numba knows a kernel by the time and size of its own source file, reads whatever lies in its cache, and stops where that is
-damaged. Here the name of a file tells the contents of all sources that the kernel depends on, so that kernels outlive another
-installation of the same version, and its last bytes tell what stands before, so that damage costs a compilation.
+Numba identifies a kernel by time and size of its source file alone, trusts any file in its cache, and fails if that is
+damaged. Here the file name contains a digest of all sources that the kernel depends on, so that kernels stay valid after a
+new installation of the same version, and a file ends with its checksum, so that damage only costs a compilation.
 """
 
 from __future__ import annotations
@@ -15,75 +15,76 @@ import secrets
 import stat
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property, lru_cache, partial
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
+from numba.core.runtime import rtsys
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
 
 log = logging.getLogger("fastcontact")
-# What Numba compiles by, and does not tell apart in its cache.
+# Settings of Numba that affect compiled code but not the keys of its cache.
 OPTIONS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "CPU_NAME", "CPU_FEATURES", "THREADING_LAYER")
-# Characters of a digest.
+# Number of characters of a digest.
 DIGEST = 64
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
 class KernelFiles:
-    """Files of the compiled versions of a kernel, with the methods that Numba's dispatcher calls.
+    """Files of the compiled versions of a kernel, with the interface of Numba's dispatcher.
 
-    What goes wrong with a file is told once, in one line; the kernel is then compiled.
+    Problems with a file are logged once, in one line; the kernel is then compiled.
 
     Parameters
     ----------
     folder : pathlib.Path
-        Where the files lie.
+        Folder of the files.
     name : str
-        Beginning of their names.
+        Beginning of the file names.
     function : callable
         The kernel in Python.
     options : str
-        By which it is compiled.
+        Options of the compilation.
     numbas : object
-        Numba's own file of the kernel, which turns its objects into bytes and back.
+        Numba's cache implementation of the kernel, which serialises its objects.
     """
 
     def __init__(self, folder: Path, name: str, function: Callable[..., Any], options: str, numbas: Any) -> None:
         self.folder, self._name, self._function, self._options, self._numbas = folder, name, function, options, numbas
 
     def exist(self) -> bool:
-        """Return whether the kernel, as it is now, is kept for any signature."""
+        """Return whether the current kernel is stored for any signature."""
         with contextlib.suppress(OSError):
             return self.version in _versions(self.folder, os.stat(self.folder).st_mtime_ns)
         return False
 
     def load(self, key: Any) -> Any:
-        """Return what is kept for a signature, once a helper at work on it is done; None if nothing may be used."""
+        """Return the stored kernel of a signature, after waiting for a helper that compiles it; None if there is none."""
         path = self._path(key)
         while not path.exists() and compiling.wait(self._name):
             pass
         try:
             with open(path, "rb") as file:
                 if not _is_own(os.fstat(file.fileno())):
-                    _tell(f"others may write to the compiled kernel '{path}'")
+                    _log_once(f"others may write to the compiled kernel '{path}'")
                     return None
                 content = file.read()
             if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
                 return self._numbas._load_data(str(path))
-            _tell(f"the compiled kernel '{path}' is damaged")
+            _log_once(f"the compiled kernel '{path}' is damaged")
         except FileNotFoundError:
             pass
-        except Exception as error:  # of an object that another release of a library has written
-            _tell(f"the compiled kernel '{path}' cannot be read ({error})")
+        except Exception as error:  # e.g. an object written by another release of a library
+            _log_once(f"the compiled kernel '{path}' cannot be read ({error})")
         return None
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep what was compiled for a signature; the file appears whole or not at all."""
+        """Store the compiled kernel of a signature; the file is written completely or not at all."""
         path, content = self._path(key), self._numbas._dump(data)
         temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
         try:
@@ -91,31 +92,31 @@ class KernelFiles:
             temporary.write_bytes(content + _digest(content).encode())
             os.replace(temporary, path)
         except OSError as error:
-            _tell(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
+            _log_once(f"compiled kernels cannot be kept in '{path.parent}' ({error.strerror or error})")
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
     def flush(self) -> None:
-        """Do nothing: what is out of date has another name."""
+        """Do nothing: outdated files have other names."""
 
     def _path(self, key: Any) -> Path:
         return self.folder / f"{self.version}.{_digest(repr(key).encode())[:24]}.nbc"
 
     @cached_property
     def version(self) -> str:
-        """The name, and a digest of what the machine code depends on, apart from the signature and the processor."""
+        """The name, and a digest of the dependencies of the machine code except signature and processor."""
         environment = {name: getattr(numba.config, name, None) for name in OPTIONS}
-        parts = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
-        depends = "\n".join([*parts, *sorted(set(_sources(self._function, set())))])
+        settings = [__version__, numba.__version__, llvmlite.__version__, sys.version, self._options, repr(environment)]
+        depends = "\n".join([*settings, *sorted(set(_sources(self._function, set())))])
         return f"{self._name}.{_digest(depends.encode())[:24]}"
 
 
-# Those of all kernels that are kept, by their functions in Python.
+# Files of all cached kernels, by their Python functions.
 files: dict[Any, KernelFiles] = {}
 
 
 def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
-    """Keep a kernel, made from a function with `options`, in `KernelFiles`; return why it cannot be kept, empty if it can."""
+    """Cache a kernel, compiled from a function with `options`, in `KernelFiles`; return the reason if this is impossible."""
     numbas: Any = getattr(kernel, "_cache", None)
     if numbas is None:
         return ""  # kernels are not compiled
@@ -124,18 +125,26 @@ def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
     files[function] = numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
+    if hasattr(numbas, "_load_overload"):  # not a public name of Numba
+        numbas.load_overload = partial(_loaded, numbas)
     return ""
+
+
+def _loaded(numbas: Any, signature: Any, target: Any) -> Any:
+    """Return a cached kernel, or None, without the compiler that Numba's own method imports first (58 modules)."""
+    rtsys.initialize(target)
+    return numbas._load_overload(signature, target)
 
 
 @lru_cache(maxsize=1)
 def _versions(folder: Path, changed: int) -> set[str]:
-    """Return which versions of kernels lie in a folder that was `changed` last at that time [ns]."""
+    """Return the versions of kernels in a folder that was `changed` last at that time [ns]."""
     return {name.rsplit(".", 2)[0] for name in os.listdir(folder)}
 
 
 @cache
 def folder_of(fallback: str) -> Path:
-    """Return the folder of compiled kernels: in NUMBA_CACHE_DIR, else in the user's cache, else `fallback`."""
+    """Return the folder of compiled kernels: in NUMBA_CACHE_DIR, otherwise in the user's cache, otherwise `fallback`."""
     chosen = str(getattr(numba.config, "CACHE_DIR", ""))
     if chosen:
         base = chosen
@@ -158,12 +167,12 @@ def folder_of(fallback: str) -> Path:
 
 @cache
 def is_trusted(folder: Path) -> bool:
-    """Return whether nobody but the owner of this process and root can write to a folder: what lies there is run.
+    """Return whether only the owner of this process and root can write to a folder, since its files are executed.
 
-    Groups of their own, which many systems give to each user, are no others.
+    The private group that many systems create for each user counts as its owner.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    above = os.stat(folder.parent)  # others who may rename the folder could put one of theirs in its place
+    above = os.stat(folder.parent)  # users who may rename the folder could replace it
     return _is_own(os.stat(folder)) and (bool(above.st_mode & stat.S_ISVTX) or _is_own(above))
 
 
@@ -175,7 +184,7 @@ def _is_own(status: os.stat_result) -> bool:
 
 
 @cache
-def _tell(text: str) -> None:
+def _log_once(text: str) -> None:
     """Log a line, once in a process."""
     log.info("%s: compiling instead", text)
 
@@ -190,9 +199,9 @@ def _digest_of_file(path: str) -> str:
 
 
 def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
-    """Yield what the code of a function, and of the kernels and intrinsics that it may call, depends on.
+    """Yield the sources on which a function, with the kernels and intrinsics that it may call, depends.
 
-    These are their files, and the constants of other files that are compiled into them.
+    These are their files, and constants from other files that are compiled into them.
     """
     code = function.__code__
     if code in seen:
@@ -201,7 +210,7 @@ def _sources(function: Callable[..., Any], seen: set[Any]) -> Iterator[str]:
     yield _digest_of_file(code.co_filename)
     for name in code.co_names:
         value = function.__globals__.get(name)
-        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # of a kernel, of an intrinsic
+        called = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # for kernels, intrinsics
         if called is not None:
             yield from _sources(called, seen)
         elif isinstance(value, CONSTANTS):

@@ -1,7 +1,7 @@
 """Decorators of kernels: disk cache, strict floating-point arithmetic, threads.
 
-Kernels compile at their first call, never at import. Where no folder is writable for the cache, they compile
-in every process instead, and one line in the log says so.
+Kernels are compiled at their first call, never at import. If no folder is writable for the cache, they are compiled
+in every process instead, with one line in the log.
 """
 
 from __future__ import annotations
@@ -22,37 +22,37 @@ from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
 
-# Arithmetic is done as written, products and sums not fused to one rounding either. A kernel that others call is compiled
-# once by itself and once as a part of each of them, and optimised differently there; which of the copies runs depends on
-# what was compiled or loaded before. Only where each operation has one result do all of them give the same bits.
+# Arithmetic is done as written, without fused multiply-add. A kernel called by others is compiled once by itself and once
+# as a part of each of them, and optimised differently there; which of the copies runs depends on what was compiled or
+# loaded before. All copies give the same bits only if each operation has a unique result.
 AS_WRITTEN: set[str] = set()
-# What vectors may do in a kernel that neither calls another nor is called by one: of that there is one copy.
+# Vectorisation allowed in kernels that neither call nor are called by others, so that only one copy exists.
 ANY_ORDER = {"contract", "reassoc"}
 
 _cache_reported = False
 
 
 class _Compilations(event.Listener):  # type: ignore[misc]
-    """Hears of kernels of this package that are compiled; Numba tells nothing of those that it reads from the cache.
+    """Listener for compilations of kernels; Numba raises no event for kernels read from the cache.
 
-    Garbage is collected after a kernel, not 60 times within it, which takes a tenth of the time that Numba does.
+    Garbage is collected after a kernel, not 60 times within it, which would take a tenth of the compilation time.
     """
 
-    depth = 0  # a kernel compiles those that it calls
+    depth = 0  # nesting: a kernel compiles those that it calls
     collects = True
 
-    def on_start(self, found: Any) -> None:
-        """Tell those who wait, and hold garbage collection back."""
-        if getattr(found.data["dispatcher"], "__module__", "").startswith("fastcontact."):
+    def on_start(self, raised_event: Any) -> None:
+        """Notify listeners and suspend garbage collection."""
+        if getattr(raised_event.data["dispatcher"], "__module__", "").startswith("fastcontact."):
             compiling.notify()
             if self.depth == 0:
                 self.collects = gc.isenabled()
                 gc.disable()
             self.depth += 1
 
-    def on_end(self, found: Any) -> None:
-        """Collect garbage again as before."""
-        if getattr(found.data["dispatcher"], "__module__", "").startswith("fastcontact."):
+    def on_end(self, raised_event: Any) -> None:
+        """Resume garbage collection."""
+        if getattr(raised_event.data["dispatcher"], "__module__", "").startswith("fastcontact."):
             self.depth -= 1
             if self.depth == 0 and self.collects:
                 gc.enable()
@@ -63,15 +63,15 @@ _forked_without_threads = False
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile `function` lazily in nopython mode, with the disk cache where one can be had."""
+    """Compile `function` lazily in nopython mode, with the disk cache if available."""
     return _compile(function, parallel=False)
 
 
 def interpretable_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`; where it is small and not compiled yet, Python runs it, to the same bits.
+    """Like `kernel`, but small calls run in Python while it is not compiled yet, with bitwise equal results.
 
-    For sums, products, quotients and square roots alone: powers and sums of arrays are other ones in NumPy. Only for kernels
-    that no other one calls, as it is no kernel to Numba.
+    It must contain only sums, products, quotients and square roots, since powers and array sums differ in NumPy. It must not
+    be called by other kernels, since it is not a kernel for Numba.
     """
     dispatcher = kernel(function)
     return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
@@ -80,26 +80,27 @@ def interpretable_kernel(function: Callable[..., Any]) -> Any:
 def parallel_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory.
 
-    With NUMBA_BOUNDSCHECK=1 the loops run in one thread: Numba checks no index inside parallel ones.
+    With NUMBA_BOUNDSCHECK=1 the loops run in one thread, since Numba checks no indices in parallel loops.
     """
     return _compile(function, parallel=not getattr(numba.config, "BOUNDSCHECK", None))
 
 
 def summing_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for long sums of products, which vectors take in an order of their own: the same in every run.
+    """Like `kernel`, for long sums of products, vectorised with another order of summation that is the same in every run.
 
-    Only where the last bits may differ between processors, as they do in BLAS, and no other kernel calls it, or is called.
+    It is for results whose last bits may differ between processors, as in BLAS, and must neither call nor be called by
+    others.
     """
     return _compile(function, parallel=False, fastmath=ANY_ORDER)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for parts of hot loops: Numba puts the code in the place of each call."""
+    """Like `kernel`, for parts of hot loops: Numba inlines the code at each call."""
     return _compile(function, parallel=False, inline="always")
 
 
 def innermost_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for what the innermost loops call: LLVM puts the machine code in the place of each call.
+    """Like `kernel`, for functions called in innermost loops: LLVM inlines the machine code at each call.
 
     Small arrays then stay in registers, where `inlined_kernel` leaves them in memory.
     """
@@ -108,11 +109,11 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
 
 def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
     options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
-    options["no_cfunc_wrapper"] = True  # a second entry for C, which nobody calls
+    options["no_cfunc_wrapper"] = True  # an unused second entry point for C
     options |= inlining
     try:
         cached = numba.njit(cache=True, **options)(function)
-        reason = cache.keep(cached, function, repr(options | {"fastmath": sorted(fastmath)}))  # a set has any order
+        reason = cache.keep(cached, function, repr(options | {"fastmath": sorted(fastmath)}))  # sets are unordered
         if not reason:
             return cached
     except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
@@ -128,20 +129,22 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
 
 def _notice_fork() -> None:
     global _forked_without_threads
-    with contextlib.suppress(ValueError):  # no parallel kernel was loaded yet: the child starts threads of its own
+    with contextlib.suppress(ValueError):  # no parallel kernel was loaded yet: the child starts its own threads
         _forked_without_threads = numba.threading_layer() == "omp" and compiled()
 
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_notice_fork)
-    os.register_at_fork(after_in_child=compiling.waiters.clear)  # nothing in a child hears of its parent's helpers
+    os.register_at_fork(
+        after_in_child=compiling.waiters.clear
+    )  # a child does not receive reports of its parent's helpers
 
 
 def check_threads() -> None:
-    """Refuse parallel kernels where they would end the process: in a child forked after their threads had started.
+    """Raise FastcontactError in a child forked after the start of kernel threads, where parallel kernels would end it.
 
-    The threads of GNU's OpenMP do not survive a fork; its library ends such a child without an exception, and a process
-    pool then waits for ever.
+    The threads of GNU OpenMP do not survive a fork; the library ends such a child without an exception, and a process
+    pool then waits forever.
     """
     if _forked_without_threads:
         raise FastcontactError(
@@ -152,7 +155,7 @@ def check_threads() -> None:
 
 
 def compiled() -> bool:
-    """Return whether kernels are compiled in this process: not where NUMBA_DISABLE_JIT is set."""
+    """Return whether kernels are compiled in this process, i.e. NUMBA_DISABLE_JIT is not set."""
     return not getattr(numba.config, "DISABLE_JIT", False)
 
 

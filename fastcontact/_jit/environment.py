@@ -1,4 +1,4 @@
-"""What Numba needs of the environment, checked before it is imported, which would end with a traceback."""
+"""Checks of the environment before the import of Numba, which would otherwise fail with a traceback."""
 
 from __future__ import annotations
 

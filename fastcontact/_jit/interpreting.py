@@ -1,8 +1,8 @@
-"""Kernels that run as Python for as long as they are not compiled, where that takes less time than compiling them.
+"""Kernels that run in Python while they are not compiled, if that takes less time than their compilation.
 
-A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and Numba one or two seconds.
-Python runs it until it has spent about as much time on it as compiling takes, in this run and those before: whatever runs
-follow, that takes no more than twice the time of the better choice. The arithmetic is the same to the last bit: sums,
+A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and its compilation one or two
+seconds. Python runs it until it has spent about the time of a compilation on it, in this run and earlier ones: for any
+later runs, that takes at most twice the time of the better choice. The arithmetic is the same to the last bit: sums,
 products, quotients and square roots of doubles, in the order written.
 """
 
@@ -24,24 +24,24 @@ import numpy as np
 from fastcontact._jit import compiling
 from fastcontact._jit.cache import KernelFiles
 
-# Entries of all arguments of a call, and seconds in all calls of a kernel, up to which it runs as Python: that takes 1 to 8
-# microseconds an entry, and Numba 0.2 to 3 seconds a kernel. With the seconds of earlier runs it is what most kernels cost.
+# Limits for Python: entries of all arguments of a call, and seconds in all calls of a kernel. Python takes 1 to 8
+# microseconds per entry, and Numba 0.2 to 3 seconds per kernel. With earlier runs the limit is the cost of most kernels.
 ENTRIES, SECONDS, SECONDS_OF_RUNS = 200_000, 0.5, 1.0
-# File beside the compiled kernels: seconds that Python has spent on others, by their versions.
+# File beside the compiled kernels: seconds that Python has spent on uncompiled ones, by version.
 SPENT = "interpreted.json"
-# NumPy computes with smaller types in other ones than Numba; those of a byte are compared only.
+# NumPy and Numba promote smaller types differently; types of one byte are only compared.
 EXACT = ("float64", "int64", "int32", "uint8", "bool")
 
 
 class Interpretable:
-    """A kernel that Python runs for as long as it is small and no compiled version is kept.
+    """A kernel that runs in Python while calls are small and no compiled version is stored.
 
     Parameters
     ----------
     compiled : object
-        What Numba makes of the kernel.
+        The Numba dispatcher of the kernel.
     files : KernelFiles, optional
-        Where compiled versions are kept.
+        Files of the compiled versions.
     """
 
     def __init__(self, compiled: Any, files: KernelFiles | None) -> None:
@@ -51,11 +51,11 @@ class Interpretable:
         self._call: Callable[..., Any] = self._choose
 
     def __call__(self, *arguments: Any) -> Any:
-        """Return what the kernel returns."""
+        """Return the result of the kernel."""
         return self._call(*arguments)
 
     def _choose(self, *arguments: Any) -> Any:
-        """Compute a call by Python, or this and all later ones by the compiled kernel."""
+        """Compute a call in Python, or this and all later calls with the compiled kernel."""
         began = time.thread_time()
         if self._is_compiled() or not self._is_small(arguments):
             self._call = self.compiled
@@ -68,11 +68,11 @@ class Interpretable:
         return result
 
     def _is_compiled(self) -> bool:
-        """Return whether it is compiled, in this process or on disk."""
+        """Return whether the kernel is compiled, in this process or on disk."""
         return bool(self.compiled.signatures) or (self._files is not None and self._files.exist())
 
     def _is_small(self, arguments: tuple[Any, ...]) -> bool:
-        """Return whether Python may run a call: what it has spent on others is less than compiling costs."""
+        """Return whether a call may run in Python: the time spent so far is less than that of a compilation."""
         if self._spent > SECONDS or entries(arguments) > ENTRIES:
             return False
         if _due or self._files is None:
@@ -83,19 +83,19 @@ class Interpretable:
 
     @property
     def spent(self) -> tuple[Path, str, float] | None:
-        """Folder, version, and the seconds that Python has spent on it in this process; None if it is not kept."""
+        """Folder, version, and seconds spent in Python in this process; None for a kernel that is not cached."""
         return None if self._files is None else (self._files.folder, self._files.version, self._spent)
 
 
-# Kernels that Python has run in this process, and the one that is compiled for the time of earlier runs: no run has to
-# compile all of them at once.
+# Kernels run in Python in this process, and the one compiled because of the time in earlier runs: only one per run, so that
+# no run has to compile all at once.
 _interpreted: list[Interpretable] = []
 _due: list[Interpretable] = []
 
 
 @functools.cache
 def _spent_before(folder: Path) -> dict[str, float]:
-    """Return the seconds that Python spent on kernels in earlier runs, by their versions."""
+    """Return the seconds spent in Python on kernels in earlier runs, by version."""
     with contextlib.suppress(OSError, ValueError):
         read = json.loads((folder / SPENT).read_text(encoding="utf-8"))
         return {str(version): float(seconds) for version, seconds in read.items()}
@@ -103,7 +103,7 @@ def _spent_before(folder: Path) -> dict[str, float]:
 
 
 def note_spent() -> None:
-    """Add the seconds of this process to those of earlier runs; of runs that end at the same time one counts."""
+    """Add the seconds of this process to those of earlier runs; of runs that end simultaneously one is counted."""
     spent = [kernel.spent for kernel in _interpreted if kernel.spent is not None]
     for folder in {folder for folder, _, _ in spent}:
         _spent_before.cache_clear()
@@ -121,35 +121,35 @@ atexit.register(note_spent)
 
 
 def interpret(kernel: Any, arguments: tuple[Any, ...]) -> Any:
-    """Return what a kernel returns, computed by Python."""
-    with np.errstate(all="ignore"):  # as compiled ones, which tell nothing
+    """Return the result of a kernel, computed in Python."""
+    with np.errstate(all="ignore"):  # compiled kernels do not warn either
         return _plain(as_python(kernel)(*map(_number, arguments)))
 
 
-def entries(given: Any) -> float:
+def entries(argument: Any) -> float:
     """Return the number of entries of an array, a scalar or a tuple of these; infinite for a type that is not `EXACT`."""
-    if isinstance(given, tuple):
-        return float(sum(map(entries, given)))
-    exact = isinstance(given, bool | int | float) or getattr(given, "dtype", "") in EXACT
-    return float(np.size(given)) if exact else np.inf
+    if isinstance(argument, tuple):
+        return float(sum(map(entries, argument)))
+    exact = isinstance(argument, bool | int | float) or getattr(argument, "dtype", "") in EXACT
+    return float(np.size(argument)) if exact else np.inf
 
 
 @functools.cache
 def as_python(kernel: Any) -> Callable[..., Any]:
-    """Return the function that a kernel is compiled from; kernels that it calls are Python, too."""
+    """Return the Python function of a kernel; the kernels that it calls are Python functions, too."""
     function = getattr(kernel, "py_func", kernel)
     known, code = function.__globals__, function.__code__
-    parts = {name: as_python(known[name]) for name in code.co_names if hasattr(known.get(name), "py_func")}
-    return FunctionType(code, {**known, **parts}, function.__name__, function.__defaults__, function.__closure__)
+    called = {name: as_python(known[name]) for name in code.co_names if hasattr(known.get(name), "py_func")}
+    return FunctionType(code, {**known, **called}, function.__name__, function.__defaults__, function.__closure__)
 
 
-def _number(given: Any) -> Any:
-    """Return an argument so that a division by zero gives what it does in compiled code."""
-    return np.float64(given) if isinstance(given, float) else given
+def _number(argument: Any) -> Any:
+    """Return an argument in a type whose division by zero gives the same result as in compiled code."""
+    return np.float64(argument) if isinstance(argument, float) else argument
 
 
 def _plain(result: Any) -> Any:
-    """Return numbers of a result as Numba returns them."""
+    """Return the numbers of a result in the types of Numba."""
     if type(result) is tuple:
         return tuple(map(_plain, result))
     return result.item() if isinstance(result, np.generic) else result

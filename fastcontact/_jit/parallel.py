@@ -1,7 +1,7 @@
 """Deterministic multithreading: results do not depend on the number of threads.
 
-Compiled loops release the interpreter, so plain threads run them side by side. Each has its own rows of a matrix, or its
-own cells; nothing is added across threads.
+Compiled loops release the interpreter lock, so that plain threads run them in parallel. Each thread has its own rows of a
+matrix, or its own cells; there are no sums across threads.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._jit import decorators
+from fastcontact.arrays import AnyArray
 
 Result = TypeVar("Result")
 Part = TypeVar("Part")
 Given = ParamSpec("Given")
-# With fewer cells, of so many nodes, the start of threads costs more than they save.
+# With fewer cells, of this number of nodes, threads cost more to start than they save.
 WORTHWHILE, NODES = 20_000, 4
 MOST = 255
 
 
 def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on every part, the first in this thread, the others each in one of their own."""
+    """Return the results of `work` on every part: the first runs in this thread, the others in one new thread each."""
     if len(parts) == 1:
         return [work(parts[0])]
     with ThreadPoolExecutor(len(parts) - 1) as pool:
@@ -42,9 +42,9 @@ def _libraries() -> Any:
 
 
 def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Keep BLAS to one thread while a function runs: its others spin between the small calls of a contact iteration.
+    """Limit BLAS to one thread while a function runs: further threads spin between the small calls of a contact iteration.
 
-    Also, the number of its threads decides the order of its sums, and so the last bits of a result.
+    Besides, the number of threads determines the order of summation, and thus the last bits of a result.
     """
 
     @wraps(function)
@@ -55,7 +55,7 @@ def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Res
     return limited
 
 
-def read_only(numbers: NDArray[Any]) -> NDArray[Any]:
+def read_only(numbers: AnyArray) -> AnyArray:
     """Return a view that cannot be written, as the arrays of a mesh are: kernels are compiled for either kind."""
     view = numbers.view()
     view.flags.writeable = False
@@ -63,9 +63,9 @@ def read_only(numbers: NDArray[Any]) -> NDArray[Any]:
 
 
 def portions(count: int, nodes: int = NODES) -> list[tuple[int, int]]:
-    """Return ranges of nearly equal size that cover 0 to `count`: one a thread, or one for little work.
+    """Return ranges of nearly equal size that cover 0 to `count`: one per thread, or a single one for little work.
 
-    What is done for each of `count` cells grows with their number of `nodes`.
+    The work for each of the `count` cells grows with its number of `nodes`.
     """
     if count * nodes < WORTHWHILE * NODES:
         return [(0, count)]

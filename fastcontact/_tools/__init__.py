@@ -1,1 +1,1 @@
-"""What every room uses: checks of arguments, tables for notebooks, paths, packed data, HDF5 and TOML with care."""
+"""Common tools: checks of arguments, tables for notebooks, paths, packed data, safe reading of HDF5 and TOML."""

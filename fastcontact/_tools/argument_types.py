@@ -1,8 +1,8 @@
 """Type checks of the arguments of public calls.
 
-What an argument may be is what its annotation says, so no call has a list of its own. Numbers are any real numbers, NumPy's
-too, but no truth values; sequences are also arrays and iterators, but no strings; arrays are all that NumPy makes one of.
-Whether a value makes sense is left to the call.
+The annotation of an argument determines its allowed types, so that calls need no separate lists. Numbers are real numbers,
+including NumPy's but not booleans; sequences include arrays and iterators but not strings; arrays are everything that NumPy
+converts to one. Whether a value is meaningful is checked by the call itself.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ _REAL = {bool: "True or False", int: "a whole number", float: "a number"}
 
 
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
-    """Return a decorator that raises `error` for an argument that its annotation excludes.
+    """Return a decorator that raises `error` for arguments that do not match their annotation.
 
-    It is one of functions, or of classes, whose constructor and public methods it guards.
+    It decorates functions, or classes, whose constructor and public methods it checks.
     """
 
     def decorate(call: F) -> F:
@@ -56,10 +56,10 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     @functools.wraps(call)
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
-            given, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
-        except TypeError:  # Python says best which argument is missing, or is none
+            values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
+        except TypeError:  # Python's message on missing and unknown arguments is the best
             return call(*args, **kwargs)
-        for key, value in given.items():
+        for key, value in values.items():
             parameter = signature.parameters[key]
             annotation = annotations.get(key, Any)
             if parameter.kind is parameter.VAR_KEYWORD:
@@ -81,7 +81,7 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 
 
 def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
-    """Return the signature with the keys of an unpacked `TypedDict` as keyword arguments, None by default, for `help`."""
+    """Return the signature for `help`, with the keys of an unpacked `TypedDict` as keyword arguments (default None)."""
     parameters = list(signature.parameters.values())
     if not parameters or not str(parameters[-1].annotation).startswith("Unpack["):
         return signature
@@ -95,7 +95,7 @@ def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Si
 
 
 def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
-    """Return the name of a function, or of the class that a user knows, or of a method of it."""
+    """Return the name of a function, of a class as the user knows it, or of a method of it."""
     owner, _, method = name.rpartition(".")
     if call.__name__ == "__init__" and args:
         return type(args[0]).__name__
@@ -103,7 +103,7 @@ def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
 
 
 def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value by name is none of the type of that field of a dataclass; `owner` tells whose they are."""
+    """Raise `error` if a value, by name, is not of the type of this field of a dataclass; messages name the `owner`."""
     known = {name: text for base in reversed(kind.__mro__) for name, text in types_of(base).items()}
     for name, value in values.items():
         check_type(f"{name} of {owner}", value, known.get(name, Any), error)
@@ -111,20 +111,20 @@ def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: t
 
 @functools.cache
 def types_of(call: Callable[..., Any]) -> dict[str, Any]:
-    """Return the types of the arguments of a function, or of the fields of a class itself, by name."""
+    """Return the types of the arguments of a function, or of the fields of a class, by name."""
     annotations: dict[str, Any] = {}
     given = inspect.get_annotations(call)
     space = vars(sys.modules[call.__module__])
     for name, text in given.items():
         try:
             annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), space)
-        except (NameError, TypeError):  # imported for type checkers alone, or of the class and no argument
+        except (NameError, TypeError):  # imported for type checkers only, or not the annotation of an argument
             continue
     return annotations
 
 
 def check_type(name_shown: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value is none of the annotated type, or has a mask; the message calls it `name_shown`."""
+    """Raise `error` if a value is not of the annotated type, or has a mask; the message names it `name_shown`."""
     if is_masked(value):
         raise error(f"{name_shown} {REFUSAL}")
     if fits(value, annotation):
@@ -153,7 +153,7 @@ def _is_number(text: str) -> bool:
 
 
 def values_at(function: Callable[..., Any], points: Any, name: str, error: type[FastcontactError]) -> Any:
-    """Return what a function of the caller, called `name` in messages, returns for `points`; `error` if it fails."""
+    """Return the values of a user's function, called `name` in messages, at `points`; raises `error` if it fails."""
     try:
         returned = function(points)
     except Exception as failure:
@@ -168,14 +168,14 @@ def values_at(function: Callable[..., Any], points: Any, name: str, error: type[
 
 
 class Kind(NamedTuple):
-    """An annotated type: the test of a value, which does not use it up, and its name in messages."""
+    """An annotated type: a test of values, which does not consume iterators, and its name in messages."""
 
     fits: Callable[[Any], bool]
     words: str
 
 
 def fits(value: Any, annotation: Any) -> bool:
-    """Return whether a value is of the annotated type, as far as that can be seen without using it up."""
+    """Return whether a value is of the annotated type, as far as can be tested without consuming an iterator."""
     return kind_of(annotation).fits(value)
 
 
@@ -206,7 +206,7 @@ def kind_of(annotation: Any) -> Kind:
 
 
 def _test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any], bool]:
-    """Return the test of a type that holds no others."""
+    """Return the test of a type without member types."""
     if kind is typing.Literal:
         texts = all(isinstance(member, str) for member in members)
         return lambda value: isinstance(value, str) if texts else value in members
@@ -215,15 +215,15 @@ def _test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any
     if kind is abc.Callable:
         return callable
     if getattr(kind, "_is_protocol", False):
-        asked = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
-        return lambda value: all(hasattr(value, name) for name in asked) and not isinstance(value, type)
+        members_needed = [name for name in (*vars(kind), *inspect.get_annotations(kind)) if not name.startswith("_")]
+        return lambda value: all(hasattr(value, name) for name in members_needed) and not isinstance(value, type)
     if annotation in (Any, inspect.Parameter.empty) or not isinstance(kind, type):
         return lambda value: True
     return lambda value: isinstance(value, kind)
 
 
 def _union(members: tuple[Any, ...]) -> Kind:
-    if {*members} >= _ARRAY_LIKE:  # a union of its own, to which others were added
+    if {*members} >= _ARRAY_LIKE:  # a union itself, joined with further types
         members = (np.typing.ArrayLike, *(member for member in members if member not in _ARRAY_LIKE))
     kinds = [kind_of(member) for member in members]
     phrases = sorted(dict.fromkeys(kind.words for kind in kinds), key="None".__eq__)
@@ -231,7 +231,7 @@ def _union(members: tuple[Any, ...]) -> Kind:
 
 
 def _series(kind: Any, members: tuple[Any, ...]) -> Kind:
-    """Return the test of a series; its members are not looked at in an iterator, nor but for the first in an array."""
+    """Return the test of a series; members of iterators are not tested, and of arrays only the first one."""
     kinds = [kind_of(member) for member in members if member is not ...]
     if kind is tuple and members and members[-1] is not ...:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
@@ -264,7 +264,7 @@ def _is_real(value: Any, kind: type) -> bool:
         return truth or (isinstance(value, Real) and value in (0, 1))
     try:
         return isinstance(value, Real) and not truth and (math.isfinite(value) or kind is float)
-    except OverflowError:  # a whole number of hundreds of digits
+    except OverflowError:  # an integer with hundreds of digits
         return False
 
 
@@ -291,13 +291,13 @@ def _plural(phrase: str) -> str:
     if phrase.startswith("a sequence of"):
         return phrase.removeprefix("a ").replace("sequence", "sequences", 1)
     return " or ".join(
-        part.removeprefix("a ").removeprefix("an ") + "s" * part.startswith(("a ", "an "))
-        for part in phrase.split(" or ")
+        words_of_one.removeprefix("a ").removeprefix("an ") + "s" * words_of_one.startswith(("a ", "an "))
+        for words_of_one in phrase.split(" or ")
     )
 
 
 def finite_vector(values: Any, size: int) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """Return `size` finite numbers as an array; None if they are none."""
+    """Return `values` as an array of `size` finite numbers; None if they are not."""
     try:
         vector = np.asarray(values, float)
     except (TypeError, ValueError):

@@ -1,7 +1,7 @@
-"""HDF5 files from elsewhere, opened with care: nothing outside the file is read, and damage is named.
+"""Safe reading of HDF5 files from any source: nothing outside the file is read, and damage is reported.
 
-Before anything is read the whole tree is looked through. Only numbers and strings of fixed length are read: texts of variable
-length stand in a heap of the file, and on some damaged heaps HDF5 never returns.
+The whole tree is checked before anything is read. Only numbers and strings of fixed length are read: strings of variable
+length are stored in a heap of the file, and on some damaged heaps HDF5 never returns.
 """
 
 from __future__ import annotations
@@ -16,43 +16,43 @@ from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray
 from fastcontact.errors import FastcontactError, FileError
 
-# What a data set may take in memory: this much [bytes], or this many times the size of its file if that is more.
-# Zeros compress a thousandfold, but no whole file does that holds a mesh or results.
+# Memory limit of a data set: this size [bytes], or this multiple of the file size if that is more. Zeros compress a
+# thousandfold, but no complete file with a mesh or results does.
 PLAUSIBLE_BYTES = 1 << 28
 PLAUSIBLE_EXPANSION = 20
-# The same for all data sets together, each counted as often as a link leads to it.
+# Limit of all data sets together, each counted once per link to it.
 PLAUSIBLE_IN_ALL = 1 << 30
 PLAUSIBLE_EXPANSION_IN_ALL = 100
 FEW_OBJECTS = 1000
-# Groups in groups; HDF5 itself follows them by recursion, and deep ones overrun its stack.
+# Largest depth of nested groups; HDF5 follows them by recursion, and deep nesting overflows its stack.
 DEEPEST = 64
-# Kinds of numbers, and strings of fixed length: no references, no variable lengths, no records.
+# Allowed kinds: numbers and strings of fixed length, but no references, variable lengths or records.
 PLAIN_KINDS = "iufS"
 
 
 @contextmanager
 def opened(path: PathLike) -> Iterator[Any]:
-    """Open an HDF5 file for reading, for the length of a block; damage that shows inside the block becomes a FileError."""
+    """Open an HDF5 file for reading in a block; damage detected inside the block raises FileError."""
     import h5py
 
-    found = existing_file(path)
+    existing = existing_file(path)
     try:
-        if not h5py.is_hdf5(found):
+        if not h5py.is_hdf5(existing):
             raise FileError(f"'{path}' is not an HDF5 file: check that it is complete and has the right suffix")
-        with h5py.File(found, "r") as file:
+        with h5py.File(existing, "r") as file:
             check_contents(file, path)
             yield file
     except (FastcontactError, Warning):
         raise
-    except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+    except Exception as error:  # HDF5 and meaningless numbers can raise any exception
         raise FileError(f"cannot read '{path}', it is damaged or incomplete: write it anew") from error
 
 
 def check_contents(file: Any, path: PathLike) -> None:
-    """Look through an open HDF5 file before anything in it is read.
+    """Check an open HDF5 file before anything in it is read.
 
-    Raises FileError if a link or the values of a data set lead to another file, a data set needs a foreign filter, one or
-    all of them need more memory than a file of this size can mean, or groups stand too deep or in a circle.
+    Raises FileError if a link or the values of a data set refer to another file, a data set needs an external filter, the
+    data sets need more memory than plausible for a file of this size, or groups are nested too deeply or in a cycle.
     """
     from h5py import h5d, h5g, h5o
     from h5py.h5l import TYPE_HARD, TYPE_SOFT
@@ -89,7 +89,7 @@ def check_contents(file: Any, path: PathLike) -> None:
 
 
 def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
-    """Refuse a data set whose values stand elsewhere, or that is too large for its file; return its size [bytes]."""
+    """Return the size of a data set [bytes]; raises FileError if it is stored elsewhere or too large for its file."""
     from h5py import h5d, h5z
 
     settings = dataset.get_create_plist()
@@ -98,17 +98,17 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         raise FileError(f"{where} stores its values in another file: copy the data into one file")
     item, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
     size = count * item
-    # Texts and references become objects one by one, and take their room in the file.
+    # Strings and references become one object each, and take space in the file.
     if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
         raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
     if layout == h5d.CHUNKED:
         chunk = int(np.prod([int(n) for n in settings.get_chunk()], dtype=object)) * item
-        own = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
+        built_in = (h5z.FILTER_DEFLATE, h5z.FILTER_SHUFFLE, h5z.FILTER_FLETCHER32, h5z.FILTER_SZIP,
                h5z.FILTER_NBIT, h5z.FILTER_SCALEOFFSET)  # fmt: skip
         filters = [settings.get_filter(number)[0] for number in range(settings.get_nfilters())]
-        # An unknown filter would be looked for among the shared libraries of the system.
-        if not set(filters) <= set(own):
-            raise FileError(f"{where} is packed by the filter {filters[0]}, which not every HDF5 knows: use gzip")
+        # HDF5 would search for an unknown filter among the shared libraries of the system.
+        if not set(filters) <= set(built_in):
+            raise FileError(f"{where} is packed by the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
             raise FileError(f"{where} takes more room packed than it can hold: the file is damaged, write it anew")
         size = max(size, chunk)
@@ -118,7 +118,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
 
 
 def check_size(where: str, shape: tuple[int, ...], file: Any) -> None:
-    """Raise FileError if an array of doubles that is put together from a file is larger than its size can mean."""
+    """Raise FileError if an array of doubles assembled from a file is too large for the size of the file."""
     size = 8 * int(np.prod(shape, dtype=object))
     if size > max(PLAUSIBLE_IN_ALL, PLAUSIBLE_EXPANSION_IN_ALL * file.id.get_filesize()):
         raise FileError(f"{where} is an array of {size:.3g} bytes, which a file of its size cannot hold: write it anew")
@@ -142,5 +142,5 @@ def attribute(item: Any, name: str, default: Any = None) -> Any:
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is no plain number: write the file anew")
+        raise FileError(f"'{name}' of '{item.name}' of '{item.file.filename}' is not a plain number: rewrite the file")
     return item.attrs[name]

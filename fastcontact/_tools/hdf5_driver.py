@@ -1,8 +1,8 @@
-"""Files that HDF5 writes through Python, so that a full or failing disk is a Python error.
+"""Files that HDF5 writes through Python, so that a full or failing disk raises a Python error.
 
-HDF5's own driver maps and caches what it writes; where the disk takes no more it can end the process. Here each write is
-an ordinary one. HDF5 cannot be stopped half way by an exception: the first error is kept, nothing is written after it, and
-it is raised once HDF5 has returned.
+HDF5's own driver maps and caches its output and can crash the process on a full disk. Here each write is an ordinary one.
+HDF5 cannot be interrupted by an exception: the first error is stored, nothing is written after it, and it is raised once
+HDF5 has returned.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ class DriverFile:
             raise self.failure
 
     def _fail(self, error: BaseException) -> None:
-        """Keep the first error, without its frames, which would keep objects of HDF5 open."""
-        error = error.with_traceback(None)  # the later ones, too: they may be the same object
+        """Store the first error, without its frames, which would keep HDF5 objects open."""
+        error = error.with_traceback(None)  # for later errors, too: they may be the same object
         self.failure = self.failure or error
 
     def fileno(self) -> int:
@@ -48,7 +48,7 @@ class DriverFile:
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Set the position from the start, from itself or from the end."""
-        base = {os.SEEK_SET: 0, os.SEEK_CUR: self._position, os.SEEK_END: self._size()}[whence]
+        base = self._size() if whence == os.SEEK_END else {os.SEEK_SET: 0, os.SEEK_CUR: self._position}[whence]
         self._position = base + offset
         return self._position
 
@@ -56,7 +56,7 @@ class DriverFile:
         return os.fstat(self.fileno()).st_size
 
     def readinto(self, buffer: memoryview) -> int:
-        """Fill a buffer from the position on; zeros beyond the end."""
+        """Fill a buffer from the position on, with zeros beyond the end of the file."""
         data = bytearray(len(buffer))
         try:
             self._get(self._position, data)
@@ -104,7 +104,7 @@ class DriverFile:
         return size
 
     def flush(self) -> None:
-        """Do nothing: what was written has gone to the operating system."""
+        """Do nothing: all writes have gone to the operating system."""
 
     def close(self) -> None:
         """Close the file; a second call does nothing."""
@@ -113,16 +113,16 @@ class DriverFile:
 
 @contextmanager
 def new_hdf5(path: Path) -> Iterator[Any]:
-    """Write an HDF5 file over the existing file at `path`; raises OSError where the operating system refuses to."""
+    """Write an HDF5 file over the existing file at `path`; raises OSError if the operating system fails."""
     import h5py
 
     driver = DriverFile(path)
-    driver.truncate(0)  # HDF5 would look for a file of its own in what is there
+    driver.truncate(0)  # HDF5 would parse the old content
     try:
         with h5py.File(driver, "w") as file:
             yield file
     except Exception:
-        driver.check()  # what the system said tells more than what HDF5 makes of it
+        driver.check()  # the error of the system is more informative than that of HDF5
         raise
     finally:
         driver.close()

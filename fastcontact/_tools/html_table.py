@@ -1,4 +1,4 @@
-"""Tables of texts as HTML, which notebooks show in the place of a repr."""
+"""HTML tables, which notebooks show in place of a repr."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-# Longest array whose numbers are shown.
+# Length of the longest array whose numbers are shown.
 SHOWN = 9
 
 
 def html_table(
     rows: Iterable[Sequence[object]], head: Sequence[object] = (), caption: str = "", style: str = "text-align:left"
 ) -> str:
-    """Return rows as an HTML table; what they hold is text, whatever characters are in it. `style` is that of all cells."""
+    """Return rows as an HTML table; their contents are escaped, and `style` applies to all cells."""
     style = f" style='{style}'" if style else ""
 
     def row(cells: Sequence[object], tag: str) -> str:
@@ -29,9 +29,9 @@ def html_table(
 
 
 def fields_table(result: Any) -> str:
-    """Return the fields of a dataclass as an HTML table, and its properties that are numbers; of long arrays the range."""
-    named = [own.name for own in fields(result) if own.repr]
-    properties = [name for name, own in vars(type(result)).items() if isinstance(own, property)]
+    """Return the fields and numeric properties of a dataclass as an HTML table; long arrays are shown by their range."""
+    named = [member.name for member in fields(result) if member.repr]
+    properties = [name for name, member in vars(type(result)).items() if isinstance(member, property)]
     rows = [(name.replace("_", " "), _text(getattr(result, name))) for name in [*named, *properties]]
     return html_table(rows, caption=type(result).__name__)
 

@@ -1,6 +1,6 @@
-"""Plain data with arrays as a sequence of bytes and back: nothing in it is executed, and damage is noticed.
+"""Serialisation of plain data with arrays: nothing in the bytes is executed, and damage is detected.
 
-A line of ASCII JSON with sizes and checksum, the data as JSON with places instead of arrays, the arrays one after the other.
+The format is a line of ASCII JSON with sizes and checksum, the data as JSON with offsets in place of arrays, then the arrays.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from fastcontact.arrays import AnyArray
 
 _ARRAY = "__array__"
-# Kinds of numbers that an array may hold: bool, signed and unsigned integers, floats.
+# Allowed kinds of arrays: bool, signed and unsigned integers, floats.
 _KINDS = "biuf"
 
 
@@ -30,9 +30,9 @@ def packed(data: Any) -> NDArray[np.uint8]:
 
 
 def unpacked(values: NDArray[np.uint8]) -> Any:
-    """Return what `packed` was given, from its bytes (n,), of which those beyond its end do not matter.
+    """Return the data from the bytes (n,) of `packed`; bytes beyond its end are ignored.
 
-    Raises ValueError if the bytes are not whole, or not from `packed`.
+    Raises ValueError if the bytes are incomplete, or not from `packed`.
     """
     raw = np.ascontiguousarray(values, np.uint8).data
     line, separator, _ = bytes(raw[:200]).partition(b"\n")

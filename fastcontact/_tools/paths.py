@@ -1,4 +1,4 @@
-"""Paths of files: one that must exist, one that may be written, one that is replaced whole or not at all."""
+"""Paths of files: checks of input and output paths, and atomic replacement of files."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from pathlib import Path
 from fastcontact.errors import FileError
 
 PathLike = str | os.PathLike[str]
-# Names of the open files of this process.
+# Paths of the open files of this process.
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/(?:self|thread-self|\d+))/fd/(\d+)")
 
 
 def existing_file(path: PathLike) -> Path:
-    """Return `path` as a Path, or raise FileError if there is no such file or it is no plain one."""
+    """Return `path` as a Path, or raise FileError if there is no such regular file."""
     file = Path(path)
     try:
         file.stat()
     except FileNotFoundError:
         pass
-    except (OSError, ValueError) as error:  # a name too long, a folder that is none, a zero in it
+    except (OSError, ValueError) as error:  # a name too long, a file used as a folder, a null byte
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
             f"'{str(path)[:200]}' cannot be looked for ({reason}): check its name and the folder"
@@ -42,10 +42,10 @@ def existing_file(path: PathLike) -> Path:
 
 
 def checked_target(path: PathLike) -> Path:
-    """Return the real path to write to, that of the file which a link names, or raise FileError if it cannot be written."""
+    """Return the path to write to, with links resolved, or raise FileError if it cannot be written."""
     try:
         target = Path(os.path.realpath(os.fspath(path)))
-    except ValueError as error:  # a zero in it
+    except ValueError as error:  # a null byte
         raise FileError(f"{os.fspath(path)!r} cannot be the name of a file ({error}): name another one") from error
     if descriptor(path) is not None:
         raise FileError(f"'{path}' is a stream: name a plain file")
@@ -66,12 +66,12 @@ def checked_target(path: PathLike) -> Path:
 
 
 def descriptor(path: PathLike) -> int | None:
-    """Return the number of the open file of this process that a path such as ``/dev/stdout`` names, None of other paths.
+    """Return the descriptor of this process that a path such as ``/dev/stdout`` names, None for other paths.
 
-    The path of the file behind it says too little: a shell may have opened that file to append to it.
+    The path of the underlying file is not sufficient: a shell may have opened that file in append mode.
     """
     name = os.path.abspath(os.fspath(path))
-    for _ in range(40):  # links, as many as the system follows
+    for _ in range(40):  # as many links as the system follows
         match = _DESCRIPTOR.fullmatch(name)
         if match:
             return int(match[1])
@@ -82,7 +82,7 @@ def descriptor(path: PathLike) -> int | None:
 
 
 def is_stream(path: PathLike) -> bool:
-    """Return whether a path names what is written to from beginning to end: an open file, a device, a pipe."""
+    """Return whether a path names a stream: an open file, a device or a pipe."""
     return descriptor(path) is not None or Path(path).is_char_device() or Path(path).is_fifo()
 
 
@@ -92,11 +92,11 @@ def _may_write(path: Path) -> bool:
 
 @contextlib.contextmanager
 def replacing(path: PathLike) -> Iterator[Path]:
-    """Give an empty file beside `path` to write to, which takes its place on success and is removed after a failure.
+    """Yield an empty temporary file beside `path`, which replaces it on success and is removed after a failure.
 
-    Its name cannot be guessed and it is a new file, so that no link put there beforehand is followed. When it takes its
-    place it is on the disk. A stream such as ``/dev/stdout`` gets what was written behind all that it holds. What the
-    operating system refuses becomes a FileError.
+    Its name is unpredictable and the file is new, so that no prepared link is followed. It is synchronised to disk before it
+    replaces `path`. Output to a stream such as ``/dev/stdout`` is appended to it. Errors of the operating system are raised
+    as FileError.
     """
     if is_stream(path):
         with tempfile.TemporaryDirectory() as folder:
@@ -105,7 +105,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
             _send(temporary, path)
         return
     target = checked_target(path)
-    # The suffix stays last, because writers choose the format by it.
+    # The suffix stays last, because writers derive the format from it.
     temporary = target.with_name(f".{target.stem[:100]}.{secrets.token_hex(12)}{target.suffix}")
     try:
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
@@ -123,7 +123,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
 
 
 def _send(file: Path, stream: PathLike) -> None:
-    """Write a file to a stream; through the open file that it names, if it does: it knows where its end is."""
+    """Write a file to a stream, through the descriptor that it names, if any, which keeps the write position."""
     number = descriptor(stream)
     try:
         if number in (1, 2):
@@ -137,14 +137,14 @@ def _send(file: Path, stream: PathLike) -> None:
 
 
 def _synchronise(path: Path) -> None:
-    """Wait until a file, or the names in a folder, are on the disk; nothing is done where folders cannot be opened."""
+    """Synchronise a file, or the entries of a folder, to disk; do nothing if folders cannot be opened."""
     if path.is_dir() and os.name == "nt":
         return
     descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     try:
         os.fsync(descriptor)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # of file systems without it
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # file systems without synchronisation
             raise
     finally:
         os.close(descriptor)

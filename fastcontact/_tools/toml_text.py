@@ -1,4 +1,4 @@
-"""TOML from elsewhere, parsed in bounded time: its parser takes a time that grows with the square of the parts of a key."""
+"""TOML from any source, parsed in bounded time: the parser takes quadratic time in the number of parts of a key."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import re
 import tomllib
 from typing import Any
 
-LARGEST = 1 << 23  # of a text [bytes]
-PARTS = 50  # of a dotted key
-# Parts are taken whole, never given back, and none begins inside another: that keeps the search linear in the text.
+LARGEST = 1 << 23  # largest size of a text [bytes]
+PARTS = 50  # largest number of parts of a dotted key
+# Possessive quantifiers and the lookbehind avoid backtracking, so that the search is linear in the text.
 LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{PARTS},}}""")
 
 
@@ -19,7 +19,7 @@ def parsed(text: str) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        If the text is no TOML, tables stand too deep in it, it is larger than `LARGEST`, or a key has more than `PARTS`
+        If the text is not TOML, tables are nested too deeply, it is larger than `LARGEST`, or a key has more than `PARTS`
         parts.
     """
     if len(text) > LARGEST:
@@ -30,11 +30,11 @@ def parsed(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError("tables or lists stand too deep in each other") from None
+        raise ValueError("tables or lists are nested too deeply") from None
 
 
 def written(data: Any) -> str:
-    """Return data as a text that `parsed` makes the same of; ValueError where there is something that TOML has not."""
+    """Return data as a text that `parsed` turns back into it; raises ValueError for data that TOML cannot express."""
     return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in data.items())
 
 
@@ -45,16 +45,16 @@ def _key(name: Any) -> str:
 
 
 def _value(value: Any) -> str:
-    if hasattr(value, "tolist"):  # NumPy's
+    if hasattr(value, "tolist"):  # a NumPy value
         value = value.tolist()
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
-        return repr(value)  # inf and nan, too, and all digits
+        return repr(value)  # with all digits, also inf and nan
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(_value, value))}]"
     if isinstance(value, dict):
         return "{" + ", ".join(f"{_key(name)} = {_value(inner)}" for name, inner in value.items()) + "}"
-    raise ValueError(f"{type(value).__name__} is no type of TOML")
+    raise ValueError(f"{type(value).__name__} is not a TOML type")

@@ -14,7 +14,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
 
 @cache
 def versions() -> dict[str, str]:
-    """Return the versions by name, without those of packages that are installed in another way than as such."""
+    """Return the versions by name, without those of libraries that are not installed as packages."""
     known = {"fastcontact": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):

@@ -1,7 +1,7 @@
 """Degrees of freedom of the contact problem: all of them, or those of the contact surfaces after static condensation.
 
-A direct solver condenses the stiffness to the contact surfaces; then all other displacements follow once, when the contact
-forces of the load step are known.
+A direct solver condenses the stiffness to the contact surfaces; all other displacements are then computed once, when the
+contact forces of the load step are known.
 """
 
 from __future__ import annotations
@@ -19,16 +19,18 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.protocol import Loaded
 from fastcontact.linear.sparse_rows import without_remnants
 
-# Where supports hold both sides of a place, no force there can close a gap or stop a slip: what is left of its row is
-# neighbours that have moved along by strains, less than this part of it, with any sign. Multipliers of a mortar joint between
-# two flanges held at one edge reached 1e23 by entries of 1e-16, and the sets of held nodes never settled by entries of 1e-7.
+# Where supports hold both sides of a constraint, no force there can close its gap or stop its slip: its row only has
+# entries of neighbours that move by strains, below this fraction of the row, of either sign. With such entries of 1e-16,
+# multipliers of a mortar joint between two flanges held at one edge reached 1e23; with entries of 1e-7 active sets of
+# held nodes never settled.
 HELD = 1e-2
 
 
 class ActiveDofs:
     """All displacement components.
 
-    Below `u` and `lift` (n,) are of all components, `part` (k,) of the active ones, `v` (l,) the active unknowns [length].
+    Below `u` and `lift` (n,) are vectors of all components, `part` (k,) of the active ones, `v` (l,) of active unknowns
+    [length].
 
     Parameters
     ----------
@@ -39,7 +41,7 @@ class ActiveDofs:
     Attributes
     ----------
     compared : ndarray of int
-        Which of the active components contact depends on.
+        Active components on which contact depends.
     """
 
     def __init__(self, system: System, contact_dofs: Indices) -> None:
@@ -58,7 +60,7 @@ class ActiveDofs:
         return u
 
     def put(self, u: Array, part: Array) -> Array:
-        """Return all displacements once the active ones are `part`; may write into `u`."""
+        """Return all displacements with the active ones replaced by `part`; may write into `u`."""
         return part
 
     def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
@@ -66,7 +68,7 @@ class ActiveDofs:
         return self._system.rows(rows, offset, lift)
 
     def unknowns(self, u: Array, lift: Array) -> Array:
-        """Return the active unknowns of displacements that obey supports and relations."""
+        """Return the active unknowns of displacements that satisfy supports and multi-point constraints."""
         return self._system.unknowns(u, lift)
 
     def displacement(self, v: Array, lift: Array) -> Array:
@@ -74,19 +76,19 @@ class ActiveDofs:
         return self._system.displacement(v, lift)
 
     def varied(self, v: Array) -> Array:
-        """Return by how much the active components (k,) change as the active unknowns do by v (l,) [length]."""
+        """Return the change of the active components (k,) for a change v (l,) of the active unknowns [length]."""
         return self._system.displacement(v, np.zeros(len(self._system.free)))
 
     def reduced(self, force: Array) -> Array:
-        """Return what nodal forces (n,) do on the active unknowns (l,) [force]."""
+        """Return the generalised forces (l,) of nodal forces (n,) on the active unknowns [force]."""
         return self._system.reduced(force)
 
     def size(self, v: Array) -> float:
-        """Return the largest of all unknowns, those that are not active as they were when the step began."""
+        """Return the largest of all unknowns, the inactive ones at the beginning of the step."""
         return largest(v)
 
     def scale(self, u: Array, lift: Array) -> float:
-        """Return the sum of the largest displacement and the largest one that supports prescribe."""
+        """Return the sum of the largest displacement and the largest prescribed one."""
         return largest(lift) + largest(u)
 
 
@@ -105,7 +107,7 @@ class SurfaceDofs(ActiveDofs):
     def __init__(self, system: System, contact_dofs: Indices, unknowns: Indices) -> None:
         super().__init__(system, np.arange(len(contact_dofs)))
         self._dofs, self._unknowns = contact_dofs, unknowns
-        # Columns of constraints as places among the unknowns, or, where relations stand between, the components.
+        # Columns of constraints as positions among the unknowns or, with multi-point constraints, among the components.
         columns = unknowns if system.T is None else contact_dofs
         self._place = np.full(len(system.free), -1, np.intp)
         self._place[columns] = np.arange(len(columns))
@@ -154,11 +156,11 @@ class SurfaceDofs(ActiveDofs):
         place = self._place[rows.indices]
         kept = (place >= 0) & (rows.data != 0.0)
         start = np.concatenate([[0], np.cumsum(kept)])[rows.indptr]
-        own = csr_array((rows.data[kept], place[kept], start), shape=(rows.shape[0], self._columns))
+        reduced = csr_array((rows.data[kept], place[kept], start), shape=(rows.shape[0], self._columns))
         if self._system.T is not None:
-            own = csr_array(own @ self._T)
-            own.eliminate_zeros()
-        return own, offset
+            reduced = csr_array(reduced @ self._T)
+            reduced.eliminate_zeros()
+        return reduced, offset
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """See `ActiveDofs`."""
@@ -192,7 +194,7 @@ class SurfaceDofs(ActiveDofs):
 def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:
     """Return constraints on all displacements as constraints on the active unknowns.
 
-    Rows of places that supports hold on both sides are empty, see HELD.
+    Rows of constraints whose two sides are held by supports are empty, see HELD.
 
     Parameters
     ----------
@@ -205,12 +207,12 @@ def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Ar
     """
 
     def on_unknowns(rows: csr_array, offset: Array) -> tuple[csr_array, Array]:
-        own, offset = dofs.rows(rows, offset, lift)
-        return without_remnants(own, rows, HELD), offset
+        reduced, offset = dofs.rows(rows, offset, lift)
+        return without_remnants(reduced, rows, HELD), offset
 
     B, gap0 = on_unknowns(constraints.B, constraints.gap0)
     slip0 = constraints.slip0 if constraints.slip0 is not None else np.zeros((len(constraints.tangents), 1))
-    slips = [own - T @ start for T, own in zip(constraints.tangents, slip0, strict=True)]
+    slips = [reduced - T @ start for T, reduced in zip(constraints.tangents, slip0, strict=True)]
     pairs = [on_unknowns(T, slip) for T, slip in zip(constraints.tangents, slips, strict=True)]
     tangents = tuple(T for T, _ in pairs)
     return replace(

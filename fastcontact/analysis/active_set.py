@@ -4,15 +4,15 @@ The gap is ``gap0 + B u + C multiplier``; the compliance C of the constraints th
 semidefinite, is absent in most formulations.
 
 The primal-dual active set (Hintermueller, Ito and Kunisch, 2003) changes all wrong constraints at once and usually
-settles in a few solutions, but it can cycle. ``B K^-1 B.T + C`` is symmetric positive definite when no constraint
-repeats others, so the problem is a linear complementarity problem with a P-matrix; when a set comes back, the solver
-therefore goes on changing only the wrong constraint with the lowest number, which never repeats a set and so ends
+converges in a few solutions, but it can cycle. ``B K^-1 B.T + C`` is symmetric positive definite when the constraints are
+linearly independent, so the problem is a linear complementarity problem with a P-matrix; when a set recurs, the solver
+therefore continues by changing only the wrong constraint with the lowest number, which never repeats a set and so terminates
 (Murty, 1974).
 
-Solvers that iterate need not finish for a set that changes anyway: they are watched, and left as soon as signs beyond
-the error that their residual leaves ask for another set. This ends too: no set is left early to change back what an earlier
-one was left for, since signs that contradict each other so are those of errors; every constraint changes early at most
-once, and what follows is the method above from some start. A state counts as settled only from a finished solution.
+Iterative solvers need not finish for a set that will change anyway: they are monitored, and stopped as soon as signs beyond
+the error bound of their residual require another set. This terminates too: no iteration is stopped early to undo an earlier
+early change, since such contradicting signs are due to errors. Every constraint changes early at most once, and then the
+method above follows. Convergence is only accepted from a finished solution.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def solve(
     constraints : Constraints
         Rows for the unknowns of the solver; an empty row is a constraint that cannot become active.
     active : ndarray of bool (m,)
-        Set to start from.
+        Initial active set.
     accuracy : Accuracy
     guess : ndarray (n,), optional
         Unknowns to start iterative solvers from [length].
@@ -80,7 +80,7 @@ def solve(
 
 
 def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Response:
-    """Return how a solution responds to further forces and gaps, the active constraints being `rows`."""
+    """Return the response of a solution with active constraints `rows` to additional forces and gaps."""
     R, compliance = constraints.B[rows], constraints.normal_compliance
     at_rest = loaded.involved_solution(np.zeros(R.shape[1]), None)
     F = loaded.delassus(R)[1]
@@ -108,7 +108,7 @@ def _first_changed(active: Mask, wanted: Mask) -> Mask:
 
 
 class _Signs:
-    """Which constraints a solution wants active: by the signs of gaps and multipliers, beyond their tolerances."""
+    """The next active set of a solution: by the signs of gaps and multipliers, beyond their tolerances."""
 
     def __init__(self, constraints: Constraints, accuracy: Accuracy) -> None:
         self._constraints, self._accuracy = constraints, accuracy
@@ -117,9 +117,9 @@ class _Signs:
         self.equations: Mask = none if constraints.equality is None else self.usable & constraints.equality
 
     def of(self, u: Array, forces: Array, active: Mask, iteration: int, error: float = 0.0) -> Equilibrium:
-        """Return the solution with unknowns (n,) and forces of the active constraints, with the set it wants.
+        """Return the solution with unknowns (n,) and forces of the active constraints, and its next active set.
 
-        Signs within errors of relative size `error`, those of an unfinished solution, do not count.
+        Signs within the relative `error` of an unfinished solution are ignored.
         """
         multiplier = np.zeros(len(active))
         multiplier[active] = forces
@@ -134,12 +134,12 @@ class _Signs:
 
 
 class _Watch:
-    """Looks at unfinished solutions, and ends them when their signs ask for another set; see `linear.protocol.Monitor`.
+    """Monitor that stops unfinished solutions when their signs require another active set; see `linear.protocol.Monitor`.
 
     Attributes
     ----------
     wanted : ndarray of bool (m,) or None
-        The set that the last solution looked at asks for; None where that is the present one.
+        The next active set by the last monitored solution; None if it equals the current one.
     """
 
     def __init__(self, signs: _Signs, active: Mask, changed: Mask) -> None:
@@ -147,9 +147,9 @@ class _Watch:
         self.wanted: Mask | None = None
 
     def __call__(self, u: Array, forces: Array, error: float) -> bool:
-        """Return whether the signs ask for another set; errors of relative size `error` do not count.
+        """Return whether signs beyond the relative `error` require another set.
 
-        A set that changes back constraints that were `changed` before does not count either.
+        Sets that would undo changes of constraints `changed` before are ignored.
         """
         signs = self._signs.of(u, forces, self._active, 0, error)
         again = (signs.wanted != self._active) & self._changed

@@ -6,25 +6,26 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 
-# Changes of the residual that point along the same line to more than this tell nothing apart.
+# Number of earlier iterates that are mixed into the next one.
+DEPTH = 5
+# Changes of the residual are dependent if their directions agree to more than this.
 DEPENDENT = 1e-8
 
 
 class Anderson:
     """Mixing of the last iterates of ``x = G(x)`` so that their residuals ``G(x) - x`` cancel best.
 
-    Near a solution a fixed point iteration whose error shrinks by a factor a time behaves like a linear one; mixing
-    then does what a Krylov method does (Walker and Ni, 2011). Only `where` the iteration depends on x counts in the
-    residual.
+    Near a solution a linearly convergent fixed-point iteration behaves like a linear one, and mixing is equivalent to a
+    Krylov method (Walker and Ni, 2011). The residual only includes the components `where`, on which the iteration depends.
 
     Parameters
     ----------
     depth : int
-        Earlier iterates in the mixture.
+        Number of earlier iterates in the mixture.
     where : ndarray of int
-        Components of x (n,) that G looks at.
+        Components of x (n,) on which G depends.
     all_mixed : bool
-        Whether the others are mixed, too; they need not be where G finds them without a first guess.
+        Whether to mix the other components as well, as needed where they serve G as an initial guess.
     """
 
     def __init__(self, depth: int, where: Indices, all_mixed: bool = True) -> None:
@@ -34,7 +35,7 @@ class Anderson:
         self._images: list[Array] = []
 
     def restart(self) -> None:
-        """Forget earlier iterates, for another G."""
+        """Discard earlier iterates, for another G."""
         self._residuals.clear()
         self._images.clear()
 

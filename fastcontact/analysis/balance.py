@@ -17,7 +17,7 @@ from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
-# Forces are there beyond so much round-off from elsewhere.
+# Forces are significant above this multiple of the round-off of other rows.
 THERE = 100.0
 
 
@@ -32,15 +32,15 @@ class Balance:
     largest : float
         The largest force of all steps so far [force].
     residual : float
-        The largest force that nothing balances; where that is beyond the bound, beyond round-off of its own row [force].
+        The largest out-of-balance force; above the bound, less the round-off of its own row [force].
     bound : float
-        What is allowed of it [force].
+        Largest admissible residual [force].
     relative : float
-        The largest force that nothing balances over the largest one of this step, zero where that is round-off.
+        The largest out-of-balance force over the largest force of this step, zero where it is round-off.
     noise : float
         Forces up to this are round-off [force].
     energy : (float, float)
-        Of deformation, springs included, and plastic work since the beginning [energy].
+        Strain energy, springs included, and plastic work since the beginning [energy].
     """
 
     reaction: Array
@@ -58,10 +58,10 @@ class Balance:
 
     @property
     def wanting(self) -> float:
-        """How many times more accurate solutions should be.
+        """Factor by which the accuracy of solutions should increase.
 
-        Solutions that are off by more than round-off leave it open whether there are any forces, as where bodies have come
-        apart: then that first, which takes much less than a balance of forces that may not exist.
+        With errors above round-off it is undecided whether there are any forces at all, e.g. after bodies have
+        separated: this is decided first, which takes much less than a balance of forces that may not exist.
         """
         return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
 
@@ -90,7 +90,7 @@ def balance(
     problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float,
     internal: tuple[Array, tuple[float, float]],
 ) -> Balance:  # fmt: skip
-    """Return the reactions, and by how much all other degrees of freedom are out of balance.
+    """Return the reactions, and the residual of all other degrees of freedom.
 
     Parameters
     ----------
@@ -114,8 +114,8 @@ def balance(
     bound = max(criteria.relative * force, criteria.absolute or 0.0)
     off, round_off, noise = residual, 0.0, 0.0
     if not 0.0 < residual <= bound:
-        # Stiff parts that moved far are off by round-off of their own rows, which may be more than the forces of soft ones.
-        # Without forces the criterion is 0/0: round-off of all rows decides. Either costs a product with K.
+        # In stiff parts with large displacements round-off of their own rows may exceed the forces of soft parts.
+        # Without forces the criterion is 0/0: round-off of all rows decides. Either case costs a product with K.
         row_sums = problem.system.K.row_sums(problem.accurate_to(u))
         residual = problem.system.balance(out, SUM_ROUND_OFF * row_sums)[1]
         round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
@@ -134,13 +134,11 @@ def balance(
 def _round_off(
     problem: Problem, row_sums: Array, forces: tuple[Array, ...], largest_force: float
 ) -> tuple[float, float]:
-    """Return how far internal forces may be off where there are no other `forces` (n_dofs,) than their round-off [force].
+    """Return the error bound of internal forces if all `forces` (n_dofs,) are round-off, and the level of round-off [force].
 
-    And up to which size forces are round-off [force]. `row_sums` (n_dofs,) is ``|K| |u|`` [force].
-
-    That is so where no degree of freedom knows its force to the criterion, or the force itself may be round-off from
-    elsewhere. Where forces are there, they are what counts: stiff parts that move far may not hide what is missing from
-    soft ones.
+    `row_sums` (n_dofs,) is ``|K| |u|`` [force]. Forces are round-off if no degree of freedom has a force accurate to the
+    criterion, or the force itself may be round-off of other rows. Otherwise the forces define the bound: stiff parts with
+    large displacements must not hide the residual of soft ones.
     """
     slack = SLACK * largest_force
     noise = max(slack, THERE * SUM_ROUND_OFF * largest(row_sums))

@@ -31,16 +31,16 @@ def contact_result(
     name : str
     pair : Formulation
     constraints : Constraints
-        Those of the pair in the last pairing.
+        Constraints of the pair in the last pairing.
     solution : Solution
-        Of all pairs; those of this one are its `rows`.
+        Solution of all pairs; this pair has the `rows` of it.
     rows : slice
     at : Configuration
-        In which the sides are paired at the end of the step.
+        Configuration of the last pairing of the step.
     axis : (ndarray (dim,), ndarray (dim,)), optional
-        In space, where the bodies met first [length] and the normal there [-].
+        In space, the point of first contact [length] and the normal there [-].
     displacement : ndarray (n_points, dim), optional
-        That gaps are measured with, by default that of `at` [length].
+        Displacement at which gaps are evaluated, by default that of `at` [length].
     """
     points = pair.secondary.points
     coordinates = pair.points[points]
@@ -49,7 +49,7 @@ def contact_result(
     gap, normal = pair.nodal_gap(at, displacement=displacement)
     closed_nodes = _closed(pair, constraints, multiplier, active[: len(constraints.normal_forces(multiplier))], gap, at)
     closed = closed_nodes.nodes
-    if pair.options.tied:  # as the bodies lay at rest
+    if pair.options.tied:  # in the undeformed configuration
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
     along = _along_the_surface(constraints, solution, rows, normal, closed_nodes)
     forces = _forces(pair, constraints, multiplier, along)
@@ -100,9 +100,7 @@ def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Arr
 
 @dataclass(frozen=True, eq=False)
 class _Forces:
-    """Contact forces on the secondary nodes, their sum, and those on the primary ones, where nodes of both sides count
-    [force].
-    """
+    """Contact forces on secondary nodes, their sum, and those on primary nodes if nodes carry them on both sides [force]."""
 
     secondary: Array
     total: Array
@@ -152,8 +150,8 @@ def _along_the_surface(
 
 @dataclass(frozen=True, eq=False)
 class _Closed:
-    """The closed nodes, their pressures (m,), and the pressures of all nodes as the formulation finds them [pressure]:
-    as a field (multiplier), and with which friction at the nodes goes (own).
+    """Closed nodes, their pressures (m,), and the formulation's pressures of all nodes: as a field (multiplier), and those
+    that belong to the friction at the nodes (own) [pressure].
     """
 
     nodes: Mask
@@ -163,9 +161,9 @@ class _Closed:
 
     @property
     def kept(self) -> Array:
-        """Part of the raw pressures (m,) that closed nodes keep; tractions are scaled alike.
+        """Factor (m,) from the raw to the reported pressures of closed nodes, by which tractions are scaled, too.
 
-        At most one, where a field undershoots: hardly any of it may then be left at a node, and its shear is arbitrary.
+        At most 1: where a field undershoots, the raw pressure of a node may nearly vanish, and its shear is arbitrary.
         """
         fraction = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
         return np.where(self.nodes, np.minimum(fraction, 1.0) if self.own.min() < 0.0 else fraction, 0.0)
@@ -207,13 +205,13 @@ def _carried(
 def _closed_nodes(
     pair: Formulation, constraints: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
 ) -> Mask:
-    """Return which secondary nodes are in contact: by their pressure, or because they never open again."""
+    """Return which secondary nodes are in contact: by their pressure, or because they cannot separate."""
     assert constraints.nodal is not None
     if pair.options.always_closed:
         covered = constraints.nodal.covered
-        # Nodes that stand out beyond the other side face nothing themselves, but parts of their facets may.
+        # Nodes beyond the end of the other side face nothing themselves, but parts of their facets may.
         return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
-    # Tension holds a layer as pressure closes a gap.
+    # Nodes of a cohesive layer are closed under tension as well.
     closed = constraints.nodal.closed_nodes(
         active, gap, pressure if pair.options.cohesion is None else np.abs(pressure)
     )
@@ -230,8 +228,8 @@ def _nodal_shear(
 ) -> Array:
     """Return the tangential traction on the secondary nodes (n_nodes, dim) [pressure].
 
-    Frames turn from point to point: the traction is that of the Cartesian components of the forces, and its part along
-    the nodal normals is no shear.
+    Tangents vary from point to point: the traction is computed from the Cartesian components of the forces, and its component
+    along the nodal normals is removed.
     """
     nodal = constraints.nodal
     assert nodal is not None
@@ -251,7 +249,7 @@ def _mostly_sticking(constraints: Constraints, sticking: Mask, multiplier: Array
 
 
 def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:
-    """Return the distances (n,) of reference positions from an axis (place, direction) [length]."""
+    """Return the distances (n,) of reference positions from an axis (point, direction) [length]."""
     foot, direction = axis
     arm = positions - foot
     return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)

@@ -19,8 +19,9 @@ from fastcontact.errors import ContactError, unknown, warn
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-# Part of the work of friction, done by nodes in the step in which they close, that is worth a warning where that work is more
-# than a part of the strain energy: under a ball that sticks by friction 0.6, 2e-4 in long steps and 1e-5 along their path.
+# A warning is given if nodes do more than the first fraction of the frictional work in the step in which they close, and that
+# work exceeds the second fraction of the strain energy: under a ball that sticks with friction 0.6 it is 2e-4 in long steps
+# and 1e-5 along their path.
 WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
 
 
@@ -56,7 +57,7 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
     """
     centre = contact.middle if about is None else np.asarray(about, float)
     if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
-        raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs a place of the space")
+        raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs a point of the space")
     arm, force = contact.coordinates - centre, contact.force_vectors
     if arm.shape[1] == 2:
         return np.array([float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())])
@@ -70,16 +71,17 @@ class ContactResultants:
     Attributes
     ----------
     force : ndarray (dim,)
-        On the secondary side [force].
+        Resultant force on the secondary side [force].
     normal_force : float
-        Sum of the normal components of the nodal forces, whatever their directions [force]. Multiplied by a coefficient of
-        friction, it is what a press fit holds, where the vector sum cancels.
+        Sum of the nodal forces, each along its own normal [force]. Multiplied by the coefficient of friction, it is
+        the friction capacity of a press fit, whose resultant force vanishes.
     moment : ndarray (1,) or (3,)
         Moment of the contact forces about the middle of the contact, see `contact_moment`; zero in axisymmetry
         [force times length].
     area : float
-        Area of contact: tributary areas of the closed nodes, in finite strain on the deformed facets; in the plane a length
-        times unit thickness, in axisymmetry of the full circle [length^2]. Accurate to a row of facets at the edge.
+        Contact area: sum of the tributary areas of the closed nodes, in finite strain on the deformed facets; in the
+        plane a length times unit thickness, in axisymmetry over the full circle [length^2]. Accurate to a row of
+        facets at the edge.
     centre : ndarray (dim,)
         Centre of pressure of the normal forces; NaN without contact [length]. In axisymmetry it lies on the axis, and its
         radial component is NaN.
@@ -244,9 +246,9 @@ def _warn_of_long_steps(work: Mapping[str, float]) -> None:
     done, touching = work.get("friction_work", 0.0), work.get("friction_while_touching", 0.0)
     if touching > WHILE_TOUCHING * done:
         warn(
-            f"{touching / done:.0%} of the work of friction is that of nodes in the load step in which they close: they "
-            "slide from its beginning, not from where they touch. Work is too large, and shear is off: take more load steps, "
-            "or Criteria(friction_while_touching=0.01)"
+            f"{touching / done:.0%} of the work of friction is that of nodes in the load step in which they close: slip "
+            "counts from its beginning, not from first touch. The work is too large, and shear inaccurate: take more load "
+            "steps, or Criteria(friction_while_touching=0.01)"
         )
 
 
@@ -318,7 +320,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
 
 def end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
-    """Return the configuration of a contact pair at the end of a step that began at the end of another one, or at rest."""
+    """Return the configuration of a contact pair at the end of a step that follows the step `before`, or starts at rest."""
     start = np.zeros_like(step.displacement) if before is None else before.displacement
     (now, angle), (then, angle_start) = _pose(step, name), (np.zeros(start.shape[1]), 0.0)
     if before is not None:

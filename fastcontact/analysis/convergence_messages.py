@@ -11,14 +11,17 @@ from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import WINDOW
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
+from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 
 Nodes = dict[str, list[int]]
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
-    """Return the message for a geometry that did not settle; `change` (n_dofs,) is that of the last update [length].
+    """Return the message for a geometry that did not converge; `change` (n_dofs,) is that of the last update [length].
 
     The nodes that moved most are added to the last entry of the history.
     """
@@ -40,7 +43,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
 
 
 def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
-    """Return the message for constraints that did not settle; `nodes` are those next to them."""
+    """Return the message for an active set that did not converge; `nodes` are those nearest to the constraints."""
     if isinstance(solution, FrictionalEquilibrium):
         return (
             f"contact with friction did not settle in {solution.iterations} Newton iterations from several starts: its "
@@ -58,7 +61,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 
 
 def no_contact_stops(bodies: FloatingBodies, work: Array) -> str:
-    """Return the message for loads that pull bodies away; `work` (k,) is their resultant on each free motion [force]."""
+    """Return the message for loads that separate bodies; `work` (k,) is their resultant on each free motion [force]."""
     return (
         f"the loads pull bodies away, no contact stops them ({'; '.join(bodies.names)}; resultant up to "
         f"{np.abs(work).max():.3g}): reverse the loads or add supports"
@@ -66,7 +69,7 @@ def no_contact_stops(bodies: FloatingBodies, work: Array) -> str:
 
 
 def friction_exceeded(bodies: FloatingBodies, work: Array, friction: tuple[float, float]) -> str:
-    """Return the message for loads beyond the friction cone; `friction` are the coefficients needed and given."""
+    """Return the message for loads beyond the friction cone; `friction` are the coefficients required and given."""
     needed, largest = friction
     return (
         f"friction cannot hold {', '.join(bodies.motions.by_body())} against loads of up to {np.abs(work).max():.3g}: that "
@@ -86,15 +89,33 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
     )
 
 
+def limit_load(problem: Problem, state: State) -> str:
+    """Return an addition to the message of a failed load step after `state` if bodies yield; otherwise empty."""
+    if problem.bodies is None or problem.bodies.finite:
+        return ""
+    strain = max(float(history[..., PLASTIC_STRAIN].max(initial=0.0)) for history in state.history.values())
+    if not strain:
+        return ""
+    beyond = (
+        f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics serve: such bodies bear less than real ones"
+        if strain > LARGEST_PLASTIC_STRAIN
+        else ""
+    )
+    return (
+        f"; before it the largest plastic strain is {strain:.2g}{beyond}. Bodies that yield may bear no larger forces: "
+        "prescribe displacements in their place to find the largest"
+    )
+
+
 def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
-    """Return, by contact pair, the secondary nodes next to constraints, counted through the pairs."""
+    """Return, by contact pair, the secondary nodes nearest to constraints, numbered through the pairs."""
     nodes: Nodes = {}
     for name, rows_of_pair in constraints.rows().items():
-        mine = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
-        if len(mine):
+        rows_in_pair = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
+        if len(rows_in_pair):
             points = problem.pairs[name].secondary.points
-            apart = constraints.parts[name].positions[mine][:, None] - problem.model.mesh.points[points][None]
-            nodes[name] = np.unique(points[np.linalg.norm(apart, axis=2).argmin(axis=1)]).tolist()
+            away = constraints.parts[name].positions[rows_in_pair][:, None] - problem.model.mesh.points[points][None]
+            nodes[name] = np.unique(points[np.linalg.norm(away, axis=2).argmin(axis=1)]).tolist()
     return nodes
 
 
@@ -106,7 +127,7 @@ def _most_moved(problem: Problem, change: Array) -> Nodes:
 
 
 def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
-    """Return nodes by contact pair in words, with the coordinates of the first three."""
+    """Return a description of nodes by contact pair, with the coordinates of the first three."""
     texts = []
     for name, points in nodes.items():
         listed = ", ".join(f"{p} {np.array2string(problem.model.mesh.points[p], precision=4)}" for p in points[:3])
@@ -116,7 +137,7 @@ def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:
 
 
 def _smoother(problem: Problem) -> str:
-    """Return the advice for pairs that oscillate between facets at a node, supports of dual functions, branches of a law."""
+    """Return advice for pairs that alternate between facets at a node, supports of dual functions, or branches of a law."""
     faceted = [name for name, pair in problem.pairs.items() if pair.normals == "facet" and len(pair.primary.points)]
     laws = {name: pair.options.cohesion for name, pair in problem.pairs.items() if pair.options.cohesion is not None}
     reach = {name: 2.0 * law.energy / law.strength for name, law in laws.items() if law.reversible}

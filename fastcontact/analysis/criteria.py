@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from fastcontact._tools.argument_types import typed
 from fastcontact.errors import ModelError
 
-# Criteria beyond this are none: a state that misses them has nothing to do with the solution.
+# Upper bound of the criteria: beyond it a state need not resemble the solution.
 LOOSEST = 1e-2
-# Part of the largest displacement that is worth a warning.
+# Fraction of the largest displacement above which a warning is given.
 NOTABLE = 1e-2
 
 
@@ -25,8 +25,8 @@ class Criteria:
         Largest residual force divided by the largest applied force, reaction or contact force (RESI_GLOB_RELA), at most
         0.01. If an iterative linear solver misses it, its tolerance is lowered or a factorisation takes over.
     absolute : float, optional
-        Largest residual force [force] that is accepted by itself (RESI_GLOB_MAXI). Without forces a relative criterion is
-        0/0; then, and by default, the bound is the round-off of the internal forces.
+        Largest admissible residual force [force] (RESI_GLOB_MAXI), an alternative to `relative`. By default, and if
+        there are no forces, the bound is the round-off of the internal forces.
     geometry_updates : int or None
         Number of contact detections on the deformed configuration after the first one of a step; None: until the
         displacement changes by less than `geometry` times its largest component.
@@ -39,18 +39,19 @@ class Criteria:
     max_geometry_updates, max_active_set_iterations : int
         Limits per step, and per pairing.
     max_halvings : int
-        How many times a load step that does not converge is halved before the analysis stops (DECOUPE), twice as often
-        with nonlinear bodies; these continue with substeps of that size, doubled after each one that took few iterations.
-        Substeps are complete load steps, along whose path friction slides, but only the instants of the ramp yield
-        results; ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
+        How many times a load step that does not converge is halved before the analysis stops (DECOUPE); twice as many
+        with nonlinear bodies, whose substeps double in size after each one that took few iterations. Substeps are
+        complete load steps, with friction along their path, but only the instants of the ramp yield results;
+        ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
     friction_while_touching : float, optional
-        Solve friction along the path of load steps in which nodes slide while they close: with the geometry of their end, in
-        increments on one Delassus operator, so many that in each the shear at such nodes is at most this fraction of what
-        friction can carry in all. Nodes then slide from where they touch on only, so that work of friction and shear are
-        those of many steps: 0.01 leaves errors of a few per cent, for up to twice the time of the step with factors, up to
-        six times the iterations with multigrid. Nonlinear bodies have no increments:
-        their steps are halved instead, at most `max_halvings` times, while such nodes do more than this fraction of the
-        frictional work so far. By default slip counts from the beginning of each step [-].
+        If given, friction is solved along the path of load steps in which nodes close and slide: in increments with
+        one Delassus operator and the geometry at the end of the step. The increments are so small that in each the
+        shear of these nodes is at most this fraction of the friction capacity. Nodes then slide only from the instant
+        of contact on, and work of friction and shear are those of many steps. A value of 0.01 leaves errors of a few
+        percent; a step takes up to twice the time with the direct solver, and up to six times the iterations with
+        multigrid. With nonlinear bodies, steps are halved instead, at most
+        `max_halvings` times, while such nodes do more than this fraction of the work of friction so far. By default
+        slip is counted from the beginning of each step [-].
 
     Examples
     --------

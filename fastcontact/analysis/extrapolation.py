@@ -12,20 +12,20 @@ from fastcontact.arrays import Array, Mask
 
 # Gaps [length] and multipliers (m,) of a pair.
 GapsAndForces = tuple[Array, Array]
-# Loads that grow by more than so many last increments at once are not extrapolated to.
+# No extrapolation to loads that grow by more than this multiple of the last increment.
 FARTHEST = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Extrapolation:
-    """The last converged load steps, at most two, and the linear extension of them to the present load.
+    """The last converged load steps, at most two, and their linear extrapolation to the current load.
 
     Attributes
     ----------
     ratio : float
-        The present load increment in units of the last one; zero where there is nothing to extend.
+        The current load increment over the last one; zero without earlier steps.
     loads : tuple of tuples of ndarray
-        The loads of the present and of the last two steps: prescribed displacements [length] and forces [force].
+        The loads of the current and of the last two steps: prescribed displacements [length] and forces [force].
     states : tuple of (ndarray (n,), dict of str to GapsAndForces)
         Displacements [length], and gaps and multipliers by pair, of the last two converged steps.
     """
@@ -35,7 +35,7 @@ class Extrapolation:
     states: tuple[tuple[Array, Mapping[str, GapsAndForces]], ...] = ()
 
     def to(self, *parts: Array) -> Extrapolation:
-        """Return the extension to the loads of the next step: prescribed displacements and forces, each its own array."""
+        """Return the extrapolation to the loads of the next step: prescribed displacements and forces, as separate arrays."""
         loads, ratio = (*self.loads[-2:], tuple(part.copy() for part in parts)), 0.0
         if len(self.states) == 2 and len(loads) == 3:
             growth = next((r for r in map(_ratio, *loads) if r is not None), 0.0)
@@ -43,18 +43,18 @@ class Extrapolation:
         return Extrapolation(ratio, loads, self.states)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces]) -> Extrapolation:
-        """Return it with the solution of the step: displacements (n,) [length], gaps and multipliers by pair."""
+        """Return a copy with the solution of the step: displacements (n,) [length], gaps and multipliers by pair."""
         return replace(self, states=(*self.states[-1:], (u.copy(), contact)))
 
     def displacement(self, u: Array) -> Array:
-        """Return the displacements (n,) to start from [length]; `u` (n,) are the last ones."""
+        """Return initial displacements (n,) [length]; `u` (n,) are the last ones."""
         if not self.ratio:
             return u
         (before, _), (last, _) = self.states
         return last + self.ratio * (last - before)
 
     def active(self, name: str, last_active: Mask) -> Mask:
-        """Return the active set (m,) to start a pair from; `last_active` (m,) is the last one."""
+        """Return an initial active set (m,) of a pair; `last_active` (m,) is the last one."""
         if not self.ratio:
             return last_active
         (_, first), (_, second) = self.states
@@ -68,7 +68,7 @@ class Extrapolation:
         return np.where(last_active, force > 0.0, gap < 0.0)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return it as plain data, without the last displacements."""
+        """Return the data as plain values, without the last displacements."""
         return {
             "loads": [[_sparse(part) for part in load] for load in self.loads[-2:]],
             "before": self.states[0][0] if len(self.states) == 2 else None,
@@ -77,17 +77,17 @@ class Extrapolation:
 
     @classmethod
     def from_dict(cls, kept: Mapping[str, Any], u: Array) -> Extrapolation:
-        """Return what `to_dict` kept; `u` (n,) are the last displacements [length]."""
+        """Return the extrapolation saved by `to_dict`; `u` (n,) are the last displacements [length]."""
         displacements = [u] if kept["before"] is None else [kept["before"], u]
         contacts = [{name: (both[0], both[1]) for name, both in contact.items()} for contact in kept["contact"]]
         states = tuple(zip(displacements, contacts)) if contacts else ()
-        # Earlier versions kept one array a step, of displacements or of forces: nobody knows which.
+        # Earlier versions saved one array per step, of displacements or of forces, which cannot be told apart.
         loads = tuple(tuple(map(_dense, load)) for load in kept["loads"] if isinstance(load, list))
         return cls(0.0, loads, states)
 
 
 def _ratio(first: Array, second: Array, third: Array) -> float | None:
-    """Return the last increment (n,) of a load in units of the one before; None where that is zero."""
+    """Return the last increment (n,) of a load over the one before; None where that is zero."""
     now, last = third - second, second - first
     size = float(np.sum(last * last))
     return float(np.sum(now * last)) / size if size else None

@@ -1,8 +1,8 @@
 """Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
 
-Chords that stand off the arc by up to h push sides of modulus E apart by pressures of the order of E h / L, whatever the
-interference is: L is the length of the facets where both sides have some, which do not match, and that of the contact where
-the other side is an exact shape.
+Chords with a sag up to h cause pressure errors of the order of E h / L in bodies of modulus E, whatever the
+interference: L is the length of the facets where both sides have non-matching facets, and that of the contact where the
+other side is an exact shape.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.results.step import ContactResult, StepResult
 
-# The estimate over the mean pressure above which there is a warning, by the order of facets. On rings nodal pressures were
-# off by 0.02 to 0.5 of it on linear facets, by up to 3 on quadratic ones; against rigid shapes by 1.1 to 1.3.
+# Estimated error over the mean pressure above which a warning is given, by the order of facets. On rings the errors of nodal
+# pressures were 0.02 to 0.5 of the estimate on linear facets and up to 3 on quadratic ones; against rigid shapes 1.1 to 1.3.
 DOUBTFUL, AGAINST_RIGID = {1: 0.5, 2: 0.1}, 0.2
 
 
 def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, str]:
-    """Return by name a warning for each pair that chords may push apart by much of its pressure in the `last` step."""
+    """Return, by name, a warning for each pair with a large pressure error due to sag in the `last` step."""
     warnings, load, displacement = {}, problem.load_at(last.load_factor), problem.displacement(state.u)
     for name, pair in problem.pairs.items():
         contact = last.contact[name]
@@ -34,7 +34,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
         if corrected or pair.options.tied or pair.options.gap_only or not (contact.pressure > 0.0).any():
             continue
         at = problem.configuration(name, state, load, displacement, state.u)
-        off = _standing_off(pair, at, contact.active)
+        off = _sag_at_points(pair, at, contact.active)
         text = _text(pair, float(np.ptp(off)), contact) if len(off) else ""
         if text:
             warnings[name] = f"contact '{name}': {text}"
@@ -42,7 +42,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 
 
 def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
-    """Return the effect on pressures of a `spread` [length] of the distance between chords and arcs; empty where small."""
+    """Return a warning about the pressure error due to a `spread` of the sag [length]; empty where small."""
     side, order = pair.secondary, pair.secondary.order
     size = float(
         np.median(np.concatenate([np.linalg.norm(np.ptp(pair.points[b.facets], axis=1), axis=1) for b in side.blocks]))
@@ -52,21 +52,21 @@ def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
     if isinstance(pair.primary, RigidSide):
         doubtful, power = AGAINST_RIGID, 2 * order
         length = float(np.linalg.norm(np.ptp(pair.points[side.points[contact.active]], axis=0)))
-        remedy = "formulation 'node_to_segment' measures the gap at nodes, which stand on the arc"
+        remedy = "formulation 'node_to_segment' measures the gap at nodes, which lie on the arc"
     mean = float(contact.pressure[contact.pressure > 0.0].mean())
     error = pair.modulus * spread / max(length, size)
     if error <= doubtful * mean:
         return ""
     finer = f"facets of length {size * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {size:.2g}"
     return (
-        f"facets of '{side.group}' and of what it faces stand off their arcs by up to {spread:.3g}, which may move pressures "
-        f"by the order of {error:.3g}, beside a mean of {mean:.3g}: {remedy}; "
+        f"facets of '{side.group}' and of what it faces deviate from their arcs by up to {spread:.3g}, which may move "
+        f"pressures by the order of {error:.3g}, beside a mean of {mean:.3g}: {remedy}; "
         f"{'quadratic elements, or ' if order == 1 else ''}{finer} bring it down"
     )
 
 
-def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
-    """Return the sag of facets where the gap of closed facets is evaluated (n,) [length]."""
+def _sag_at_points(pair: Formulation, at: Configuration, active: Mask) -> Array:
+    """Return the sag of closed facets at the points where their gap is evaluated (n,) [length]."""
     points, deformed, closed = _points(pair), pair.points + at.displacement, np.zeros(len(pair.points), bool)
     closed[pair.secondary.points[active]] = True
     if isinstance(pair.primary, RigidSide):
@@ -84,7 +84,7 @@ def _standing_off(pair: Formulation, at: Configuration, active: Mask) -> Array:
 
 
 def _points(pair: Formulation) -> Candidates:
-    """Return the points of the secondary side where the gap counts: nodes alone, or points inside of facets, too."""
+    """Return the points of the secondary side where the gap is evaluated: nodes alone, or points inside facets as well."""
     if pair.name == "node_to_segment":
         return Candidates.nodes_of(pair.secondary)
     return Candidates.inside(pair.secondary, [fine_rule(block.element)[0] for block in pair.secondary.blocks])

@@ -1,10 +1,10 @@
 """Floating bodies, held by contact alone: soft springs regularise their singular stiffness matrix.
 
-Each free rigid motion gets one spring at one node, soft beside the body there. Wherever the bodies are anchored, the
-contact problem is regular; its solution stretches the springs, and they are anchored anew where it has moved the bodies.
-This is the proximal point method for the energy under the inequalities of contact (Rockafellar, 1976): where contact holds
-the bodies, a solution leaves about the stiffness of the springs over that of the contact of their forces. Detections of
-contact begin at the last position, so that most need no more than one solution. At the end the springs carry nothing.
+Each rigid-body mode gets one spring at one node, soft compared with the body there. With anchored springs the contact problem
+is regular; its solution stretches the springs, and they are anchored anew at the new position of the bodies. This is the
+proximal point method for the energy under the inequalities of contact (Rockafellar, 1976): where contact holds the bodies,
+each solution reduces the forces of the springs by about the ratio of their stiffness to that of the contact. Pairings
+begin at the last position, so that most need only one solution. At convergence the springs carry no force.
 """
 
 from __future__ import annotations
@@ -25,22 +25,24 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import ROUND_OFF
 
-# Stiffness of the springs beside that of the body. Softer ones cost digits of factors (1e-6: a wedge off by 3e-9), stiffer
-# ones solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and 1, a bolt 2.8, 5.3 and 27.
-# By factors, whose solutions are cheap, the second: SSNP170 has a uniform pressure to 1.5e-10 with the first, to 1e-10 so.
-# Where turned bodies under load have a negative stiffness, springs as stiff as the body make up for it. The body is the
-# softest one: what presses a stiff body against it is no stiffer (a layer 2e5 times softer crept for 100 positions).
+# Stiffness of the springs over that of the body. Softer springs cost digits of factorisations (1e-6: an error of 3e-9 in a
+# wedge), stiffer ones more solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and
+# 1, a bolt 2.8, 5.3 and 27. With factorisations, whose solutions are cheap, the second is used: the pressure of SSNP170
+# is uniform to 1.5e-10 with the first and to 1e-10 with the second. Where rotated bodies under load have a negative
+# stiffness, springs as stiff as the body compensate it. The reference is the softest body: a contact with a stiff body
+# is no stiffer than it (a layer 2e5 times softer crept for 100 positions).
 SOFT, FIRM, STIFF = 1e-3, 1e-2, 1.0
-# The springs carry less than this fraction of the loads and of the contact forces, which is all there is where motions drive
-# the bodies; more where round-off or the linear solver leave more.
+# At convergence the springs carry less than this fraction of the loads and of the contact forces (the only forces where
+# prescribed displacements drive the bodies), or as little as round-off or the linear solver allow.
 SLACK = ROUND_OFF
-# What is left when nothing improves any more counts as slack below this fraction.
+# Springs whose forces do not decrease any more count as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100
-# Anchors before their changes are extrapolated: parts far softer than the springs, as a layer that peels off, creep.
+# Positions before their changes are extrapolated: parts far softer than the springs, such as a peeling layer, creep.
 PLAIN = 1
-# Of the size of a displacement as a place of a spring: on contact surfaces, and where springs have been.
-AVOIDED, KEPT = 1e-3, 4.0
+# Weight of displacements in the choice of springs where springs were before: a rubber block pressed on another by multigrid
+# takes 142 iterations in two steps, 157 without.
+KEPT = 4.0
 NONE = np.empty(0, np.intp)
 
 
@@ -51,13 +53,13 @@ class RigidPosition:
     Attributes
     ----------
     state : Solution
-        The last one, its iterations those of all positions.
+        The last solution, with the iterations of all positions.
     position : ndarray (k,)
-        Rigid displacement at each spring, where it is anchored [length].
+        Rigid displacement at the anchor of each spring [length].
     spring_force : ndarray (k,)
-        Force still carried by each spring [force].
+        Remaining force of each spring [force].
     positions : int
-        Positions tried.
+        Number of positions.
     slack : bool
         Whether the springs are slack.
     dofs : ndarray of int (k,)
@@ -73,41 +75,36 @@ class RigidPosition:
 
 
 class FloatingBodies:
-    """Springs on the free motions of a system.
+    """Springs on the free rigid motions of a system.
 
     Parameters
     ----------
     motions : FreeMotions
     system : System
-    avoid : ndarray of int
-        Displacements to keep the springs from if possible: those of the contact surfaces.
     relative_stiffness : float
-        Stiffness of the springs beside that of the body [-].
+        Stiffness of the springs over that of the body [-].
     before : ndarray of int, optional
-        Displacements that springs held before, which go on with them unless others are much better.
+        Displacements of the springs before, which are kept unless others are much better.
 
     Attributes
     ----------
     names : list of str
-        Of the free motions.
+        Names of the free motions.
     dofs : ndarray of int (k,)
         The displacement that each spring holds.
     motions : FreeMotions
         The free motions, each moving one of `dofs` by 1.
     stiffness : float
-        Of each spring [force / length].
+        Stiffness of each spring [force / length].
     """
 
-    def __init__(
-        self, motions: FreeMotions, system: System, avoid: Indices, relative_stiffness: float, before: Indices = NONE
-    ) -> None:
+    def __init__(self, motions: FreeMotions, system: System, relative_stiffness: float, before: Indices = NONE) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = _softest(diagonal, system.free & ~weightless, motions.displacement != 0.0)
         diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
-        weights[avoid] *= AVOIDED
         weights[before] *= KEPT
         self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), weights)
         self._places = [
@@ -134,9 +131,9 @@ class FloatingBodies:
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as plain numbers and strings.
 
-        Keys: ``motions``, names of the free motions; ``springs``, their places; ``spring_stiffness`` [force / length];
-        ``force_left``, what each spring still carries [force]; ``relative_to_load``, the largest over the load;
-        ``positions``, rigid positions tried.
+        Keys: ``motions``, names of the free motions; ``springs``, their positions; ``spring_stiffness`` [force / length];
+        ``force_left``, the remaining force of each spring [force]; ``relative_to_load``, the largest one over the load;
+        ``positions``, number of rigid positions.
         """
         left = np.abs(rigid.spring_force)
         return {
@@ -156,14 +153,14 @@ class FloatingBodies:
         return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
 
     def moving(self, rigid: RigidPosition) -> list[str]:
-        """Return the names of the free motions that the springs still resist most."""
+        """Return the names of the free motions with the largest remaining spring forces."""
         work = np.abs(self._at_springs.T @ rigid.spring_force)
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
         self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float
     ) -> RigidPosition:
-        """Anchor the springs where the last solution has moved them, until they are slack.
+        """Anchor the springs at the position of the last solution, until they are slack.
 
         Parameters
         ----------
@@ -171,7 +168,7 @@ class FloatingBodies:
             Solves the contact problem with the springs anchored at a position (k,).
         start : ndarray (k,)
         load : float
-            The loads to compare the forces of the springs with, beside those of contact [force].
+            Loads to which the forces of the springs are compared, in addition to contact forces [force].
         noise : float
             Accuracy of displacements, as a fraction of the largest one.
         round_off : float
@@ -180,7 +177,7 @@ class FloatingBodies:
         Returns
         -------
         RigidPosition
-            The last one if the springs do not become slack, or a contact problem does not settle.
+            The last position if the springs do not become slack, or a contact problem does not converge.
         """
         position, before, iterations = start, np.inf, 0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
@@ -203,12 +200,12 @@ class FloatingBodies:
 
 
 def _softest(diagonal: Array, solid: Mask, moving: Mask) -> float:
-    """Return the least median stiffness (n,) of `solid` unknowns (n,) over those of each of `moving` (n, k), and the rest."""
+    """Return the least median of `diagonal` (n,) over the `solid` unknowns of each of `moving` (n, k), and of the others."""
     groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
     return min(float(np.median(diagonal[group])) for group in groups if group.any())
 
 
 def _spring_dofs(motions: Array, weights: Array) -> Indices:
-    """Return k unknowns that determine the motions (n, k): those of the largest `weights` (n,) far apart."""
+    """Return k unknowns that determine the motions (n, k): unknowns of large `weights` (n,) far apart."""
     _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
     return np.sort(order[: motions.shape[1]]).astype(np.intp)

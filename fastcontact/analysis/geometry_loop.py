@@ -9,7 +9,7 @@ from typing import NoReturn
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_newton import newton_step
@@ -19,16 +19,16 @@ from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import PATIENT_UPDATES, Tolerances
+from fastcontact.analysis.tolerances import Tolerances
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
-# One active-set iteration per pairing is cheapest near the solution but may cycle; after so many, settle the set first.
+# One active-set iteration per pairing is cheapest near the solution but may cycle; after this many, the set converges first.
 SEMISMOOTH_UPDATES = 8
-# Earlier geometries that are mixed into the next one.
-MIXED = 5
+# Pairings after which an iteration begins again from elsewhere, or with rounded edges: nodes flip between facets.
+PATIENT_UPDATES = 25
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,15 @@ class Plan:
     Attributes
     ----------
     until_settled : bool
-        Update until the displacement stands still; otherwise a fixed number of times.
+        Whether to update until the displacement converges; otherwise a fixed number of times.
     limit : int
-        Updates allowed, or that fixed number.
+        Largest number of updates, or that fixed number.
     semismooth : bool
-        Pair again after every active-set iteration at first.
+        Whether to pair again after every active-set iteration at first.
     extrapolate : bool
-        Begin with displacements that are extrapolated along the load, and with inexact solutions.
+        Whether to begin with displacements extrapolated along the load, and with inexact solutions.
     newton : bool
-        Take steps of Newton's method for the geometry, see `geometry_newton`.
+        Whether to use Newton's method for the geometry, see `geometry_newton`.
     """
 
     until_settled: bool
@@ -57,11 +57,11 @@ class Plan:
 
     @classmethod
     def of(cls, problem: Problem) -> Plan:
-        """Return the plan that the criteria, the formulations and the linear solver of a problem ask for."""
+        """Return the plan for the criteria, the formulations and the linear solver of a problem."""
         criteria, iterative = problem.criteria, problem.solver.iterative
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
         pairs = problem.pairs.values()
-        # How slips vary with the geometry is not known, and fluid presses along the surfaces themselves.
+        # Derivatives of slips are not available, and fluid pressure follows the surfaces themselves.
         known = not any(pair.friction or pair.options.source is not None for pair in pairs)
         newton = known and not iterative and problem.floating_bodies is None
         return cls(
@@ -75,7 +75,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class SettledContact:
-    """The contact of a load step when its geometry has settled.
+    """The contact of a load step with converged geometry.
 
     Attributes
     ----------
@@ -83,9 +83,9 @@ class SettledContact:
     solution : Solution
     iterate : Iterate
     last_change : (int, float), optional
-        A fixed number of updates, and the relative change by the last one.
+        The fixed number of updates, and the relative change by the last one.
     scatter : Scatter, optional
-        Of the last geometries, where round-off did not let them settle to the criterion.
+        Scatter of the last geometries, where round-off prevented convergence to the criterion.
     """
 
     constraints: StackedConstraints
@@ -110,14 +110,14 @@ def settle_geometry(
     step : StepContext
     extrapolation : Extrapolation
     expected : float
-        Displacement to expect in the first step, if forces alone act [length].
+        Expected displacement in the first step, if only forces act [length].
     begun : Iterate, optional
-        Where less accurate solutions have settled; by default the step begins where the last one ended.
+        Converged iterate of less accurate solutions; by default the step begins at the end of the last one.
 
     Raises
     ------
     ConvergenceError
-        If the active set or the geometry does not settle.
+        If the active set or the geometry does not converge.
     """
     iterate = begun or Iterate.of(step.state)
     try:
@@ -133,10 +133,10 @@ def settle_geometry(
 
 def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
     problem, plan = step.problem, Plan.of(step.problem)
-    if iterate.history:  # nothing to extrapolate any more
+    if iterate.history:  # already started: no extrapolation
         plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
-    mixing, watch = _Mixing(Anderson(MIXED, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
+    mixing, watch = _Mixing(Anderson(DEPTH, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
     for update in range(plan.limit + 1):
@@ -154,9 +154,9 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         settled = SettledContact(constraints, solution, iterate)
         if not solution.settled or tolerances.inexact:
             watch.forget()
-        elif moved.change <= tolerances.enough(update, moved.size):
+        elif moved.change <= tolerances.enough(moved.size):
             return settled
-        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size, tolerances.noise(moved.size)):
+        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed = None
@@ -167,7 +167,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
-            # Nodes that flip between facets may do so for ever from one start and not from another.
+            # Whether nodes alternate between facets for ever depends on the initial guess.
             iterate.begin_again(step.state)
             mixing.restart()
             watch.forget()
@@ -187,7 +187,7 @@ def _solve_once(
     step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None, iterate: Iterate, active: Mask,
     accuracy: Accuracy,
 ) -> tuple[Solution, Array]:  # fmt: skip
-    """Solve the inequalities of a pairing, those of `nodes` in several pairs or at both ends of a period once."""
+    """Solve the inequalities of a pairing, with one condition for `nodes` in several pairs or at both ends of a period."""
     if nodes is None:
         return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
     once = nodes.once(constraints)
@@ -196,7 +196,7 @@ def _solve_once(
 
 @dataclass(frozen=True, eq=False)
 class _Moved:
-    """By how much (change) the active displacements differ from those `before` [length], and how large all are (size)."""
+    """Change of the active displacements from those `before`, and the largest displacement (size) [length]."""
 
     before: Array
     change: float
@@ -210,10 +210,10 @@ class _Moved:
 def _move(
     step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, fraction: Array
 ) -> _Moved:
-    """Let the iterate take the active displacements `fraction` (k,) of a solution."""
+    """Update the iterate by the active displacements `fraction` (k,) of a solution."""
     before = step.dofs.of(iterate.u)
     iterate.u = step.dofs.put(iterate.u, fraction)
-    # Rigid motions of bodies that only contact holds do not count.
+    # Rigid-body motions of floating bodies are left out.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
     moved = _Moved(before, largest_difference(fraction, before), size)
     iterate.remember(constraints, solution)
@@ -243,13 +243,13 @@ def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: 
 
 
 class _Mixing:
-    """Anderson mixing of the geometries that belong to one active set, and how long Newton's method takes its place.
+    """Anderson mixing of the geometries with one active set, or Newton's method as long as it converges.
 
     Parameters
     ----------
     accelerated : Anderson
     newton : bool
-        Whether Newton's method may.
+        Whether Newton's method is allowed.
     """
 
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
@@ -258,25 +258,25 @@ class _Mixing:
         self._newton, self._change = newton, np.inf
 
     def newton(self, change: float) -> bool:
-        """Return whether a step of Newton's method is due, after a `change` of the displacements [length].
+        """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
 
-        Where nodes pass from one facet to another and back, changes rise, and derivatives lead nowhere.
+        Where nodes move to and fro between facets, changes increase, and Newton's method does not converge.
         """
         self._newton, self._change = self._newton and change <= self._change, change
         return self._newton
 
     def restart(self) -> None:
-        """Forget the geometries so far."""
+        """Discard the geometries so far."""
         self._accelerated.restart()
 
     def next(
         self, before: Array, fraction: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
     ) -> Array | None:
-        """Return the active displacements (k,) to pair at next; None for those of the solution [length]."""
+        """Return the active displacements (k,) of the next pairing; None for those of the solution [length]."""
         state = constraints.state(solution.active)
         same = self._known is not None and np.array_equal(self._known, state)
         self._known = state if solution.settled else None
         if inexact or not same:
             self._accelerated.restart()
-        # An inexact solution stands still where it is not right yet.
+        # An inexact solution may be stationary before it is accurate.
         return None if inexact else self._accelerated.mixed(before, fraction)

@@ -1,13 +1,13 @@
 """Newton's method for the contact geometry of a load step, by directional derivatives.
 
-With the pairing of displacements u the contact problem has a solution S(u), and the load step asks for u = S(u). Newton's
-method takes the geometry's own variation into account: of the change v of the displacements in
+With the pairing at displacements u the contact problem has a solution S(u), and the load step requires u = S(u). Newton's
+method accounts for the variation of the geometry: of the change v of the displacements in
 
     v = S(u) - u + S'(u) v
 
-the last part is the response of the solution to the forces and gaps by which the geometry varies along v, see
-`contact.linearised_geometry`, with the active set as it is. It is a third of v or less, so that a few iterations of GMRES
-solve for v, each of the price of a back substitution. How slips of friction vary with the geometry is not known.
+the last term is the response of the solution, with fixed active set, to the variation of forces and gaps with the geometry
+along v, see `contact.linearised_geometry`. It is a third of v or less, so that a few iterations of GMRES solve for v, each at
+the cost of a back substitution. Derivatives of frictional slips with respect to the geometry are not available.
 """
 
 from __future__ import annotations
@@ -23,16 +23,14 @@ from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 
-# Relative residual of the change, and iterations at most.
+# Relative residual of the change, and the largest number of iterations.
 ACCURACY, MOST = 1e-6, 20
-# What the response may add to the change, in units of it: far from the solution a step beyond that leads anywhere.
-FARTHEST = 1.0
 
 
 def newton_step(
     step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array
 ) -> Array | None:
-    """Return the active displacements (k,) to pair at next [length]; None where the geometry is not linearised.
+    """Return the active displacements (k,) of the next pairing [length]; None where the geometry is not linearised.
 
     Parameters
     ----------
@@ -40,10 +38,10 @@ def newton_step(
     constraints : StackedConstraints
         Paired at displacements `before` (k,) [length].
     solution : Solution
-        With these constraints.
+        Solution with these constraints.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length]; those that contact does not depend on stay as in
-        the latter.
+        Active displacements of the pairing and of the solution [length]; displacements on which contact does not depend are
+        taken from the latter.
     """
     if (
         not isinstance(solution, Equilibrium)
@@ -73,7 +71,8 @@ def newton_step(
     system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
     size = largest(changed) or 1.0
     v, _ = gmres(system, changed / size, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
-    if not largest_difference(size * v, changed) <= FARTHEST * size:
+    # Far from the solution a step in which the response adds more than the change itself leads anywhere.
+    if not largest_difference(size * v, changed) <= size:
         return None
     mixed = image.copy()
     mixed[where] = before[where] + size * v
@@ -81,7 +80,7 @@ def newton_step(
 
 
 def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:
-    """Return the linearised geometry of pairs in contact with the rows of each; empty where that of one is not known."""
+    """Return the linearised geometry of pairs in contact with the rows of each; empty if a pair has none."""
     parts = []
     for name, rows in constraints.rows().items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]

@@ -1,4 +1,4 @@
-"""Steady heat of a model, prepared for analysis: temperatures for the conductances that its contacts have at the moment."""
+"""Steady heat conduction of a model, prepared for analysis: temperatures for given contact conductances."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Temperatures:
     Attributes
     ----------
     rise : ndarray (n_points,)
-        Over the reference [temperature].
+        Temperature rise over the reference [temperature].
     reaction : ndarray (n_points,)
-        Heat that prescribed temperatures put into the nodes [power].
+        Heat flow into the nodes with prescribed temperatures [power].
     balance : dict
         See `StepResult.heat` [power].
     """
@@ -46,14 +46,14 @@ class Temperatures:
 
 @dataclass(frozen=True, eq=False)
 class ThermalLoads:
-    """What loads and films exchange with the surroundings of the bodies.
+    """Heat exchange of loads and films with the surroundings of the bodies.
 
     Attributes
     ----------
     films : csr_array (n_points, n_points)
         Matrix of all films [power / temperature].
     powers, ambient : dict of ramp table to ndarray (n_points,)
-        By history, at multiplier 1: of loads, and of films by the rise of their surroundings [power].
+        By history, at multiplier 1: powers of loads, and of films due to the temperature rise of their surroundings [power].
     """
 
     films: csr_array
@@ -62,7 +62,7 @@ class ThermalLoads:
 
 
 def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoads:
-    """Return what loads and films of a model exchange, over areas and volumes at a displacement (n_points, dim) [length]."""
+    """Return the heat exchange of a model, over areas and volumes at a displacement (n_points, dim) [length]."""
     mesh, films = model.mesh, csr_array((model.mesh.n_points,) * 2)
     deformed = mesh if displacement is None else mesh.replace(points=mesh.points + displacement)
     places = mesh, model.kinematics, deformed
@@ -79,7 +79,7 @@ def thermal_loads(model: Model, displacement: Array | None = None) -> ThermalLoa
 
 @dataclass(frozen=True, eq=False)
 class Heat:
-    """The conduction of heat of a model, prepared for analysis; temperatures are rises over the reference.
+    """Heat conduction of a model, prepared for analysis; temperatures are rises over the reference.
 
     Attributes
     ----------
@@ -87,19 +87,19 @@ class Heat:
     ramp : Ramp
     criteria : Criteria
     conduction : Conduction
-        In the reference configuration.
+        Conduction in the reference configuration.
     matrix : csr_array (n_points, n_points)
-        Of that conduction [power / temperature].
+        Conductivity matrix in that configuration [power / temperature].
     loads : ThermalLoads
         Loads and films in that configuration.
     merged : csr_array (n_points, n_points)
-        From the temperatures of nodes to those of all that have the same [-].
+        From the temperatures of merged nodes to those of all nodes [-].
     body : ndarray of int (n_points,)
         Body of each node, -1 for none.
     fixed : ndarray of bool (n_points,)
         Merged nodes with a prescribed temperature.
     prescribed : dict of ramp table to ndarray (n_points,)
-        By history, at multiplier 1: rises of prescribed temperatures [temperature].
+        By history, at multiplier 1: prescribed temperature rises [temperature].
     linear_solver : str
     linear_tolerance : float
     """
@@ -119,7 +119,7 @@ class Heat:
 
     @property
     def depends_on_contact(self) -> bool:
-        """Whether temperatures depend on the contact, not the contact on temperatures alone."""
+        """Whether temperatures depend on the contact, in addition to the contact on temperatures."""
         return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
 
     @property
@@ -133,7 +133,7 @@ class Heat:
         return self.depends_on_contact or self.finite
 
     def conductors(self, displacement: Array) -> Conduction:
-        """Return the cells as they conduct at displacements (n_points, dim), with finite strains deformed [length]."""
+        """Return the conduction of the cells at displacements (n_points, dim), deformed with finite strains [length]."""
         return replace(self.conduction, displacement=displacement) if self.finite else self.conduction
 
     def temperatures(
@@ -146,18 +146,19 @@ class Heat:
         ----------
         instant : float
         displacement : ndarray (n_points, dim), optional
-            Of the bodies, which counts with finite strains [length].
+            Displacement of the bodies, used with finite strains [length].
         contact : csr_array (n_points, n_points), optional
-            Matrix of what contacts conduct [power / temperature].
+            Conductivity matrix of the contacts [power / temperature].
         friction : ndarray (n_points,), optional
-            Powers of nodes by friction [power].
+            Nodal powers of friction [power].
         obstacles : (csr_array (n_points, n_points), ndarray (n_points,)), optional
-            Films between bodies and rigid obstacles: matrix [power / temperature], and powers by the obstacles' rise [power].
+            Films between bodies and rigid obstacles: matrix [power / temperature], and powers due to the obstacles' rise
+            [power].
 
         Raises
         ------
         ConvergenceError
-            If a body is left alone by open contacts, so that nothing determines its temperature, or heat is not in balance.
+            If open contacts isolate a body, so that its temperature is undetermined, or heat is not in balance.
         """
         n = (self.model.mesh.n_points,)
         inner, outer = self.matrix, self.loads
@@ -206,14 +207,14 @@ class Heat:
         return solver.load(f).full_solution(np.zeros(len(f)))
 
     def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
-        """Raise ConvergenceError if nothing determines the temperature of a body."""
+        """Raise ConvergenceError if the temperature of a body is undetermined."""
         held = self.merged @ self.fixed + films.diagonal() > 0.0
         pairs = coo_array(self.merged if contact is None else self.merged + contact)
         joined = np.stack([pairs.row, pairs.col], axis=1)[pairs.data != 0.0]
-        alone = not_reached(self.body, held, joined)
-        if len(alone):
+        cut_off = not_reached(self.body, held, joined)
+        if len(cut_off):
             raise ConvergenceError(
-                f"no heat reaches body {body_name(self.model.mesh, self.body, alone[0])}: its contacts are open or conduct "
+                f"no heat reaches body {body_name(self.model.mesh, self.body, cut_off[0])}: its contacts are open or conduct "
                 "nothing in this step, so that nothing determines its temperature; add a film, or a conductance by gap"
             )
 
@@ -221,7 +222,7 @@ class Heat:
 def prepared_heat(
     model: Model, ramp: Ramp, criteria: Criteria, linear_solver: str, linear_tolerance: float
 ) -> Heat | None:
-    """Return the heat of a model that was checked before; None where it conducts none."""
+    """Return the heat conduction of a checked model; None without any."""
     if not model.conducts:
         return None
     conduction, same, n = model.conduction(), model.same_temperature(), model.mesh.n_points

@@ -1,4 +1,4 @@
-"""Contact problem with fixed geometry: active set without friction, friction cone with it, positions of floating bodies."""
+"""Contact problem with fixed geometry: active set or friction cone, and the positions of floating bodies."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ class StepContext:
     ----------
     problem : Problem
     state : State
-        At the beginning of the step.
+        State at the beginning of the step.
     load : StepLoad
     loaded : Loaded
         The matrix with the right-hand side of the step, for the active unknowns.
     dofs : ActiveDofs
     path : Path or Slid, optional
-        To solve friction along, or where its last increment begins.
+        Path along which friction is solved, or the beginning of its last increment.
     """
 
     problem: Problem
@@ -51,21 +51,21 @@ class StepContext:
 
     @cached_property
     def prescribed_motion(self) -> Array:
-        """By how much supports and relations alone move all components in the step (n_dofs,) [length]."""
+        """Displacement of all components in the step by supports and multi-point constraints alone (n_dofs,) [length]."""
         system, start, zero = self.problem.system, self.state.u, np.zeros_like(self.state.u)
         return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
 
     def driven(self, constraints: Constraints) -> Array:
-        """Return the slips (k, m) that supports and obstacles make in the step, over the largest of all motions [-]."""
+        """Return the slips (k, m) imposed by supports and obstacles in the step, over the largest imposed motion [-]."""
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
-        # Where nothing is prescribed, motions are what round-off leaves of those before.
+        # Without prescribed displacements, the motion is the round-off of earlier motions.
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
             for name, rows in constraints.rows().items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
-                    # A motion along the normals makes no slips but those of round-off.
+                    # The slips of a motion along the normals are round-off.
                     moved = end.get(name, np.zeros(1)) - begin.get(name, 0.0)
                     scale = max(scale, largest(constraints.slip0[:, rows]), largest(moved))
         return np.asarray(slips / (scale or 1.0))
@@ -81,9 +81,9 @@ def solve_inequalities(
     step : StepContext
     constraints : Constraints
     iterate : Iterate
-        Keeps the solution with friction, and the rigid position of floating bodies.
+        Receives the solution with friction, and the rigid position of floating bodies.
     active : ndarray of bool (m,)
-        Set to start from.
+        Initial active set.
     accuracy : Accuracy
 
     Returns
@@ -101,9 +101,9 @@ def solve_inequalities(
 def _solve(
     step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array, guess: Array
 ) -> Solution:  # fmt: skip
-    """Solve in the unknowns that supports and relations leave.
+    """Solve in the unknowns that remain after supports and multi-point constraints.
 
-    `lift` (n_dofs,) is what they prescribe, `guess` (n_dofs,) are displacements to start from [length].
+    `lift` (n_dofs,) are the displacements that these prescribe, `guess` (n_dofs,) initial displacements [length].
     """
     condensed = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
     u = step.dofs.unknowns(guess, lift)
@@ -159,21 +159,21 @@ def _with_floating_bodies(
 
 
 def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:
-    """Return which constraints (m,) displacements u (n_dofs,) of rigid bodies in contact close."""
+    """Return which constraints (m,) are closed by displacements u (n_dofs,) of rigid bodies in contact."""
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     # The linear program for rigid bodies is accurate to 1e-7.
     return constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
 
 
 def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:
-    """Return how far (k,) rigid bodies move until the loads hold them in contact [length].
+    """Return the rigid displacements (k,) at which contact balances the loads [length].
 
     Raises
     ------
     ConvergenceError
         If no contact stops them.
     """
-    work = generalised(bodies.motions, step.load.force)
+    work = generalised(bodies.motions, step.load.force, step.state.largest_rigid_force)
     rows, gap0 = resisting(constraints)
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     stop = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)

@@ -1,4 +1,4 @@
-"""Warnings about bodies that interpenetrate at the end of an analysis, where no contact is defined or beside it."""
+"""Warnings about bodies that interpenetrate at the end of an analysis, without or outside the defined contacts."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 Indices = NDArray[np.signedinteger]
 # Bodies by their numbers, and nodes on the outside of the first (n,) with their depths (n,) in the second [length].
 Inside = tuple[int, int, Indices, Array]
-# Depth beside the facets of a contact that is worth a warning, relative to that of nodes that contact holds.
+# Depth beside the facets of a contact above which a warning is given, relative to that of nodes in contact.
 HELD = 2.0
 
 
@@ -38,7 +38,7 @@ def interpenetration(problem: Problem, state: State, last: StepResult) -> list[s
 
 
 def _joined(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
-    """Return by two bodies the contact pairs between them; none where they are the sides of a pretension section."""
+    """Return the contact pairs between each two bodies; none where these are the sides of a pretension section."""
     body = bodies(problem.model.mesh)[1]
     groups: dict[frozenset[int], list[str]] = {}
     for name, pair in problem.pairs.items():
@@ -54,7 +54,7 @@ def _joined(problem: Problem) -> Mapping[frozenset[int], Sequence[str]]:
 def _without_contact(
     problem: Problem, joined: Mapping[frozenset[int], Sequence[str]], inside: Sequence[Inside]
 ) -> list[str]:
-    """Return warnings about bodies that no contact pair joins, the deepest first, two bodies once."""
+    """Return warnings about bodies without a contact pair between them, the deepest first, one for each two bodies."""
     mesh = problem.model.mesh
     _, body = bodies(mesh)
     texts: dict[frozenset[int], str] = {}
@@ -82,9 +82,7 @@ def _beside_contact(
     _, body = bodies(mesh)
     for both, names in joined.items():
         entries = [entry for entry in inside if names and {*entry[:2]} == both]
-        if not entries or any(
-            problem.pairs[name].options.wear for name in names
-        ):  # what is worn off is still in the mesh
+        if not entries or any(problem.pairs[name].options.wear for name in names):  # worn material is still in the mesh
             continue
         points, depth = np.concatenate([entry[2] for entry in entries]), np.concatenate([entry[3] for entry in entries])
         held, faced = (mask[points] for mask in _held(problem, last, names))
@@ -99,7 +97,7 @@ def _beside_contact(
 
 
 def _held(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
-    """Return the points (n_points,) of secondary sides that face the other one, or need not, and those of primary sides."""
+    """Return the points (n_points,) of secondary sides that face the other side, or need not, and those of primary sides."""
     held, faced = np.zeros((2, problem.model.mesh.n_points), bool)
     for name in names:
         pair = problem.pairs[name]
@@ -110,7 +108,7 @@ def _held(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mas
 
 
 def _at_rest(problem: Problem, bodies_of: Sequence[Inside], point: int) -> float:
-    """Return how deep a point of one of two bodies lies in the other before any load [length]."""
+    """Return the depth of a point of one of two bodies in the other before any load [length]."""
     mesh = problem.model.mesh
     for number, other, points, depth in depths(mesh, problem.model.kinematics, mesh.points):
         if any((number, other) == entry[:2] for entry in bodies_of) and point in points:
@@ -122,7 +120,7 @@ def _through_obstacles(problem: Problem, state: State, last: StepResult) -> list
     """Return warnings about nodes beside a contact surface that pass through its rigid obstacle."""
     mesh, u, texts = problem.model.mesh, problem.displacement(state.u), []
     for name, pair in problem.pairs.items():
-        if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # what is worn off is still in the mesh
+        if not isinstance(pair.primary, RigidSide) or pair.options.wear:  # worn material is still in the mesh
             continue
         nodes = pair.secondary.points
         facets = [block[np.isin(block, nodes).any(axis=1)].ravel() for block in outer_facets(mesh).values()]

@@ -25,11 +25,11 @@ class Iterate:
     Attributes
     ----------
     u : ndarray (n_dofs,)
-        Displacements, those that are not active as they were when the step began [length].
+        Displacements, inactive components as at the beginning of the step [length].
     active : dict of str to ndarray of bool (m,)
-        By contact pair, the set that the last solution wants active.
+        Next active set by the last solution, for each contact pair.
     pressure : dict of str to ndarray (n_nodes,)
-        By contact pair, the last nodal pressures [pressure].
+        Last nodal pressures of each contact pair [pressure].
     frictional : FrictionalEquilibrium, optional
         The last solution with friction.
     rigid : RigidPosition, optional
@@ -37,7 +37,7 @@ class Iterate:
     history : list of dict
         An entry for each pairing.
     rounded : bool
-        Whether edges between facets are rounded by now, since nodes flipped between facets.
+        Whether edges between facets are rounded, because nodes alternated between facets.
     """
 
     u: Array
@@ -50,16 +50,16 @@ class Iterate:
 
     @classmethod
     def of(cls, state: State) -> Iterate:
-        """Return the iterate that a load step begins with."""
+        """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
     def begin_again(self, state: State) -> None:
-        """Go back to where the load step began; the history stays."""
+        """Return to the beginning of the load step; the history is kept."""
         self.u, self.active, self.pressure = state.u.copy(), dict(state.active), dict(state.pressure)
         self.frictional = self.rigid = None
 
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
-        """Keep, by pair, which constraints the solution wants active, and its nodal pressures, those of fluid left out."""
+        """Store, for each pair, the next active set of the solution and its nodal pressures, without those of fluid."""
         for name, rows in constraints.rows().items():
             self.active[name] = solution.wanted[rows]
             forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
@@ -84,7 +84,7 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
 
 
 def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
-    """Return the set (m,) to start from: that of the last solution, extrapolated in the first pairing of a step."""
+    """Return the initial active set (m,): that of the last solution, extrapolated in the first pairing of a step."""
     sets = [_start_of(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
     return np.concatenate(sets)
 

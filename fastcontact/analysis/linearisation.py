@@ -32,14 +32,14 @@ def linearised(
     ----------
     problem : Problem
     K : bsr_array (n, n)
-        See `Terms.tangent`; it is taken apart.
+        See `Terms.tangent`; modified in place.
     u : ndarray (n_dofs,)
     rigid : RigidPosition, optional
         The last position of floating bodies.
     contact : csr_array (n_dofs, n_dofs), optional
-        Stiffness of forces of contact that vanish or are known at u [force / length].
+        Stiffness of contact forces that vanish or are known at u [force / length].
     stiff : bool
-        Whether springs of floating bodies are as stiff as these.
+        Whether springs of floating bodies are as stiff as the bodies.
     """
     K = problem.force_driven.stiffness(K)
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
@@ -54,9 +54,9 @@ def linearised(
 
 
 def load_about(problem: Problem, terms: Terms, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
-    """Return the load of a linearised problem, under which it moves on from displacements u (n_dofs,) [length]."""
+    """Return the load of the problem linearised at displacements u (n_dofs,) [length]."""
     force = load.force - terms.residual(u)[0] + problem.system.K @ u
-    if problem.floating_bodies is not None and rigid is not None:  # turned bodies under load are not free to turn
+    if problem.floating_bodies is not None and rigid is not None:  # rotated bodies under load are not free to rotate
         force -= problem.system.K @ problem.floating_bodies.rigid(u[problem.floating_bodies.dofs])
     return replace(load, force=force)
 
@@ -64,7 +64,7 @@ def load_about(problem: Problem, terms: Terms, u: Array, load: StepLoad, rigid: 
 def _floating(
     problem: Problem, system: System, u: Array, rigid: RigidPosition | None, stiff: bool
 ) -> FloatingBodies | None:
-    """Return the floating bodies of a tangent: where they turn, their free motions are those of the deformed shape."""
+    """Return the floating bodies of a tangent: where they rotate, with the free motions of the deformed configuration."""
     if problem.floating_bodies is None or problem.bodies is None or not problem.bodies.finite:
         return problem.floating_bodies
     motions = problem.floating_bodies.motions
@@ -73,4 +73,4 @@ def _floating(
         motions = turned if len(turned) == len(motions) else motions
     before = problem.floating_bodies.dofs if rigid is None else rigid.dofs
     relative_stiffness = STIFF if stiff else floating_stiffness(problem.solver)
-    return FloatingBodies(motions, system, system.involved(problem.contact_dofs), relative_stiffness, before)
+    return FloatingBodies(motions, system, relative_stiffness, before)

@@ -1,9 +1,8 @@
 """One load step: predict, solve the contact problem, check equilibrium, recover. Start reading the code here.
 
-First the loads and the prescribed displacements at the end of the step are evaluated. Then the contact geometry is settled:
+First the loads and the prescribed displacements at the end of the step are evaluated. Then the contact geometry is iterated:
 the surfaces are paired on the deformed configuration, the inequalities of contact are solved, and both are repeated until
-the displacement stands still. The contact forces are then known, and all displacements, the balance of forces and the
-stresses follow from them.
+the displacement converges. All displacements, the force balance and the stresses follow from the contact forces.
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ----------
     problem : Problem
     state : State
-        At the end of the step before; it is not modified.
+        State at the end of the previous step; it is not modified.
     index : int
-        Number of the step, 1 for the first one.
+        Number of the step, starting at 1.
     instant : float
-        Pseudo-time of its end.
+        Pseudo-time at the end of the step.
 
     Raises
     ------
@@ -73,7 +72,7 @@ def _ended(
     problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
     instant: tuple[int, float], heated: Heated | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
-    """Return state and result of a load step, from its equilibrium."""
+    """Return the state and the result of a load step from its equilibrium."""
     settled, u, balanced = solution.settled, solution.u, solution.balance
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
@@ -88,19 +87,18 @@ def _ended(
     if settled is None and start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if end.work is not None:
-        iterations["work"] = end.work.told()
+        iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balanced.reaction, iterations, instant, solution.bodies)
-    return end, result if heated is None else heated.told(problem, result)
+    return end, result if heated is None else heated.completed(problem, result)
 
 
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> Beginning:
-    """Return what a load step begins with.
+    """Return the beginning of a load step.
 
-    The displacement to expect matters in the first step if forces alone act: nothing else tells how large displacements will
-    be.
+    The expected displacement matters in the first step if only forces act: it is then the only scale of the displacements.
     """
     pushing = expansion_as_force(problem, load)
     loaded = with_loads(problem, pushing)
@@ -109,10 +107,10 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.pairs and pushing.force.any() and not (state.u.any() or load.lift.any()):
         expected = largest(loaded.full_solution(zero))
     if problem.pairs and problem.model.springs:
-        # Springs of the model may be weak: without contact, bodies on them move far, and gaps are differences of such
-        # displacements, of which each has an error of some units in its last place.
-        alone = largest(loaded.full_solution(zero))
-        round_off = max(round_off, 16 * np.finfo(float).eps * alone)
+        # Springs of the model may be weak: without contact, bodies on them have large displacements, and gaps are
+        # differences of such displacements, each with an error of a few units in the last place.
+        from_zero = largest(loaded.full_solution(zero))
+        round_off = max(round_off, 16 * np.finfo(float).eps * from_zero)
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
@@ -125,7 +123,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
 
 
 def _motions(problem: Problem, load: StepLoad) -> list[Array]:
-    """Return motions of obstacles that nonlinear bodies are extrapolated along."""
+    """Return the motions of obstacles along which nonlinear bodies are extrapolated."""
     return [] if problem.bodies is None else [*load.obstacles.values()]
 
 

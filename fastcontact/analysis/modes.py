@@ -1,4 +1,4 @@
-"""Modes: frequencies and shapes of small vibrations about a settled load step."""
+"""Modes: frequencies and shapes of small vibrations about a converged load step."""
 
 from __future__ import annotations
 
@@ -33,8 +33,11 @@ from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
-# The shift that makes free bodies regular, by the eigenvalue of a uniform deformation: below those of all but thin bodies.
+# Shift that regularises free bodies, over the eigenvalue of a uniform deformation: below the eigenvalues of all but thin
+# bodies.
 SHIFT = 1e-4
+# Part of its motion that a shape slides by at least where it slides at all; of others it is round-off.
+SLIDES = 1e-3
 
 
 @typed(ModelError)
@@ -49,34 +52,34 @@ def modes(
     nodal_diameters: int | str | Sequence[int] | None = None,
     linear_solver: str = "auto",
 ) -> Modes:
-    """Return the lowest frequencies and shapes of small vibrations, about a settled load step or at rest.
+    """Return the lowest natural frequencies and mode shapes about the equilibrium of a load step, or at rest.
 
-    What contact has closed stays closed, what sticks does not slip, what slides or is open is free; supports, relations,
-    couplings and springs hold, with what they prescribe kept, and pretension sections keep their length. Stresses of the step
-    stiffen, as in a string, or soften; at finite strains the bodies are those deformed, and pressures follow them. Obstacles
-    that forces drive have no mass.
+    Closed nodes remain closed, sticking nodes do not slip, sliding nodes are free along the surface, and open nodes
+    are free. Supports, multi-point constraints, couplings and springs act with their prescribed values, and pretension
+    sections keep their length. The stresses of the step stiffen or soften the bodies; in finite strain the modes are
+    those of the deformed bodies under follower pressures. Force-driven obstacles have no mass.
 
     Parameters
     ----------
     model : Model
-        Its materials need densities. Free bodies are fine.
+        Its materials need densities. Bodies may be free.
     step : StepResult, optional
-        Of this model, from `solve` or a result file. Without one the model is at rest and without stress, and contact holds
-        nothing but tied and bilateral pairs.
+        A step of this model, from `solve` or a result file. Without it the model is free of stress, and only tied and
+        bilateral pairs connect bodies.
     n : int
-        How many, of each number of nodal diameters; modes in pairs count once.
+        Number of modes, for each number of nodal diameters; a pair of modes counts once.
     stress_stiffening : bool
-        Whether stresses of the step count.
+        Whether to include the stresses of the step.
     hold_sliding : bool
-        Whether nodes that slide in the step are held along the surface, too, as friction does as soon as small motions turn
-        the slip round. Without, what friction alone holds and slides everywhere, as a bolt that is pressed on all round may,
-        is free to turn.
+        Whether to treat nodes that slide in the step as sticking, as friction does when a vibration reverses the slip.
+        Otherwise a body that slides along its whole circumference, such as a tightened bolt, is free to rotate.
     nodal_diameters : int, sequence of int or "all", optional
-        Of the whole ring that a model with one cyclic symmetry stands for: from 0 to half the number of sectors. Modes are
-        then those of the ring: all but those of 0 and of half the sectors come in pairs of one frequency. Without, motions
-        are alike in all sectors, as of 0 nodal diameters; a warning tells so.
+        Numbers of nodal diameters of the whole ring, for a model with one cyclic symmetry: from 0 to half the number
+        of sectors. The modes are then those of the ring; except for 0 and half the number of sectors they occur in
+        pairs of equal frequency. By default the motion is the same in all sectors, as with 0 nodal diameters, and a
+        warning is given.
     linear_solver : str
-        As for `solve`: by factors the Lanczos method, by multigrid conjugate gradients (LOBPCG).
+        As for `solve`: the Lanczos method with a direct solver, conjugate gradients (LOBPCG) with multigrid.
 
     Returns
     -------
@@ -85,10 +88,10 @@ def modes(
     Raises
     ------
     ModelError
-        If a density is missing, the step is of another mesh or of bodies that yield, the step is not stable, or there are
-        fewer than n modes.
+        If a density is missing, the step belongs to another mesh, bodies yield, the equilibrium is unstable, or there
+        are fewer than n modes.
     ConvergenceError
-        If the iteration does not end.
+        If the eigenvalue iteration does not converge.
 
     Examples
     --------
@@ -108,19 +111,20 @@ def modes(
         )
     model = stage_of(model, step)
     sectors = Sectors.of(model)
-    asked = _asked(model, sectors, nodal_diameters)
+    diameters = _diameters(model, sectors, nodal_diameters)
     vibration = _Vibration.of(model, sectors, step if stress_stiffening else None, step, hold_sliding)
-    if sectors is None or asked is None:
+    if sectors is None or diameters is None:
         values, vectors = vibration.lowest(n, linear_solver, None if sectors is None else Wave(sectors, 0))
+        vibration.warn_of_slides(values, vectors)
         return _modes(vibration, values, vectors)
-    waves = [Wave(sectors, d) for d in asked]
+    waves = [Wave(sectors, d) for d in diameters]
     return _of_ring(vibration, sectors, [(wave, *vibration.of_wave(wave, n, linear_solver)) for wave in waves])
 
 
-def _asked(
+def _diameters(
     model: Model, sectors: Sectors | None, nodal_diameters: int | str | Sequence[int] | None
 ) -> list[int] | None:
-    """Return the nodal diameters asked for; ModelError where there can be none."""
+    """Return the requested nodal diameters; ModelError for a model without any."""
     if nodal_diameters is None:
         if sectors is not None:
             warn(
@@ -149,12 +153,13 @@ class _Vibration:
     contact: list[Conditions]
     supported: Mask
     shift: float
+    with_sliding: list[Conditions]  # conditions that would hold what slides, too; empty where nothing does
 
     @classmethod
     def of(
         cls, model: Model, sectors: Sectors | None, stressed: StepResult | None, step: StepResult | None, hold_sliding: bool
     ) -> _Vibration:  # fmt: skip
-        """Return those about a step, without the ends of sectors, whose stresses stiffen as `stressed` has them."""
+        """Return the vibration about a step, without the ends of sectors; the stresses of `stressed` add stiffness."""
         density = Densities([material for material, _ in model.materials], model.material_of_cells())
         field = model.material_field()
         K = _stiffness(model, stressed, field)
@@ -163,7 +168,23 @@ class _Vibration:
         model = model if sectors is None else without_ends(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
-        return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M))
+        slides = step is not None and any((own.active & ~own.sticking).any() for own in step.contact.values())
+        further = held_contact(model, step, held, True) if slides and not hold_sliding else []
+        return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M), further)
+
+    def warn_of_slides(self, values: Array, vectors: Array) -> None:
+        """Warn of eigenvalues (n,) next to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
+        low = vectors[:, np.abs(values) < self.shift]
+        moved = [
+            np.abs(own.rows @ low) > SLIDES * (abs(own.rows) @ np.abs(low)).max(initial=0.0)
+            for own in self.with_sliding
+        ]
+        if low.shape[1] and (count := int(np.any([own.any(axis=0) for own in moved], axis=0).sum())):
+            warn(
+                f"{count} of {len(values)} modes have frequencies next to zero (the lowest {_frequencies(values)[0]:.3g}), "
+                "since nodes that slide in this step are free along the surface: hold_sliding=True holds them, as friction "
+                "holds small motions"
+            )
 
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
         """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n), in the real form of a wave."""
@@ -219,14 +240,14 @@ def _stiffness(model: Model, step: StepResult | None, field: MaterialField) -> b
 
 
 def _uniform(model: Model, K: bsr_array, M: bsr_array) -> float:
-    """Return the least quotient of energies [1 / time^2] of uniform deformations, which grow with one coordinate each."""
+    """Return the least Rayleigh quotient [1 / time^2] of uniform deformations, each linear in one coordinate."""
     points, densities = model.mesh.points - model.mesh.points.mean(axis=0), []
     for component in range(model.mesh.dim):
         for axis in range(model.mesh.dim):
             u = np.zeros_like(points)
             u[:, component] = points[:, axis]
             densities.append(float(u.ravel() @ (K @ u.ravel())) / float(u.ravel() @ (M @ u.ravel())))
-    return min((own for own in densities if own > 0.0), default=1.0)
+    return min((density for density in densities if density > 0.0), default=1.0)
 
 
 def _modes(vibration: _Vibration, values: Array, vectors: Array) -> Modes:
@@ -276,7 +297,7 @@ def _momentum(vibration: _Vibration) -> Array:
     dim = vibration.model.mesh.dim
     along = np.tile(np.eye(dim), (vibration.M.shape[0] // dim, 1))
     if vibration.model.kinematics == "axisymmetric":
-        along[:, 0] = 0.0  # around the circle it has every direction
+        along[:, 0] = 0.0  # cancels over the full circle
     return np.asarray(vibration.M @ along)
 
 

@@ -1,8 +1,8 @@
-"""Newton's method for a load step: terms of the equilibrium are linearised, contact is solved with its inequalities.
+"""Newton's method for a load step: the terms of the equilibrium are linearised, contact is solved with its inequalities.
 
-That is the Newton method of Josephy (1979) for generalised equations: each iteration solves the contact problem of the
-linearised bodies, with its geometry, so that iterations converge quadratically and few matrices are factorised. Where all
-tangents are as they were prepared, for linear bodies under small strains, the first iteration is the solution.
+This is the Newton method of Josephy (1979) for generalised equations: each iteration solves the contact problem of the
+linearised bodies, including its geometry, so that iterations converge quadratically and few matrices are factorised. Where
+all tangents are constant, for linear bodies under small strains, the first iteration gives the solution.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.scatter import DISPLACEMENT
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
 from fastcontact.analysis.terms import Fluid, Terms
@@ -33,25 +34,26 @@ from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.protocol import Loaded
 
 log = logging.getLogger("fastcontact")
-# Newton iterations of a load step, and how often one is halved where it turns cells inside out.
+# Largest number of Newton iterations of a load step, and of halvings of one that inverts cells.
 MOST, HALVINGS = 40, 6
-# Trials of a line search, what it takes for an overshot of the slope at the beginning, and the least part of the way to go.
+# Trials of a line search, the slope over the initial one that counts as overshooting, and the smallest step length.
 SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
-# Iterations after which the change of the displacement must have fallen at least once by the factor.
+# Number of iterations within which the change of the displacement must have decreased at least once by the factor.
 PATIENCE, FALL = 12, 0.5
-# Stiffness of springs along closed gaps beside the largest of the bodies. What contact does not hold, such as gaps between
-# values of a pressure field, creeps with stiff ones: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3.
-HELD = 5e-5, 1e-3
-# Contact geometry of the linearised bodies settles to this part of the last relative change of the displacement.
+# Stiffness of springs along closed gaps over the largest of the bodies. Motions that contact does not hold, such as gaps
+# between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3, and
+# one under fluid pressure, for which the first is too soft, 13 and 22 with the others.
+HELD = 5e-5, 2e-4, 1e-3
+# The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
-# Relative error of the displacement below which iterations end. Changes below SCATTER that do not fall to the part STAYS of
-# the one before are round-off, which is that much in slender bodies.
-UNCHANGED, SCATTER, STAYS = 1e-10, 1e-6, 0.3
+# Relative error of the displacement at which iterations end. Changes that may be round-off (`scatter`), and do not decrease
+# to the fraction STAYS of the previous one, are: it is this large in slender bodies.
+UNCHANGED, STAYS = 1e-10, 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """What a load step begins with.
+    """Data at the beginning of a load step.
 
     Attributes
     ----------
@@ -60,9 +62,9 @@ class Beginning:
         Number of the step.
     load : StepLoad
     loaded : Loaded
-        The prepared matrix under it.
+        The prepared matrix with the right-hand side of the load.
     expected : float
-        Displacement to expect in the first step, if forces alone act [length].
+        Expected displacement in the first step, if only forces act [length].
     """
 
     state: State
@@ -82,14 +84,14 @@ def newton(
     problem : Problem
     begin : Beginning
     load : StepLoad
-        That of the beginning, or with other temperatures.
+        Load of `begin`, or the same with other temperatures.
     before : StepEquilibrium, optional
-        Of the same step, under about the same load.
+        Equilibrium of the same step under nearly the same load.
 
     Raises
     ------
     ConvergenceError
-        If the iterations do not end, a cell turns inside out, or forces stay out of balance.
+        If the iterations do not converge, a cell is inverted, or forces stay out of balance.
     """
     start = begin.state
     if problem.bodies is not None and (before is not None or start.extrapolation.ratio):
@@ -104,16 +106,16 @@ def newton(
 
 @dataclass(frozen=True)
 class Regularisation:
-    """How a tangent is made positive definite.
+    """Regularisation that makes a tangent positive definite.
 
     Attributes
     ----------
     geometric : int
-        How much of the geometric stiffness it has, see `NonlinearBodies.at`.
+        Part of the geometric stiffness that it includes, see `NonlinearBodies.at`.
     held : float
-        Stiffness of springs along closed gaps, beside the largest of the bodies [-].
+        Stiffness of springs along closed gaps, over the largest of the bodies [-].
     stiff : bool
-        Whether those of floating bodies are.
+        Whether the springs of floating bodies are as stiff as the bodies.
     """
 
     geometric: int = WHOLE
@@ -132,11 +134,11 @@ class _Newton:
         settled = None if before is None else before.settled
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
-        self._kept: Problem | None = None  # the last tangent, where another iteration may use it
+        self._kept: Problem | None = None  # the last tangent, if another iteration may use it
         self._held = False  # whether the last tangent needed springs along closed gaps
 
     def iterated(self, origin: Array) -> StepEquilibrium:
-        """Return the equilibrium by iterations that begin at displacements `origin` (n_dofs,) [length]."""
+        """Return the equilibrium by iterations from displacements `origin` (n_dofs,) [length]."""
         history: list[dict[str, Any]] = []
         u, changes = origin, [1.0]
         for _ in range(MOST):
@@ -153,7 +155,7 @@ class _Newton:
                 balanced = self._balanced(u, contact_force, before) if fraction < 1.0 else balanced
             moved = largest_difference(u, before)
             changes.append(self._relative(moved, u))
-            history.append(_told(self._iterate, changes[-1], balanced, fraction))
+            history.append(_history_entry(self._iterate, changes[-1], balanced, fraction))
             small = self._stands_still(changes) or moved <= self._start.gap_round_off
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
@@ -166,12 +168,12 @@ class _Newton:
         )
 
     def _is_exact(self, balanced: Balance) -> bool:
-        """Return whether forces balance where tangents are exact; else linear solutions are to be more accurate.
+        """Return whether forces balance where tangents are exact; otherwise request more accurate linear solutions.
 
         Raises
         ------
         ConvergenceError
-            If they cannot.
+            If no higher accuracy is available.
         """
         if self._iterate.history:
             self._iterate.history[-1]["residual"] = balanced.relative
@@ -187,43 +189,44 @@ class _Newton:
 
     @property
     def _enough(self) -> float:
-        """Relative error of the displacement at which iterations end."""
+        """Tolerance of the relative error of the displacement."""
         return max(self._problem.criteria.geometry, UNCHANGED)
 
     def _stands_still(self, changes: list[float]) -> bool:
         """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
         error = last * min(last / before, 1.0) if before else last
-        return error <= self._enough or (last <= SCATTER and last > STAYS * before)
+        return error <= self._enough or (last <= DISPLACEMENT and last > STAYS * before)
 
     def _serves_again(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.
 
-        Newton's next change is C times the square of the last one. It leaves C^2 times the cube, if the tangent is old.
+        The next change of Newton's method is C times the square of the last one. With an old tangent the error after it
+        is C^2 times the cube.
         """
         before, last = changes[-2:] if len(changes) > 2 else (0.0, changes[-1])
         C = last / before**2 if before else 1.0
         return len(changes) > 1 and C**2 * last**3 <= self._enough
 
     def _balanced(self, u: Array, contact_force: Array, linearised_at: Array) -> Balance:
-        """Return the balance of forces at displacements u, of contact those of a linearisation elsewhere (n_dofs,)."""
+        """Return the force balance at displacements u with contact forces linearised at `linearised_at` (n_dofs,)."""
         internal = self._terms.residual(u, self._fluid(linearised_at))
         return balance(self._problem, u, contact_force, self._load.force, self._start.largest_force, internal)
 
     def _solve(self, u: Array, changes: list[float]) -> tuple[Array, Array]:
         """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
 
-        Contact geometry settles to a part of the last of the relative `changes` of the displacement. Where the tangent is not
-        positive definite, the springs of floating bodies are stiffened, then the constraints that the last contact held, by
-        soft springs first: this leaves the iterations quadratic but for what contact does not hold. Where that does not help,
-        parts of the geometric stiffness are left out. Once springs have helped, they are tried first.
+        The contact geometry converges to a fraction of the last of the relative `changes` of the displacement. Where the
+        tangent is not positive definite, first the springs of floating bodies are stiffened, then springs are added along
+        closed gaps, soft ones first: convergence stays quadratic except for motions that contact does not hold. If this does
+        not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
         """
         if self._terms.prepared:
             return self._prepared_contact(u)
         failed: Exception | None = None
         for by in self._regularisations():
             if self._held and by.geometric == WHOLE and not by.held:
-                continue  # it failed an iteration ago
+                continue  # it failed in the last iteration
             try:
                 solution = self._linearised_contact(u, changes, by)
             except (ModelError, ConvergenceError) as error:
@@ -239,7 +242,7 @@ class _Newton:
         )
 
     def _regularisations(self) -> list[Regularisation]:
-        """Return those to try, one after the other."""
+        """Return the regularisations to try, in order."""
         floats = self._problem.floating_bodies is not None
         closed = self._settled is not None and self._settled.solution.active.any()
         whole = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + floats]]
@@ -247,7 +250,7 @@ class _Newton:
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
     def _prepared_contact(self, u: Array) -> tuple[Array, Array]:
-        """Return the result of `_solve` where all tangents are as they were prepared."""
+        """Return the result of `_solve` where all tangents are the prepared ones."""
         begin = self._begin
         first = self._load is begin.load and self._settled is None
         loaded = begin.loaded if first else with_loads(self._problem, self._load)
@@ -274,7 +277,7 @@ class _Newton:
     def _contact(
         self, problem: Problem, load: StepLoad, loaded: Loaded, u: Array, extrapolation: Extrapolation
     ) -> tuple[Array, Array]:
-        """Return displacements and contact forces of a problem whose terms are linear, and keep the contact."""
+        """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
         settled = None
         if problem.pairs:
             dofs = problem.dofs.for_step(self._iterate.u, load.lift)
@@ -290,11 +293,11 @@ class _Newton:
         return solution
 
     def _stiffness_of_contact(self, K: bsr_array, u: Array, by: Regularisation) -> csr_array | None:
-        """Return what the last contact adds to a tangent (n_dofs, n_dofs), at displacements u (n_dofs,) [force / length].
+        """Return the stiffness that the last contact adds to a tangent at displacements u (n_dofs,) [force / length].
 
-        The symmetric part of how forces of fluid follow the surface; and springs, slack at u, along the gaps that are
-        closed. Displacements along these hardly change any more as iterations converge, so that springs change iterations by
-        terms of second order alone (as the augmented Lagrangian does: Alart and Curnier, 1991).
+        It is the symmetric part of the load stiffness of fluid pressure, and that of springs, slack at u, along closed gaps.
+        Displacements along closed gaps hardly change as iterations converge, so that the springs affect iterations only to
+        second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
         """
         parts = [fluid.tangent(u) for fluid in self._fluid(u)]
         if by.held and self._settled is not None:
@@ -308,7 +311,7 @@ class _Newton:
         return sum(parts[1:], parts[0]) if parts else None
 
     def _fluid(self, at: Array) -> list[Fluid]:
-        """Return the fluid in the last contact, linearised `at` displacements (n_dofs,), that follows bodies."""
+        """Return the fluid pressures of the last contact that follow bodies, linearised `at` displacements (n_dofs,)."""
         bodies = self._problem.bodies
         if self._settled is None or bodies is None or not bodies.finite:
             return []
@@ -316,10 +319,9 @@ class _Newton:
         return [Fluid(self._problem, each, at) for each in wetted if each is not None]
 
     def _reach(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, float]:
-        """Return the displacements (n_dofs,) to go on from, and the part of the way from u to the `target` (n_dofs,).
+        """Return the next displacements (n_dofs,), and the step length from u to the `target` (n_dofs,).
 
-        Half of the way, of that half, and so on, is gone where cells turn inside out farther on. After `changes` and the
-        whole way, a tangent may not be needed any more.
+        The step is halved until no cells are inverted. After a full step, `changes` decide whether another tangent is needed.
         """
         fraction, bodies = 1.0, self._terms.bodies
         if bodies is None:
@@ -340,8 +342,8 @@ class _Newton:
     def _searched(self, u: Array, target: Array, contact_force: Array) -> tuple[Array, float]:
         """Return the result of `_reach` after a line search (Crisfield, 1991, section 9.2).
 
-        Under contact forces (n_dofs,) [force] as they are, the potential falls along the way at its beginning; where it rises
-        at the end by much of that, the end lies too far.
+        With fixed contact forces (n_dofs,) [force] the potential decreases at the beginning of the step; if its slope at
+        the end is positive and a large fraction of the initial one, the step is shortened.
         """
         system, fluid = self._problem.system, self._fluid(u)
         change, along = target - u, system.unknowns(target - u)
@@ -360,8 +362,8 @@ class _Newton:
         return target, fraction
 
 
-def _told(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:
-    """Return the entry of an iteration in the history."""
+def _history_entry(iterate: Iterate, change: float, balanced: Balance, fraction: float) -> dict[str, Any]:
+    """Return the entry of the history for an iteration."""
     inner = iterate.history
     return {
         "displacement_change": change, "residual": balanced.relative, "pairings": len(inner),

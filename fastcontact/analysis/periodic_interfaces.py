@@ -1,7 +1,7 @@
 """Contact at the ends of a period or cyclic sector, where two nodes represent one material point.
 
-Their gaps are one and the same condition (`shared_nodes`) or one value of a field of pressures, which fixes the sum of their
-forces alone. Their traction is that of the place: the sum of both forces over both areas.
+Their gaps are one condition (`shared_nodes`) or one value of a pressure field, which only determines the sum of their forces.
+Their common traction is the sum of both forces over the sum of both areas.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fastcontact.results.step import ContactResult
 
 
 def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return the results of contact pairs with one traction for both nodes of a point, closed where one of them is."""
+    """Return the results of contact pairs with one traction for both nodes of a point, closed if one of them is."""
     results_of_pairs = dict(results)
     for name, contact in results.items() if problem.model.periodic_interfaces else ():
         pair = problem.pairs[name]

@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array, eye_array, kron
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
@@ -53,23 +52,23 @@ class StepLoad:
     Attributes
     ----------
     lift : ndarray (n_dofs,)
-        What supports and relations prescribe, see `System.lift` [length].
+        Displacements prescribed by supports and multi-point constraints, see `System.lift` [length].
     force : ndarray (n_dofs,)
         External forces [force].
     obstacles : dict of str to ndarray (dim,)
-        By contact pair, the prescribed displacement of its rigid obstacle [length].
+        Prescribed displacement of the rigid obstacle of each contact pair [length].
     clearance_factors : dict of str to float
-        By contact pair, what its clearances are multiplied with.
+        Factor on the clearances of each contact pair.
     angles : dict of str to float
-        By contact pair, by how much its rigid obstacle has turned, where one does [radian].
+        Rotation of the rigid obstacle of each contact pair, where one rotates [radian].
     following : tuple of float
-        What pressures that follow the surface are multiplied with.
+        Factors of pressures that follow the surface.
     friction_factors : dict of str to float
-        By contact pair, what its coefficient of friction is multiplied with, where it changes.
+        Factor on the coefficient of friction of each contact pair, where it varies.
     fluids : dict of str to float
-        By contact pair, the pressure of the fluid at its source [pressure].
+        Fluid pressure at the source of each contact pair [pressure].
     rise : ndarray (n_points,), optional
-        Of the temperature, by which nonlinear bodies expand [temperature]; that of linear ones is in the forces.
+        Temperature rise for the expansion of nonlinear bodies [temperature]; for linear ones it is part of the forces.
     """
 
     lift: Array
@@ -93,13 +92,13 @@ class Problem:
     ramp : Ramp
     criteria : Criteria
     solver : LinearSolver
-        Prepared with the stiffness matrix; its snapshot is part of the state.
+        Linear solver with the stiffness matrix; its snapshot is part of the state.
     pairs : dict of str to Formulation
         The contact pairs.
     field : MaterialField
         Materials of all solid cells.
     system : System
-        Stiffness, supports and relations.
+        Stiffness, supports and multi-point constraints.
     floating_bodies : FloatingBodies, optional
         Bodies held by contact alone, if there are any.
     dofs : ActiveDofs
@@ -107,7 +106,7 @@ class Problem:
     contact_dofs : ndarray of int
         Components that constraints may involve.
     sides : MaterialSides
-        Where materials meet, which have nodal stresses of their own.
+        Interfaces between materials, each of which has its own nodal stresses.
     force_driven : ForceDrivenObstacles
         Rigid obstacles that forces move.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
@@ -119,9 +118,9 @@ class Problem:
     bodies : NonlinearBodies, optional
         The solid cells, where they are nonlinear; `system` and `solver` then hold their stiffness before any load.
     following : sequence of (FollowingPressure, ramp table)
-        Pressures in finite strain; `forces` hold them as they are before any displacement.
+        Pressures in finite strain; `forces` contain them in the undeformed configuration.
     heat : Heat, optional
-        Where heat is conducted.
+        Heat conduction, if any.
     linearised_at : ndarray (n_dofs,), optional
         Displacements at which `system` is the tangent of bodies in finite strain [length].
     """
@@ -149,7 +148,7 @@ class Problem:
 
     @cached_property
     def material_of_cells(self) -> Numbers:
-        """Material of every solid cell (n_solids,), equal ones under one number."""
+        """Material number of every solid cell (n_solids,); equal materials have one number."""
         return np.concatenate(list(self.field.distinct.values()))
 
     @property
@@ -189,13 +188,13 @@ class Problem:
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
-        """Return the displacements (n_points, dim) of the mesh of all displacements u (n_dofs,) [length]."""
+        """Return the displacements (n_points, dim) of the mesh in all displacements u (n_dofs,) [length]."""
         return u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
 
     def accurate_to(self, u: Array) -> Array:
-        """Return the lengths (n_dofs,) of which displacements u (n_dofs,) are known up to round-off [length].
+        """Return the lengths (n_dofs,) to whose round-off displacements u (n_dofs,) are accurate [length].
 
-        Those themselves; where bodies turn, they are differences of places.
+        These are the displacements themselves, or coordinates where bodies rotate and displacements are their differences.
         """
         if self.bodies is None or not self.bodies.finite:
             return u
@@ -204,7 +203,7 @@ class Problem:
         return sizes
 
     def obstacles_at(self, load: StepLoad, u: Array) -> dict[str, Array]:
-        """Return by contact pair the displacements (dim,) of rigid obstacles, those that forces drive where u has them."""
+        """Return the displacement (dim,) of the rigid obstacle of each contact pair; u holds force-driven ones."""
         return {**load.obstacles, **self.force_driven.positions(u)}
 
     def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
@@ -213,14 +212,14 @@ class Problem:
         Parameters
         ----------
         name : str
-            Of the pair.
+            Name of the pair.
         state : State
-            At the beginning of the load step.
+            State at the beginning of the load step.
         load : StepLoad
         displacement : ndarray (n_points, dim)
-            Of the mesh [length].
+            Displacement of the mesh [length].
         u : ndarray (n_dofs,)
-            All displacements, for the obstacles that forces drive [length].
+            All displacements, including those of force-driven obstacles [length].
         """
         still, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
         return Configuration(
@@ -247,7 +246,7 @@ class Problem:
     ) -> DeformedBodies:
         """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`.
 
-        `rise` (n_points,) is that of the temperature at its end [temperature].
+        `rise` (n_points,) is the temperature rise at the end of the step [temperature].
         """
         assert self.bodies is not None
         before = start.history or self.bodies.beginning
@@ -255,7 +254,7 @@ class Problem:
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""
-        # Gaps are differences of coordinates and no more accurate than those.
+        # Gaps are differences of coordinates, and no more accurate than these.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
         return State(
             np.zeros(self.force_driven.n_dofs),
@@ -276,7 +275,7 @@ def prepare(
     linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
 ) -> Problem:
-    """Assemble a model that was checked before, and prepare the linear solver; see `run.solve` for the parameters."""
+    """Assemble a checked model, and prepare the linear solver; see `run.solve` for the parameters."""
     mesh, driven = model.mesh, model.force_driven
     supported, prescribed = model.prescribed_by_ramp()
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
@@ -305,11 +304,10 @@ def prepare(
         driven.relations(model.relations),
         driven.without_stiffness,
     )
-    solver.basis_transformation = _basis_transformation(pairs.values(), K.shape[0], mesh.dim)
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, involved, floating_stiffness(solver)) if len(motions) else None
+    bodies = FloatingBodies(motions, system, floating_stiffness(solver)) if len(motions) else None
     involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
@@ -321,12 +319,12 @@ def prepare(
 
 
 def floating_stiffness(solver: LinearSolver) -> float:
-    """Return the stiffness of springs on floating bodies beside that of the bodies [-]."""
+    """Return the stiffness of springs on floating bodies relative to that of the bodies [-]."""
     return SOFT if solver.iterative else FIRM
 
 
 def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
-    """Return the rigid-body modes that supports and relations leave, at a `displacement` (n_points, dim) [length]."""
+    """Return the rigid-body modes that supports and constraints leave free, at a `displacement` (n_points, dim) [length]."""
     deformed = model.mesh.replace(points=model.mesh.points + displacement)
     motions = free_motions(deformed, model.kinematics, supported, model.holding_rows())
     return model.force_driven.motions(motions)
@@ -343,9 +341,9 @@ def active_dofs(
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return by history the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1 [force].
+    """Return the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1, by history [force].
 
-    Heat expands nonlinear bodies by strains, not by forces.
+    In nonlinear bodies thermal expansion enters the strains, not the forces.
     """
     forces = model.forces_by_ramp()
     thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
@@ -357,11 +355,11 @@ def _forces(model: Model) -> dict[Table | None, Array]:
 def prepare_solver(
     solver: LinearSolver, system: System, bodies: FloatingBodies | None, modes: Array, involved: Indices
 ) -> Indices:
-    """Give the linear solver the matrix, with the springs of floating bodies; return the unknowns of contact."""
+    """Set the matrix of the linear solver, with the springs of floating bodies; return the unknowns of contact."""
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
         involved = np.union1d(involved, bodies.dofs)
-    modes = system.unknowns_of(modes)  # and those of all displacements are gone
+    modes = system.unknowns_of(modes)  # releases those of all displacements
     kept = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.keep(kept)
@@ -369,30 +367,20 @@ def prepare_solver(
 
 
 def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> Indices:
-    """Return the displacement components of all points on contact surfaces, and of obstacles that forces drive."""
+    """Return the displacement components of all points on contact surfaces, and of force-driven obstacles."""
     sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
     points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
     moved = mesh.n_points + np.arange(n_driven)
     return (np.concatenate([points, moved])[:, None].astype(np.intp) * mesh.dim + np.arange(mesh.dim)).ravel()
 
 
-def _basis_transformation(pairs: Iterable[Formulation], n: int, dim: int) -> csr_array | None:
-    """Return the `Formulation.basis_transformation` of all pairs as rows of displacement components (n, n)."""
-    total = None
-    for pair in pairs:
-        if (functions := pair.basis_transformation) is not None:
-            functions = csr_array(kron(functions, eye_array(dim), format="csr"))
-            functions.resize((n, n))
-            total = functions if total is None else csr_array(total.maximum(functions))
-    return total
-
-
 def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:
-    """Return the displacements (n_dofs, k) that cost little energy, for multigrid: rigid-body modes of the mesh [-].
+    """Return the near null space (n_dofs, k) for multigrid: rigid-body modes of the mesh [-].
 
-    At a `displacement` (n_points, dim) [length], by which modes of rotation turn.
+    Rotational modes are those at a `displacement` (n_points, dim) [length].
 
-    One set serves all bodies, since aggregates do not span them. In axisymmetry the in-plane motions are no rigid-body
-    modes of the ring, but away from the axis they cost little, and aggregates of two unknowns a node need them.
+    One set suffices for all bodies, since aggregates do not span several. In axisymmetry the in-plane motions are no
+    rigid-body modes of the ring, but away from the axis their energy is small, and aggregates of two unknowns per node need
+    them.
     """
     return rigid_modes(model.mesh.points + displacement, "plane_strain" if model.mesh.dim == 2 else model.kinematics)

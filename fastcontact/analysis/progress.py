@@ -1,4 +1,4 @@
-"""Progress on a terminal or in a notebook: one line on standard error, drawn anew after every load step."""
+"""Progress on a terminal or in a notebook: one line on standard error, redrawn after every load step."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class StatusLine:
     def __init__(self, width: int, show: bool) -> None:
         self._width, self._show = width, show
         self._started = time.perf_counter()
-        self._told = False
+        self._reported = False
 
     def __enter__(self) -> Self:
         compiling.listeners.append(self._compiling)
@@ -30,14 +30,14 @@ class StatusLine:
         self.close()
 
     def _compiling(self) -> None:
-        if not self._told:
-            self._told = True
+        if not self._reported:
+            self._reported = True
             self.draw(compiling.TEXT)
 
     def draw(self, text: str) -> None:
         """Replace the line."""
         if self._show:
-            # Back at its beginning, so that a warning does not follow it on the same line.
+            # Return to the beginning of the line, so that a warning overwrites it.
             sys.stderr.write(f"\r{text:<{self._width}}\r")
             sys.stderr.flush()
 
@@ -68,7 +68,7 @@ class Progress(StatusLine):
         self.draw(f"step {index}/{self._total} does not converge, cut in halves: {begin:.6g} to {end:.6g}")
 
     def step(self, step: StepResult, complete: int | None = None) -> None:
-        """Redraw after a step; `complete` steps are there, all up to this one by default."""
+        """Redraw after a step; `complete` steps are done, by default all up to this one."""
         index = step.index if complete is None else complete
         if not self._show or not index:
             return
@@ -78,8 +78,8 @@ class Progress(StatusLine):
         self.draw(f"[{bar:<{WIDTH}}] step {index}/{self._total}, {nodes} in contact{self._left(index)}")
 
     def _left(self, index: int) -> str:
-        """Return the time left after a step; nothing where it was the one for which kernels were compiled."""
-        if self._compiled != compiling.count:  # it is no measure of the steps that follow
+        """Return the time left after a step; empty if kernels were compiled in this step."""
+        if self._compiled != compiling.count:  # not representative of the following steps
             self._compiled, self._before, self._started = compiling.count, index, time.perf_counter()
             return ""
         each = (time.perf_counter() - self._started) / max(index - self._before, 1)

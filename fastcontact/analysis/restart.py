@@ -1,8 +1,8 @@
 """Restart data, as plain numbers, strings and arrays.
 
-It is the state at the end of a step, but for the displacements, which the result of the step holds; what the linear solver
-has learnt; and what tells the case from others. The state includes what later iterates owe to earlier ones in their last
-digits, so that an analysis that continues repeats an uninterrupted one bit for bit.
+They consist of the state at the end of a step, except for the displacements, which are in the result of the step; the
+snapshot of the linear solver; and the identity of the case. The state includes everything on which the last digits of
+later iterates depend, so that a continued analysis reproduces an uninterrupted one bit for bit.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fastcontact.results.step import StepResult
 from fastcontact.round_off import ROUND_OFF
 
 FORMAT = 1
-# Criteria that an answer depends on; others are limits and tolerances.
+# Criteria on which the solution depends; the others are limits and tolerances.
 ANSWER = ("geometry_updates", "keep_pairing")
 
 
@@ -37,7 +37,7 @@ def identity(model: Model, ramp: Ramp, criteria: Criteria) -> dict[str, Any]:
 
 
 def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
-    """Raise ModelError if nothing can go on after `step`, or not the `case` of `identity` of a model; it says why."""
+    """Raise ModelError, with the reason, if `step` has no restart data or belongs to another case than `case`."""
     state = step.restart
     if state is None or state.get("format") != FORMAT:
         raise ModelError(
@@ -57,7 +57,7 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
 
 
 def _formulations(then: dict[str, str], now: dict[str, str], model: Model) -> str:
-    """Return which formulations to name, as the end of a message, where pairs differ in nothing else."""
+    """Return the end of a message with the formulations to give, if pairs differ in nothing else."""
     changed = [pair.name for pair in model.contact if then.get(key := f"contact '{pair.name}'") != now[key]]
     formulations = {name: formulation_behind(model, name, then.get(f"contact '{name}'")) for name in changed}
     named = [f"contact '{name}' had {text}" for name, text in formulations.items() if text]
@@ -93,7 +93,7 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
 
 
 def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple[Array, Array]]:
-    """Return the elastic slips [length] by pair of files that hold tangential tractions instead, of pairs with a penalty."""
+    """Return the elastic slips [length] of pairs with a penalty from files that contain tangential tractions instead."""
     slips = {}
     for name in [name for name, kept in pairs.items() if kept.get("traction")]:
         (positions, traction), stiffness = pairs[name]["traction"], problem.pairs[name].options.tangential_penalty
@@ -105,7 +105,7 @@ def _of_tractions(problem: Problem, pairs: Mapping[str, Any]) -> dict[str, tuple
 
 @contextmanager
 def _whole(step: StepResult) -> Iterator[None]:
-    """Turn what restart data that lack a part, or have one of another kind, raise into one sentence."""
+    """Convert errors of incomplete or mistyped restart data into one message."""
     try:
         yield
     except (LookupError, TypeError, ValueError, AttributeError) as error:
@@ -116,12 +116,12 @@ def _whole(step: StepResult) -> Iterator[None]:
 
 
 def _extrapolates(problem: Problem) -> bool:
-    """Return whether load steps start from extrapolated ones."""
+    """Return whether load steps start from an extrapolation."""
     return problem.solver.iterative or problem.bodies is not None
 
 
 def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
-    """Return the instants of a ramp after the last step so far, all of them where there is none."""
+    """Return the instants of a ramp after the last step, all of them if there is none."""
     if last is None:
         return list(ramp.instants)
     end = last.load_factor
@@ -129,7 +129,7 @@ def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:
 
 
 def _history(table: Sequence[Sequence[float]], end: float, other: Sequence[Sequence[float]]) -> list[float]:
-    """Return multipliers of the loads where one of two tables bends before `end`, and there."""
+    """Return the multipliers of a load at `end` and at earlier breakpoints of either of two tables."""
     rows = tuple((float(t), float(value)) for t, value in table)
     instants = sorted({*(t for t, _ in (*rows, *other) if t < end), end})
     return [float(f"{table_value(rows, t):.12g}") for t in instants]

@@ -22,25 +22,23 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
 from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Equivalent strain, and worn depth by the size of the model, beyond which linear kinematics are worth a warning.
+# Equivalent strain, and wear depth over the size of the model, beyond which linear kinematics give a warning.
 STRAIN = 0.1
-# Plastic strain, which concentrates in a few cells, likewise: under a ball without hardening the mean contact pressure falls
-# from 2.6 times the yield stress, where it reaches 0.1, to 2.3 at 0.5 and 2.1 at 1.1.
-PLASTIC_STRAIN = 0.5
 # Rotation [radian] beyond which they are: half its square is the strain that they leave out.
 ROTATION = 0.3
-# Steps to take in the place of one; more of them are no remedy, but the sign of a wrong coefficient.
+# Largest factor on the number of steps that is recommended; a larger one indicates a wrong coefficient.
 MANY_STEPS = 1000
-# Elements across the radius of a contact that resolve its pressure.
+# Number of elements across the radius of a contact that resolve its pressure.
 ACROSS = 4
-# What criteria may leave, of the displacement or of the forces, before it is worth a warning.
+# Relative residual of the displacement or of the forces above which a warning is given.
 LOOSE = 1e-4
-# Part of the largest energy or work that may be missing in the balance of works.
+# Fraction of the largest energy or work that the energy balance may lack.
 IMBALANCE = 0.02
 
 
@@ -69,7 +67,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
-    """Yield a warning where a penalty lets the sides penetrate by much of the largest displacement."""
+    """Yield a warning where the penetration of a penalty is a notable fraction of the largest displacement."""
     size = float(np.abs(displacement).max(initial=0.0))
     penalty, depth = pair.options.penalty, contact.penetration
     if isinstance(penalty, float) and depth > NOTABLE * size:
@@ -110,7 +108,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 
 
 def _unsettled(state: State) -> Iterator[str]:
-    """Yield a warning where the last of a fixed number of geometry updates still changed much."""
+    """Yield a warning where the last of a fixed number of geometry updates changed the displacement notably."""
     update, change = state.last_change or (0, 0.0)
     if change > NOTABLE:
         yield (
@@ -185,10 +183,10 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     else:
         yield from _large_stress_free_strain(problem, last)
     plastic = last.cell_fields.get("plastic_strain")
-    if plastic is not None and (most := float(plastic.max())) > PLASTIC_STRAIN:
+    if plastic is not None and (most := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
-            f"the largest plastic strain is {most:.2f}, beyond the {PLASTIC_STRAIN} up to which linear kinematics serve: "
-            "pressures on it are too low"
+            f"the largest plastic strain is {most:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
+            "serve: pressures on it are too low"
         )
 
 
@@ -197,7 +195,7 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
     model = problem.model
     if not (model.temperatures or model.initial_states or model.conducts):
         return
-    moduli = np.eye(problem.field.moduli.shape[1])[None]  # of which stresses are strains
+    moduli = np.eye(problem.field.moduli.shape[1])[None]  # unit moduli: stresses are strains
     rows = {name: np.zeros(len(block), np.int32) for name, block in model.mesh.solids.items()}
     strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
     if strain > STRAIN:
@@ -208,7 +206,7 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
 
 
 def _shear_modulus(law: Material) -> float:
-    """Return the shear modulus of an isotropic material [pressure]; of others, whose strains are computed, infinity."""
+    """Return the shear modulus of an isotropic material [pressure]; infinity for others, whose strains are computed."""
     return law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf
 
 
@@ -222,9 +220,9 @@ def _large_rotation(problem: Problem, state: State) -> Iterator[str]:
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
-    """Return the largest rotation of the centre of a solid cell [radian], and where (dim,).
+    """Return the largest rotation at the centre of a solid cell [radian], and its position (dim,).
 
-    That of linear kinematics, half the curl of the displacement (n_points, dim).
+    In linear kinematics it is half the curl of the displacement (n_points, dim).
     """
     square, point, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
     for name, block in mesh.solids.items():
@@ -239,12 +237,12 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
 
 def _clearances(problem: Problem, state: State) -> set[str]:
-    """Return the names of found pairs that were apart and never closed, as a shank in its hole, where others closed."""
-    found = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
-    if not state.touched & found.keys():
+    """Return the names of automatically detected pairs that were apart and never closed, such as a shank in its hole."""
+    gap_by_pair = {pair.name: pair.found_gap for pair in problem.model.contact if pair.found_gap is not None}
+    if not state.touched & gap_by_pair.keys():
         return set()
-    apart = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
-    return {name for name, gap in found.items() if gap > apart and name not in state.touched}
+    open_from = LENGTH_ROUND_OFF * float(np.ptp(problem.model.mesh.points, axis=0).max())
+    return {name for name, gap in gap_by_pair.items() if gap > open_from and name not in state.touched}
 
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:
@@ -252,7 +250,9 @@ def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool
     name, reach, facing = contact.name, pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
     least = float(facing.min(initial=np.inf))
     gap = f"the smallest gap is {least:.4g}" if len(facing) else "no node faces the other side"
-    if contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None:  # these tell it
+    if (
+        contact.active.any() or contact.damage is not None or contact.fluid_pressure is not None
+    ):  # visible in these results
         return
     if reach is not None and least < -reach:
         yield (
@@ -283,16 +283,16 @@ def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> Iterato
 
 
 def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
-    """Return how many facets lie between the innermost closed node and the edge of the contact; None without an edge.
+    """Return the number of facets between the innermost closed node and the edge of the contact; None without an edge.
 
-    That is the radius in elements, whatever the shape of the contact, and also where symmetry cuts it. The edge lies
-    within the last of these facets.
+    This is the radius in elements, for any shape of the contact, and also where symmetry cuts it. The edge lies within
+    the last of these facets.
 
     Parameters
     ----------
     side : Surface
     closed, excluded : ndarray of bool (m,)
-        Which nodes of the side are in contact; which ones the user keeps out of it, so that no edge is there.
+        Nodes of the side in contact; nodes excluded by the user, which are no edge.
     """
     reached = ~closed & ~excluded
     if not reached.any():

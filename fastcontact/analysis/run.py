@@ -76,7 +76,7 @@ def solve(
     Warns
     -----
     FastcontactWarning
-        What is doubtful about the model and, at the end, about the result, with numbers; steps keep the messages.
+        If the model or, at the end, the result is doubtful; each warning states a number and is stored in the steps.
 
     Examples
     --------
@@ -106,7 +106,7 @@ def _gathered(
     progress: Progress,
     on_step: Callable[[StepResult], None] | None,
 ) -> Steps:
-    """Return `steps` with the new ones behind them, each handed to `on_step` when it is done."""
+    """Return `steps` extended by the new ones; `on_step` is called after each."""
     with progress:
         for step in new():
             if on_step is not None:
@@ -129,11 +129,11 @@ def solve_steps(
     criteria: Criteria | None = None,
     resume: Sequence[StepResult] = (),
 ) -> Iterator[StepResult]:
-    """Solve a model step by step: a new step is computed when it is asked for, and none is kept.
+    """Solve a model step by step: each step is computed when it is requested, and none is kept.
 
-    Of a long analysis `solve` returns all steps, 80 bytes a point and step in 2D, 120 in 3D. Here what the caller keeps
-    stays in memory, and an analysis may be ended at any step. Parameters, errors and warnings are those of `solve`; a
-    wrong model is told at once.
+    `solve` returns all steps, which take 80 bytes per point and step in 2D, 120 in 3D. Here only the steps that the
+    caller keeps stay in memory, and the analysis may be stopped after any step. Parameters, errors and warnings are those
+    of `solve`; an invalid model is refused at once.
 
     Returns
     -------
@@ -165,7 +165,7 @@ def solve_steps(
 
 
 def _kinds(model: Model, linear_solver: str) -> list[str]:
-    """Return the kinds of runs, as in the table of `_jit.ahead`, whose kernels a model needs."""
+    """Return the kinds of runs in the table of `_jit.ahead` whose kernels a model needs."""
     dim = model.mesh.dim
     multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
@@ -190,20 +190,20 @@ def _marched(
     for text in doubtful if last is None else ():
         warn(text)
     problem = prepared(stage_of(model, last, ramp.table[0][0]))
-    for text in problem.doubtful if last is None else ():  # now: it may be the reason for an error to come
+    for text in problem.doubtful if last is None else ():  # before the steps: it may explain an error in them
         warn(text)
     doubtful += problem.doubtful
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, before = problem.ramp.table[0][0], 0
     if last is not None:
-        begin, before, last = last.load_factor, last.index, None  # kept no longer
+        begin, before, last = last.load_factor, last.index, None  # releases the step
     for index, instant in enumerate(instants, start=before + 1):
         problem, state = go_on(prepared, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
         warnings = result_warnings(problem, state, step) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
-        told = (*doubtful * (index == 1), *warnings)
-        yield replace(step, warnings=told, restart=restart.taken(problem, state, case))
-        del step  # before the next one is computed
+        warned = (*doubtful * (index == 1), *warnings)
+        yield replace(step, warnings=warned, restart=restart.taken(problem, state, case))
+        del step  # releases it before the next one is computed
         begin = instant

@@ -3,7 +3,7 @@
 How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
 the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
 its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
-change. So does what iterative linear solutions leave, of which is known how large it may be.
+change. So does what iterative linear solutions leave.
 """
 
 from __future__ import annotations
@@ -15,26 +15,24 @@ import numpy as np
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.arrays import Array
 
-# Updates to look at, and how far apart their displacements may lie in units of the typical change: WINDOW in one direction.
+# Number of updates in the window, and largest distance of their displacements over the typical change (WINDOW if collinear).
 WINDOW, APART = 8, 4.0
-# Where changes may be what linear solutions leave, fewer will do, closer together: 3 in one direction.
-SHORT_WINDOW, CLOSE = 4, 2.0
 # What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
 DISPLACEMENT, FORCE = 1e-6, 1e-5
-# Changes that become smaller than this part of those at the beginning of the window still converge.
+# Changes below this fraction of those at the beginning of the window still converge.
 DECLINE = 0.5
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """How far the last geometries of a load step lie apart.
+    """Scatter of the last geometries of a load step.
 
     Attributes
     ----------
     displacement : float
-        In units of the largest displacement [-].
+        Scatter of displacements over the largest one [-].
     force : float
-        Nodal contact forces, in units of the largest one [-].
+        Scatter of nodal contact forces over the largest one [-].
     """
 
     displacement: float
@@ -42,30 +40,28 @@ class Scatter:
 
 
 class Watch:
-    """Keeps the last displacements and contact forces, and says when they only scatter."""
+    """Monitor of the last displacements and contact forces that detects when they only scatter."""
 
     def __init__(self) -> None:
         self._parts: list[Array] = []
         self._forces: list[Array] = []
         self._changes: list[float] = []
 
-    def seen(self, unknowns: Array, force: Array, change: float, size: float, noise: float = 0.0) -> Scatter | None:
+    def seen(self, unknowns: Array, force: Array, change: float, size: float) -> Scatter | None:
         """Take the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
 
         Parameters
         ----------
         part, force : ndarray
         change : float
-            By how much the displacements differ from those before [length].
+            Change of the displacements from the previous ones [length].
         size : float
             Of the displacements [length].
-        noise : float
-            Changes up to this may be what an iterative linear solver leaves [length].
 
         Returns
         -------
         Scatter or None
-            None as long as the updates may still converge, or scatter by more than what is of no consequence.
+            None while the updates may still converge, or scatter by more than is acceptable.
         """
         if not change <= DISPLACEMENT * size:
             self.forget()
@@ -74,26 +70,22 @@ class Watch:
         self._forces.append(force.copy())
         self._changes.append(change)
         del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
-        last = self._changes[-SHORT_WINDOW:]
-        window, apart = (SHORT_WINDOW, CLOSE) if max(last) <= noise else (WINDOW, APART)
-        if len(self._changes) < window:
+        if len(self._changes) < WINDOW:
             return None
-        changes, half = self._changes[-window:], window // 2
-        scatter = Scatter(
-            _apart(self._parts[-window:]) / size, _apart(self._forces[-window:]) / (largest(force) or 1.0)
-        )
+        changes, half = self._changes, WINDOW // 2
+        scatter = Scatter(_last_change(self._parts) / size, _last_change(self._forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
-        if declining or scatter.displacement * size > apart * float(np.median(changes)):
+        if declining or scatter.displacement * size > APART * float(np.median(changes)):
             return None
         return scatter if scatter.displacement <= DISPLACEMENT and scatter.force <= FORCE else None
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Discard the window."""
         self._parts.clear()
         self._forces.clear()
         self._changes.clear()
 
 
-def _apart(vectors: list[Array]) -> float:
+def _last_change(vectors: list[Array]) -> float:
     """Return the largest difference of the last of some vectors from the others."""
     return max(float(largest_difference(vectors[-1], other)) for other in vectors[:-1])

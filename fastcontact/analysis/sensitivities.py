@@ -1,9 +1,9 @@
 """Sensitivities: derivatives of one quantity with respect to many parameters from one adjoint solution.
 
-Where a load step has settled, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints
-are smooth equations as long as the active set stands. The adjoint solution for a quantity, with the transposed matrix of
-these equations, gives its derivative by every parameter as a scalar product with what the parameter changes in them (Haftka
-and Gürdal, Elements of Structural Optimization, 1992, chapter 7).
+At the end of a load step, ``K u = f + B.T multiplier`` and ``gap0 + B u + C multiplier = 0`` of the active constraints are
+smooth equations as long as the active set does not change. The adjoint solution for a quantity, with the transposed matrix of
+these equations, gives its derivative with respect to every parameter as a scalar product with the derivative of the residual
+(Haftka and Gürdal, Elements of Structural Optimization, 1992, chapter 7).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import TINY
 
-# What points between two facets may make of a derivative, relative to it.
+# Largest effect of points between two facets on a derivative, relative to it.
 BETWEEN = 1e-6
 
 
@@ -43,12 +43,13 @@ class Sensitivities:
     value : float
         The quantity [its own unit].
     derivatives : dict
-        By parameter, as a tuple, the derivative of the quantity [its unit by that of the parameter].
+        Derivative of the quantity for each parameter, as a tuple [unit of the quantity per unit of the parameter].
     margin : float
-        How near the active set is to a change: the smallest of the multipliers of active constraints over the largest one of
-        their pair, and of the gaps of open ones over the largest displacement; 1 where these are larger [-].
+        Distance of the active set from a change: the smallest multiplier of an active constraint relative to the
+        largest one of its pair, or the smallest open gap relative to the largest displacement, whichever is smaller;
+        at most 1 [-].
     solutions : int
-        Linear solutions that the adjoint took: one, and those for the moving geometry of contact.
+        Linear solutions for the adjoint: one, and those for the variation of the contact geometry.
 
     Examples
     --------
@@ -80,36 +81,37 @@ def sensitivities(
     linear_solver: str = "auto",
     margin: float = 1e-6,
 ) -> Sensitivities:
-    """Return the derivatives of a quantity by parameters of the model, by one adjoint solution.
+    """Return the derivatives of a quantity with respect to parameters of the model, by one adjoint solution.
 
-    The state at the end of the step is found again; its active set stands, and contact moves with the bodies. What a constant
-    of a material changes in the forces, and displacements in the pairing, are central differences of these at the solution.
+    The state at the end of the step is recomputed. Its active set is held fixed, and the contact geometry varies with
+    the displacements. Derivatives of internal forces with respect to material constants, and of the pairing with
+    respect to displacements, are central differences at the solution.
 
     Parameters
     ----------
     model : Model
     step : StepResult
-        The last one that `solve` returned, or that a result file holds, with its `restart`.
+        The last step that `solve` returned, or the last one of a result file, with its `restart`.
     quantity : sequence
-        ``("displacement", point, "y")``, of a point by its number, or by a group that holds it alone [length];
-        ``("reaction", group, "y")``, the sum of the forces of supports on a group [force]; ``("contact_force", pair, "y")``,
-        on the secondary side [force]; ``("pressure_max", pair)``, at the node where it is largest now, or
-        ``("pressure", pair, point)`` [pressure].
+        ``("displacement", point, "y")``, where the point is a number or a group of one point [length]; ``("reaction",
+        group, "y")``, the sum of the support forces on a group [force]; ``("contact_force", pair, "y")``, on the
+        secondary side [force]; ``("pressure_max", pair)``, at the node of the largest pressure, or ``("pressure",
+        pair, point)`` [pressure].
     parameters : sequence of sequences
-        ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, by a group that it was given to or
-        by its number in the order of the model; of an `Orthotropic` with the axes, as ``("E", material, "1")``,
-        ``("nu", material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or
-        ``("expansion", material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads on a
-        group, or of the force on a rigid obstacle by its name [-]; ``("speed", group)``, of its centrifugal forces
-        [radian / time]; ``("temperature", group)``, the factor of the rise of its temperatures [-]; of these three also with
-        ``"all solid cells"`` for what names no group; ``("pretension", name)``, the factor of the force or the shortening of
-        a section [-]; ``("prescribed", group)``, the factor of the displacements prescribed on a group, or
-        ``("prescribed", group, "y")`` of one component [-]; ``("motion", obstacle)``, the factor of its motion [-];
-        ``("clearance", pair)``, a length added to the gap [length]. All factors are 1 now.
+        ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, which is given by one of its
+        groups or by its number in the model; of an `Orthotropic` with the axes, as ``("E", material, "1")``, ``("nu",
+        material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or ``("expansion",
+        material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads on a group, or
+        of the force on a rigid obstacle by its name [-]; ``("speed", group)``, the angular speed of centrifugal forces
+        [radian / time]; ``("temperature", group)``, the factor of the temperature rise [-]; the latter three also with
+        ``"all solid cells"`` for loads without a group; ``("pretension", name)``, the factor of the force or the
+        shortening of a section [-]; ``("prescribed", group)``, the factor of the displacements prescribed on a group,
+        or ``("prescribed", group, "y")`` of one component [-]; ``("motion", obstacle)``, the factor of its motion [-];
+        ``("clearance", pair)``, a length added to the gap [length]. All factors have the value 1.
     ramp, criteria, linear_solver
         Those of `solve`.
     margin : float
-        What `Sensitivities.margin` must be at least [-].
+        Smallest admissible `Sensitivities.margin` [-].
 
     Returns
     -------
@@ -118,9 +120,9 @@ def sensitivities(
     Raises
     ------
     ModelError
-        If there is no such quantity or parameter; with friction, wear, or locked pretension sections, since results then
-        depend on earlier steps; if an active constraint is about to open, or an open one to close; if nodes lie between two
-        facets, so that there is one derivative to either side.
+        If there is no such quantity or parameter; with friction, wear, or locked pretension sections, since results
+        then depend on earlier steps; if an active constraint is about to open or an open one to close; if a node lies
+        between two facets, where the derivatives to both sides differ.
 
     Examples
     --------
@@ -138,16 +140,16 @@ def sensitivities(
     >>> round(result.value, 9), round(result.derivatives["E", "BLOCK"], 9)
     (1.0, 0.001)
     """
-    asked = [tuple(parameter) for parameter in parameters]
-    check_asked(model, quantity, parameters)
+    tuples = [tuple(parameter) for parameter in parameters]
+    check_labels(model, quantity, parameters)
     problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     nearest = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
-    values, solutions = _derivatives(contact, gradient, [change_by(contact, parameter) for parameter in asked])
-    return Sensitivities(gradient.value, dict(zip(asked, values.tolist(), strict=True)), nearest, solutions)
+    values, solutions = _derivatives(contact, gradient, [change_by(contact, parameter) for parameter in tuples])
+    return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), nearest, solutions)
 
 
-def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
+def check_labels(model: Model, quantity: Sequence[str | int], parameters: Sequence[Sequence[str | int]]) -> None:
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
     model.refuse_nonlinear("sensitivities are")
     if model.conducts:
@@ -158,7 +160,7 @@ def check_asked(model: Model, quantity: Sequence[str | int], parameters: Sequenc
 
 
 def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[Change]) -> tuple[Array, int]:
-    """Return the derivatives of a quantity by parameters, and the linear solutions that they took."""
+    """Return the derivatives of a quantity with respect to parameters, and the number of linear solutions."""
     forward, backward = contact.derivatives()
     adjoint = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward)))
     values = np.array([adjoint.derivative(change) for change in changes])

@@ -1,13 +1,13 @@
 """Nodes shared by contact pairs, or by both ends of a period or sector: one constraint, whose force is shared.
 
-A node of several pairs behaves as that of one pair over all their facets. Its conditions are one and the same, which fixes
-the sum of their forces alone, and equations that repeat each other cannot be eliminated: their mean is solved for. It stands
-for the area of all, so that penalties add up, and has the mean of their coefficients of friction. Each pair then carries the
-part that its area is of all their areas, so that the pressure is the same. Of several clearances at one place the smallest
-alone can close. Constraints with a normal compliance or with different clearances are independent.
+A node of several pairs behaves like a node of one pair over all their facets. Its conditions are linearly dependent:
+they only determine the sum of their forces, and cannot all be eliminated, so their mean is solved for. The mean has the
+area of all, so that penalties add up, and the mean coefficient of friction. Each pair carries the fraction of the force
+given by its fraction of the area, so that the pressures are equal. Of several clearances at one node only the smallest
+can close. Constraints with a normal compliance or with different clearances are independent.
 
-Two nodes at the ends of a part that repeats itself are one node, too: its gap, weighted over the facets at both ends, is the
-mean of theirs by area. Tangents at the second end are turned to the first one before they are compared.
+Two nodes at the ends of a periodic part are one node, too: its gap, weighted over the facets at both ends, is the
+area-weighted mean of both. Tangents at the second end are rotated to the first one before they are compared.
 """
 
 from __future__ import annotations
@@ -26,24 +26,21 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Gaps that differ by less than this part of the coordinates are the same.
-SAME_GAP = 64 * float(np.finfo(float).eps)
-
 
 @dataclass(frozen=True, eq=False)
 class SharedNodes:
-    """Constraints that repeat others, and the share of the force that each carries.
+    """Linearly dependent constraints, and the fraction of the force that each carries.
 
     Attributes
     ----------
     place : ndarray of int (m,)
-        Of each constraint, the one that is solved for in its place; itself for most.
+        The representative of each constraint, which is solved for instead; mostly the constraint itself.
     behind : ndarray of int (k,)
-        Constraints that cannot close, for others are in front of them.
+        Constraints that cannot close, because others have a smaller gap.
     part, along : ndarray (m,)
-        Of the normal and of the tangential forces of a place, the part of each constraint [-].
+        Fraction of each constraint in the normal and in the tangential force of its representative [-].
     frame : ndarray (m, k, dim)
-        Tangents of the constraints, at second ends of periods as they are at the first one [-].
+        Tangents of the constraints, at second ends of periods rotated to the first one [-].
     """
 
     place: Indices
@@ -54,7 +51,7 @@ class SharedNodes:
 
     @classmethod
     def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
-        """Return those of the constraints of all pairs; None where no node is in several, or at both ends of a period."""
+        """Return the shared nodes of all pairs; None if no node is in several pairs, or at both ends of a period."""
         if len(constraints.parts) < 2 and not interfaces:
             return None
         first, second, behind = _alike(constraints)
@@ -72,17 +69,17 @@ class SharedNodes:
         return redundant
 
     def closed(self, active: Mask) -> Mask:
-        """Return the places (m,) at which some of the constraints (m,) are active."""
+        """Return the representatives (m,) of which some constraints (m,) are active."""
         return np.asarray(self.summed(active) > 0)
 
     def summed(self, values: NDArray[np.generic]) -> Array:
-        """Return the sums (m, ...) of values (m, ...) at each place."""
+        """Return the sums (m, ...) of values (m, ...) over the constraints of each representative."""
         total = np.zeros(values.shape)
         np.add.at(total, self.place, values.astype(float))
         return total
 
     def once(self, constraints: StackedConstraints) -> Constraints:
-        """Return constraints of which each place has one, for the area of all of its constraints."""
+        """Return constraints with only the representatives, each with the area of all of its constraints."""
         mean = self._at_places(self.part)
         merged = {
             "B": csr_array(mean @ constraints.B),
@@ -109,12 +106,12 @@ class SharedNodes:
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
 
     def _at_places(self, weight: Array) -> csr_array:
-        """Return the matrix (m, m) that sums values with weights (m,) at each place."""
+        """Return the matrix (m, m) that sums values with weights (m,) for each representative."""
         m = len(weight)
         return csr_array((weight, (self.place, np.arange(m))), shape=(m, m))
 
     def _tangents(self, constraints: Constraints) -> tuple[csr_array, ...]:
-        """Return the rows (m, n_dofs) of the mean slips of each place along its own tangents."""
+        """Return the rows (m, n_dofs) of the mean slip of each representative along its own tangents."""
         turn = np.einsum("mjd,mkd->jkm", self.frame, self.frame[self.place])
         parts = [[self._at_places(self.along * each) for each in along] for along in turn]
         return tuple(
@@ -123,14 +120,14 @@ class SharedNodes:
         )
 
     def _mean(self, along: Array, weight: Array) -> Array:
-        """Return the mean with weights (m,) of components along the tangents (m, k) at each place, along its own tangents."""
+        """Return the weighted means, along the representatives' tangents, of components along the tangents (m, k)."""
         vectors = np.einsum("mk,mkd->md", weight[:, None] * along, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
     def gathered(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return gaps (m,) [length], normal (m,) and tangential (m, dim) forces of places, from those of constraints.
+        """Return gaps (m,) [length], normal (m,) and tangential (m, dim) forces of representatives.
 
         And the slips (m, dim) of `closing` the gaps [length].
         """
@@ -141,7 +138,7 @@ class SharedNodes:
         return self._at_places(self.part) @ gap, self.summed(normal), forces, slips
 
     def shared(self, solution: Solution, constraints: StackedConstraints, u: Array) -> Solution:
-        """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces that all constraints share."""
+        """Return a solution of `once` at displacements `u` (n_dofs,) [length] with forces distributed to all constraints."""
         representative = self.place
         normal, gap = self.part * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
@@ -167,7 +164,7 @@ class SharedNodes:
 
 
 def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface]) -> Array:
-    """Return the tangents (m, k, dim) of constraints, those at second ends of periods turned back to the first one [-]."""
+    """Return the tangents (m, k, dim) of constraints, at second ends of periods rotated back to the first one [-]."""
     m, dim = constraints.positions.shape
     frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
     for interface in interfaces:
@@ -199,7 +196,7 @@ def _at_periodic_interfaces(
 
 
 def _places(constraints: Constraints, pairs: Indices) -> Indices:
-    """Return the place (m,) of each constraint, `pairs` (2, k) being at one: of these one with friction, of low number."""
+    """Return the representative (m,) of each constraint, given dependent `pairs` (2, k): one with friction, of low number."""
     m = len(constraints)
     label = connected_components(csr_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(m, m)), directed=False)[1]
     last_to_first = np.lexsort((np.arange(m), constraints.coefficients == 0.0))[::-1]
@@ -209,18 +206,18 @@ def _places(constraints: Constraints, pairs: Indices) -> Indices:
 
 
 def _stiffness(softness: Array) -> Array:
-    """Return the own stiffness (m,) of constraints, infinite without compliance [force / length]."""
+    """Return the stiffness (m,) of constraints, infinite without compliance [force / length]."""
     return np.divide(1.0, softness, out=np.full_like(softness, np.inf), where=softness > 0.0)
 
 
 def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
-    """Return the parts (m,) of normal and tangential forces of places (m,) that constraints carry [-].
+    """Return the fractions (m,) of normal and tangential forces that constraints carry [-].
 
-    Normal forces by stiffness where all are compliant, by area among exact ones. Tangential forces as far as friction
-    can carry them: what slides then slides in each pair.
+    Normal forces are distributed by stiffness where all are compliant, by area among exact ones. Tangential forces are
+    distributed by friction limit, so that nodes that slide do so in each pair.
     """
     m = len(representative)
-    several = np.bincount(representative, minlength=m)[representative] > 1  # others need not stand for an area
+    several = np.bincount(representative, minlength=m)[representative] > 1  # others need not have an area
     weight = np.where(several, _areas(constraints), 1.0)
     if constraints.softness is not None:
         hard = constraints.softness == 0.0
@@ -251,19 +248,19 @@ def _nodes(constraints: StackedConstraints) -> Indices:
 
 
 def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
-    """Return constraints (k,) of a pair, those of other pairs (k,) that repeat them, and others that lie behind some.
+    """Return constraints (k,) of a pair, dependent ones of other pairs (k,), and constraints behind others.
 
-    The latter face the same place along the same normal, with a larger clearance: what is in front of them holds their node,
-    unless it is compliant.
+    The latter face the same point along the same normal with a larger clearance: the constraints in front hold their node,
+    unless these are compliant.
     """
     first, second = _of_one_node(constraints)
     if not len(first):
         return first, first, first
-    alike = _apart(constraints.B, first, second) <= LENGTH_ROUND_OFF
+    alike = _row_differences(constraints.B, first, second) <= LENGTH_ROUND_OFF
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
-    level = constraints.gap0[second] - constraints.gap0[first] <= SAME_GAP * np.abs(constraints.positions).max()
+    level = constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
     yields = np.zeros(len(constraints), bool) if constraints.softness is None else constraints.softness > 0.0
     behind = np.setdiff1d(second[~level & ~yields[first]], [])
     first, second = first[level], second[level]
@@ -272,24 +269,24 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
 
 
 def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
-    """Return constraints (k,) at nodes of several, and for each another one there with a gap as large or larger.
+    """Return constraints (k,) at nodes with several, and for each another one there with an equal or larger gap.
 
-    Those that another one is paired with are in order of their gaps.
+    The partners of each constraint are in order of their gaps.
     """
     nodes = _nodes(constraints)
     usable = np.isfinite(_areas(constraints)) & constraints.usable & (nodes >= 0)
     order = np.flatnonzero(usable)
     order = order[np.lexsort((constraints.gap0[order], nodes[order]))]
     node, pairs = nodes[order], [np.empty((2, 0), np.intp)]
-    apart = 1
-    while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        pairs.append(np.stack([order[same], order[same + apart]]))
-        apart += 1
+    shift = 1
+    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
+        pairs.append(np.stack([order[same], order[same + shift]]))
+        shift += 1
     first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second
 
 
-def _apart(rows: csr_array, first: Indices, second: Indices) -> Array:
+def _row_differences(rows: csr_array, first: Indices, second: Indices) -> Array:
     """Return the largest difference (k,) between entries of rows."""
     if not len(first):
         return np.empty(0)

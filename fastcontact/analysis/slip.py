@@ -10,12 +10,12 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.results.step import ContactResult
 
-# In facet lengths: nodes that stand out as far beyond the other side may still be pressed, by parts of their facets.
+# In facet lengths: nodes up to this distance beyond the other side may still carry pressure, by parts of their facets.
 STANDS_OUT = 3.0
 
 
 def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
-    """Return the slip (m, dim) of the closed nodes in a step that ends `at` [length]; friction may hold them."""
+    """Return the slip (m, dim) of the closed nodes in a step that ends at the configuration `at` [length]."""
     if pair.options.tied or not contact.active.any():
         return np.zeros_like(contact.coordinates)
     held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)

@@ -21,11 +21,11 @@ class Accuracy:
     multiplier : float
         A multiplier above minus this fraction of the largest one counts as compression [-].
     residual : float, optional
-        Relative residual of iterative linear solvers where less than their own tolerance will do [-].
+        Relative residual of iterative linear solvers where it may exceed their own tolerance [-].
     max_iterations : int
-        Linear solutions allowed without friction; the result may then not be settled.
+        Largest number of linear solutions without friction; the result may then not be converged.
     max_newton_steps : int, optional
-        Newton steps with friction after which a state that is not settled will do; None where it will not.
+        Number of Newton steps with friction after which an unconverged state is accepted; None where it is not.
     """
 
     gap: float
@@ -35,7 +35,7 @@ class Accuracy:
     max_newton_steps: int | None = None
 
 
-# How unknowns (n,) [length] change with forces (n,) [force] and with gaps (m,) [length].
+# Response of the unknowns (n,) [length] to forces (n,) [force] and gaps (m,) [length].
 Response = Callable[[Array, Array], Array]
 
 
@@ -48,17 +48,17 @@ class Equilibrium:
     u : ndarray (n,)
         Unknowns [length].
     multiplier : ndarray (m,)
-        Of all constraints, zero for inactive ones [force].
+        Multipliers of all constraints, zero for inactive ones [force].
     gap : ndarray (m,)
-        Of all constraints [length].
+        Gaps of all constraints [length].
     active : ndarray of bool (m,)
-        The set that this is the solution for.
+        Active set of this solution.
     wanted : ndarray of bool (m,)
-        The set that the signs of this solution ask for; equal to `active` when every inequality holds.
+        Next active set by the signs of this solution; equal to `active` when every inequality holds.
     iterations : int
-        Linear solutions made.
+        Number of linear solutions.
     response : callable, optional
-        Makes the `Response` of this solution under its active set.
+        Returns the `Response` of this solution with its active set.
     """
 
     u: Array
@@ -76,7 +76,7 @@ class Equilibrium:
 
     @property
     def residual(self) -> float:
-        """By how much the inequalities of the active set do not hold, over the largest force: it is solved exactly."""
+        """Violation of the inequalities over the largest force: zero, since the active set is solved exactly."""
         return 0.0
 
     @property
@@ -98,7 +98,7 @@ class Path:
     closing : ndarray (m, dim)
         What is not to count as slip where all of the gap closes [length].
     parts : int
-        Increments to solve in.
+        Number of increments.
     """
 
     gap: Array
@@ -130,9 +130,9 @@ class Slid:
     Attributes
     ----------
     slip : ndarray (m, dim)
-        Since the beginning of the step [length].
+        Slip since the beginning of the step [length].
     work : ndarray (2, m)
-        Of friction since then, and what of it constraints did while they closed [energy].
+        Frictional work since then, and the part of it done by constraints while they closed [energy].
     normal : ndarray (m,)
         Normal forces [force].
     """
@@ -162,15 +162,15 @@ class FrictionalEquilibrium:
     settled : bool
         Whether all inequalities hold.
     residual : float
-        By how much they do not, over the largest force.
+        Violation of the inequalities over the largest force.
     iterations : int
         Newton iterations.
     directions : tuple of ndarray (m, dim)
         The k tangents.
     work : ndarray (2, m), optional
-        Of friction in the step, and what of it constraints do while they close, where increments of the step tell [energy].
+        Frictional work in the step, and the part of it done by constraints while they close, from increments [energy].
     slid : Slid, optional
-        Where the last increment began.
+        Beginning of the last increment.
     """
 
     u: Array
@@ -190,7 +190,7 @@ class FrictionalEquilibrium:
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.
 
-        From one pairing to the next tangents may turn by any angle: only the plane that they span is the contact's.
+        Tangents of different pairings may differ by any angle: only their plane is defined by the contact.
         """
         if self.tangential.shape != (m, len(directions)):
             return None
@@ -199,7 +199,7 @@ class FrictionalEquilibrium:
 
     @property
     def wanted(self) -> Mask:
-        """The set to start the next solution from."""
+        """Initial active set of the next solution."""
         return self.active
 
 

@@ -1,4 +1,4 @@
-"""The model in one load step: with locked pretension sections, and the relations, temperatures and films that hold in it."""
+"""The model in one load step: with locked pretension sections, and the constraints, temperatures and films of that step."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fastcontact.results.step import StepResult
 
 
 def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model:
-    """Return the model as it was in the `last` step; before all steps as it is in the first one, from the instant `begin`."""
+    """Return the model of the `last` step; before all steps that of the first one, which begins at the instant `begin`."""
     if last is None:
         return _stage(model, begin, np.zeros(model.mesh.points.shape), None, {})[0]
     before = float(np.nextafter(last.load_factor, -np.inf))
@@ -31,18 +31,18 @@ def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model
 def go_on(
     prepared: Callable[[Model], Problem], model: Model, problem: Problem, state: State, begin: float
 ) -> tuple[Problem, State]:
-    """Return problem and state for the step that begins at an instant.
+    """Return problem and state of the step that begins at an instant.
 
     Parameters
     ----------
     prepared : callable
-        Makes the problem of a model.
+        Prepares the problem of a model.
     model : Model
-        With all that is temporary, and without locked sections.
+        Model with everything temporary, and without locked sections.
     problem : Problem
-        Of the step before.
+        Problem of the previous step.
     state : State
-        At the beginning of the step.
+        State at the beginning of the step.
     begin : float
     """
     stage, kept = _stage(model, begin, problem.displacement(state.u), state.rise, state.locked)
@@ -55,12 +55,12 @@ def go_on(
 
 
 def at_present_length(model: Model) -> list[MultiPointConstraint]:
-    """Return the relations that keep all pretension sections as they are in small motions."""
-    return [own.locked(model.mesh.points.size, 0.0) for own in model.pretensions]
+    """Return the constraints that keep the length of all pretension sections in small motions."""
+    return [bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions]
 
 
 def _names(model: Model) -> list[str]:
-    """Return the names of relations, temperatures and films."""
+    """Return the names of constraints, temperatures and films."""
     temporary = [load for load in model.heat_loads if isinstance(load, TemporaryHeat)]
     return [*(relation.name for relation in model.relations), *(load.label for load in temporary)]
 
@@ -68,24 +68,24 @@ def _names(model: Model) -> list[str]:
 def _stage(
     model: Model, begin: float, displacement: Array, rise: Array | None, kept: Mapping[str, Any]
 ) -> tuple[Model, dict[str, float | Array]]:
-    """Return the model in the step that begins at an instant, and what its locks and all that is temporary began with.
+    """Return the model in the step that begins at an instant, and the initial values of locks and temporary items.
 
-    That is `kept` from when they began, and follows for new ones from the displacements (n_points, dim) [length] and the rise
-    of the temperature (n_points,) [temperature]: lengths by the names of sections, values (m,) by those of relations,
+    Values of earlier locks and items are `kept`; those of new ones follow from the displacements (n_points, dim) [length] and
+    the temperature rise (n_points,) [temperature]: lengths by the names of sections, values (m,) by those of constraints,
     temperatures by their labels.
     """
     lengths = locked_lengths(model.pretensions, begin, displacement, kept)
     locks = [
-        own.locked(model.mesh.points.size, lengths[own.label]) for own in model.pretensions if own.label in lengths
+        item.locked(model.mesh.points.size, lengths[item.label]) for item in model.pretensions if item.label in lengths
     ]
     reached: dict[str, float | Array] = {**lengths}
     relations: list[MultiPointConstraint] = []
-    for own in model.relations:
-        if not isinstance(own, TemporaryConstraint):
-            relations.append(own)
-        elif own.acts_from(begin):
-            reached[own.name] = kept[own.name] if own.name in kept else own.rows @ displacement.ravel()
-            relations += own.after(np.asarray(reached[own.name]))
+    for item in model.relations:
+        if not isinstance(item, TemporaryConstraint):
+            relations.append(item)
+        elif item.acts_from(begin):
+            reached[item.name] = kept[item.name] if item.name in kept else item.rows @ displacement.ravel()
+            relations += item.after(np.asarray(reached[item.name]))
     loads: list[Any] = []
     for load in model.heat_loads:
         if isinstance(load, FixedTemperature) and load.begins > -np.inf and load.acts_from(begin):
@@ -94,7 +94,7 @@ def _stage(
             loads.append(replace(load, reached=np.asarray(reached[load.label])))
         elif not isinstance(load, TemporaryHeat) or load.acts_from(begin):
             loads.append(load)
-    if not locks and not any(isinstance(own, TEMPORARY) for own in (*model.relations, *model.heat_loads)):
+    if not locks and not any(isinstance(item, TEMPORARY) for item in (*model.relations, *model.heat_loads)):
         return model, reached
     made = copy.copy(model)
     made.relations, made.heat_loads = [*relations, *locks], loads

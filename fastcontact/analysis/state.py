@@ -16,7 +16,7 @@ from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 
-# What a restart stores of each contact pair, and of numbers: key and attribute.
+# Key and attribute of the data of each contact pair, and of the numbers, in a restart.
 OF_PAIRS = {
     "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "elastic_slip": "elastic_slip",
     "angle": "angles", "slipped": "slipped", "worn": "worn",
@@ -28,63 +28,63 @@ NUMBERS = {"largest_force": "largest_force", "largest_work": "largest_rigid_forc
 class State:
     """The state at the end of a load step, or before the first one.
 
-    A load step returns a new state and leaves this one as it is: arrays are replaced, never written into. So a state is its
-    own snapshot, and its `to_dict` is what a restart stores.
+    A load step returns a new state and does not modify this one: arrays are replaced, never written into. A state is
+    therefore its own snapshot, and its `to_dict` the content of a restart.
 
     Attributes
     ----------
     u : ndarray (n_dofs,)
-        Displacements of all points, then of the obstacles that forces drive [length].
+        Displacements of all points, then of the force-driven obstacles [length].
     active : dict of str to ndarray of bool (m,)
-        By contact pair, the constraints to start from as active.
+        Initial active set of each contact pair.
     pressure : dict of str to ndarray (n_nodes,)
-        By contact pair, the last nodal pressures [pressure].
+        Last nodal pressures of each contact pair [pressure].
     obstacles : dict of str to ndarray (dim,)
-        By contact pair, the displacement of its rigid obstacle [length].
+        Displacement of the rigid obstacle of each contact pair [length].
     angles : dict of str to float
-        By contact pair, by how much its rigid obstacle has turned, where one does [radian].
+        Rotation of the rigid obstacle of each contact pair, where one rotates [radian].
     worn : dict of str to Worn
-        By contact pair that wears, what has been worn off.
+        Wear of each contact pair that wears.
     slipped : dict of str to ndarray (m, dim)
-        By contact pair, the slip of its secondary nodes so far [length].
+        Accumulated slip of the secondary nodes of each contact pair [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
-        By contact pair that is bilateral once closed, places of constraints [length] and which of them are closed for good.
+        For each contact pair without separation, the positions of constraints [length] and which of them have closed.
     elastic_slip : dict of str to (ndarray (m, dim), ndarray (m, dim))
-        By contact pair whose sticking constraints have a compliance of their own, places of constraints and the slips by
-        which they give way to the present forces [length].
+        For each contact pair with tangential compliance, the positions of constraints and their elastic slips under the
+        current forces [length].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
-        By contact pair in space, where the bodies met first [length] and the normal there [-].
+        For each contact pair in space, the point of first contact [length] and the normal there [-].
     bonds : dict of str to Bond
-        By contact pair with a cohesive layer, what that is like.
+        State of the cohesive layer of each contact pair with one.
     locked : dict of str to float or ndarray (m,)
-        By locked pretension section, its shortening from when it was locked [length]; by temporary relation, the values that
-        it began with; by temperature that began later, the rise (n_points,) of then [temperature].
+        Shortening at locking of each locked pretension section [length]; initial values of each temporary constraint; initial
+        temperature rise (n_points,) of each temperature that began later [temperature].
     extrapolation : Extrapolation
         The last two converged steps.
     gap_round_off : float
         Gaps are no more accurate than this [length].
     largest_force, largest_rigid_force : float
-        Of all steps so far: the largest force [force], and the largest force of loads on a free rigid motion [force].
+        The largest force of all steps so far, and the largest force of loads on a free rigid motion [force].
     touched : frozenset of str
         Contact pairs that were closed at the end of a step.
     work : Work, optional
-        Of all steps so far; None behind steps of a version that did not count it.
+        Work of all steps so far; None after steps of a version that did not compute it.
     forces : dict of str to ContactForces
-        By contact pair, what the work of the next step needs.
+        Contact forces of each pair, for the work of the next step.
     last_change : (int, float), optional
         The fixed number of geometry updates of the last step, and the relative change by the last one.
     rigid : RigidPosition, optional
         Rigid position of floating bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
-        By solid element of nonlinear bodies, see `constitutive_kernels`; none before the first step.
+        History of each solid element of nonlinear bodies, see `constitutive_kernels`; empty before the first step.
     rise : ndarray (n_points,), optional
-        Of the temperature over the reference, where heat is conducted [temperature].
+        Temperature rise over the reference, where heat is conducted [temperature].
     instant : float
         Pseudo-time.
     halved : int
-        How often load steps of nonlinear bodies are halved before they are tried.
+        Number of times that load steps of nonlinear bodies are halved before they are tried.
     solver : dict
-        All that later solutions owe to earlier ones, see `LinearSolver.snapshot`.
+        Snapshot of the linear solver, see `LinearSolver.snapshot`.
     """
 
     u: Array
@@ -115,7 +115,7 @@ class State:
     solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
-        """Return the state with these contact pairs closed; pairs that have touched keep their first contact."""
+        """Return the state with these contact pairs marked as touched; pairs that touched before keep their first contact."""
         touched = self.touched.union(pairs)
         met = {name: positions for name, positions in self.first_contact.items() if name in touched}
         return dataclasses.replace(self, touched=touched, first_contact=met)
@@ -127,9 +127,9 @@ class State:
             "obstacles": self.u[n_dofs:].copy(),
             "touched": sorted(self.touched),
             "locked": dict(self.locked),
-            "bonds": {name: vars(own) for name, own in self.bonds.items()},
+            "bonds": {name: vars(entry) for name, entry in self.bonds.items()},
             "work": None if self.work is None else dataclasses.asdict(self.work),
-            "forces": {name: vars(own) for name, own in self.forces.items()},
+            "forces": {name: vars(entry) for name, entry in self.forces.items()},
             "history": dict(self.history),
             **({} if self.rise is None else {"rise": self.rise.copy(), "instant": self.instant}),
             "active": dict(self.active),
@@ -143,41 +143,41 @@ class State:
         }
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:
-        """Return the state that `to_dict` kept.
+    def from_dict(cls, data: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:
+        """Return the state saved by `to_dict`.
 
         Parameters
         ----------
-        kept : mapping
+        data : mapping
         displacement : ndarray (n_points, dim)
-            At the end of the last step [length].
+            Displacement at the end of the last step [length].
         touched : frozenset of str
-            Contact pairs that were closed at the end of a step, beside those that it knows itself.
+            Contact pairs that were closed at the end of a step, in addition to those in `data`.
         """
-        u = np.concatenate([displacement.ravel(), kept["obstacles"]])
-        pairs, numbers = kept["pairs"], kept["numbers"]
+        u = np.concatenate([displacement.ravel(), data["obstacles"]])
+        pairs, numbers = data["pairs"], data["numbers"]
         of_pairs: dict[str, Any] = {
-            name: {pair: _from_list(key, own[key]) for pair, own in pairs.items() if own.get(key) is not None}
+            name: {pair: _from_list(key, entry[key]) for pair, entry in pairs.items() if entry.get(key) is not None}
             for key, name in OF_PAIRS.items()
         }
         return cls(
             u,
             **{name: numbers[key] for key, name in NUMBERS.items()},
             **of_pairs,
-            history=dict(kept.get("history", {})),
-            rise=kept.get("rise"),
-            instant=kept.get("instant", 0.0),
+            history=dict(data.get("history", {})),
+            rise=data.get("rise"),
+            instant=data.get("instant", 0.0),
             halved=int(numbers.get("halved", 0)),
-            active=dict(kept["active"]),
-            pressure=dict(kept["pressure"]),
-            locked=dict(kept.get("locked", {})),
-            bonds={name: Bond(**own) for name, own in kept.get("bonds", {}).items()},
-            work=Work(**kept["work"]) if kept.get("work") else None,
-            forces={name: ContactForces(**own) for name, own in kept.get("forces", {}).items()},
-            extrapolation=Extrapolation.from_dict(kept["extrapolation"], u)
-            if "extrapolation" in kept
+            active=dict(data["active"]),
+            pressure=dict(data["pressure"]),
+            locked=dict(data.get("locked", {})),
+            bonds={name: Bond(**entry) for name, entry in data.get("bonds", {}).items()},
+            work=Work(**data["work"]) if data.get("work") else None,
+            forces={name: ContactForces(**entry) for name, entry in data.get("forces", {}).items()},
+            extrapolation=Extrapolation.from_dict(data["extrapolation"], u)
+            if "extrapolation" in data
             else Extrapolation(),
-            touched=touched.union(kept.get("touched", ())),
+            touched=touched.union(data.get("touched", ())),
         )
 
 
@@ -189,7 +189,7 @@ def _listed(value: Any) -> Any:
 
 
 def _from_list(key: str, value: Any) -> Any:
-    """Return what `_listed` was given."""
+    """Return the value that `_listed` converted."""
     if key == "worn":
         return Worn(*value)
     return tuple(value) if isinstance(value, list) else value

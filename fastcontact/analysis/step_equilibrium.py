@@ -25,7 +25,7 @@ class StepEquilibrium:
     balance : Balance
     terms : Terms
     newton : list of dict
-        An entry for each iteration, where tangents change.
+        An entry for each iteration, if tangents vary.
     """
 
     settled: SettledContact | None
@@ -36,17 +36,17 @@ class StepEquilibrium:
 
     @property
     def bodies(self) -> DeformedBodies | None:
-        """The bodies, where they are nonlinear."""
+        """The bodies, if they are nonlinear."""
         return None if self.terms.bodies is None else self.terms.bodies.at(self.u)
 
     @property
     def history(self) -> list[dict[str, Any]]:
-        """Geometry updates of the contact, an entry each."""
+        """An entry for each geometry update of the contact."""
         return self.settled.iterate.history if self.settled is not None else []
 
     @property
     def counts(self) -> dict[str, Any]:
-        """Of nonlinear bodies their history, with the pairings and active-set iterations of all iterations."""
+        """Iteration history of nonlinear bodies, with the pairings and active-set iterations of all iterations."""
         if self.terms.prepared:
             return {}
         names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}

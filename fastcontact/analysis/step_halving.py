@@ -1,6 +1,6 @@
 """Bisection of load steps that do not converge, or whose nodes slide too far while they touch.
 
-A step that is cut leaves the state unchanged.
+A step that is halved leaves the state unchanged.
 
 Parts of steps of nonlinear bodies keep the size of the last one, and double after one that took few iterations.
 """
@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastcontact.analysis.convergence_messages import limit_load
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -20,22 +21,22 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.results.step import StepResult
 
 log = logging.getLogger("fastcontact")
-# Called with the number of a step, and the instants between which it does not converge and is cut in halves.
+# Called with the number of a step, and the instants between which it does not converge and is halved.
 listeners: list[Callable[[int, float, float], None]] = []
-# Newton iterations after which the next part of a step is twice as large.
+# Number of Newton iterations up to which the next substep is twice as large.
 FEW = 6
 
 
 def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
-    """Compute the step `index` from instant `begin` to `end`, in halves of halves where it needs them.
+    """Compute the step `index` from instant `begin` to `end`, recursively halved where necessary.
 
-    Parts of the step are steps of their own: friction slides along their path. The result is that at `end`, with the
-    iterations and the dissipation of all parts; ``iterations["substeps"]`` lists the instants of their ends where it was cut.
+    Substeps are complete load steps: friction slides along their path. The result is that at `end`, with the iterations
+    and the dissipation of all substeps; if there are several, ``iterations["substeps"]`` lists the instants of their ends.
 
     Raises
     ------
     ConvergenceError
-        If a part that was halved `Criteria.max_halvings` times does not converge, or one that no halving can help.
+        If a substep does not converge after `Criteria.max_halvings` halvings, or halving cannot help.
     """
     state, parts = _parts(problem, state, index, (begin, end), 0)
     return state, _joined(parts)
@@ -60,7 +61,8 @@ def _parts(
             part = (
                 f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
             )
-            final = ConvergenceError(f"{error} ({part})", error.history, smaller_steps_help=False)
+            limit = limit_load(problem, state)
+            final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
             # As raised where it was found: the same words twice, in two tracebacks, would tell nothing more.
             raise final.with_traceback(error.__traceback__) from None
         reason = str(error).split(". ")[0]
@@ -81,7 +83,7 @@ def _both(
 
 
 def _slides_while_touching(problem: Problem, state: State, after: State) -> bool:
-    """Return whether nodes of nonlinear bodies that close in a step do more of the work of friction than is allowed."""
+    """Return whether nodes of nonlinear bodies that close in a step do too large a part of the frictional work."""
     allowed = problem.criteria.friction_while_touching
     if allowed is None or problem.bodies is None or state.work is None or after.work is None:
         return False
@@ -89,7 +91,7 @@ def _slides_while_touching(problem: Problem, state: State, after: State) -> bool
 
 
 def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> State:
-    """Return the state with how small the next part of a step shall be at least."""
+    """Return the state with the minimum number of halvings of the next step."""
     if problem.bodies is None:
         return state
     few = len(result.iterations["history"]) <= FEW
@@ -97,7 +99,7 @@ def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> S
 
 
 def _joined(parts: list[StepResult]) -> StepResult:
-    """Return the last part with the sums over all parts."""
+    """Return the last substep with the sums over all substeps."""
     end = parts[-1]
     if len(parts) == 1:
         return end

@@ -27,11 +27,11 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
     ----------
     problem : Problem
     start : State
-        At the beginning of the step.
+        State at the beginning of the step.
     load : StepLoad
     settled : SettledContact
     end : State
-        At the end of the step, its displacements known.
+        State at the end of the step, with its displacements.
     """
     return replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
@@ -46,9 +46,9 @@ def keep_path(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
     energy: tuple[float, float],
 ) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
-    """Return the state at the end of a step with slip, wear and work so far, and the results of contact pairs with them.
+    """Return the state at the end of a step with accumulated slip, wear and work, and the contact results with these.
 
-    `energy` is that of deformation, elastic and plastic [energy].
+    `energy` are the elastic strain energy and the plastic work [energy].
     """
     displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
@@ -76,9 +76,9 @@ def keep_path(
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
-    """Return by contact pair in space where the bodies meet first [length], and the normal there.
+    """Return the point of first contact [length] of each contact pair in space, and the normal there.
 
-    Once they have met it stays; until then it is where they would meet now, with obstacles and clearances as they are.
+    It is fixed once the bodies have met; before, it is the closest point for the current obstacles and clearances.
     """
     if problem.model.mesh.dim == 2:
         return {}
@@ -96,25 +96,25 @@ def never_opening(problem: Problem, start: State, settled: SettledContact) -> di
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
             constraints, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
-            if constraints.equality is not None:  # what stands beside the other side now may come back to it
+            if constraints.equality is not None:  # points beside the other side may return to it
                 closed |= constraints.equality
             positions[name] = constraints.positions, closed
     return positions
 
 
 def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return, for pairs whose sticking constraints give way, their positions and by how much they do, as `State` keeps it."""
+    """Return the positions and elastic slips of pairs with tangential compliance, see `State.elastic_slip`."""
     given, solution = {}, settled.solution
     for name, rows in settled.constraints.rows().items():
         constraints = settled.constraints.parts[name]
-        gives = constraints.compliance is not None or constraints.tangential_softness is not None
-        if gives and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
+        compliant = constraints.compliance is not None or constraints.tangential_softness is not None
+        if compliant and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
             slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
             given[name] = constraints.positions, slips
     return given
 
 
 def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:
-    """Return by contact pair what cohesive layers are like at displacements u (n_dofs,) [length]."""
+    """Return the state of the cohesive layer of each contact pair at displacements u (n_dofs,) [length]."""
     parts = settled.constraints.parts.items()
     return {name: part.tied.after(part, u) for name, part in parts if isinstance(part.tied, Layer)}

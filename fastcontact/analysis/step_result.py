@@ -33,7 +33,7 @@ def recover(
     ----------
     problem : Problem
     end : State
-        At the end of the step.
+        State at the end of the step.
     contact : dict of str to ContactResult
     reaction : ndarray (n_dofs of the mesh,)
         [force]
@@ -42,11 +42,11 @@ def recover(
     instant : (int, float)
         Number of the step, and its pseudo-time.
     bodies : DeformedBodies, optional
-        Where they are nonlinear.
+        The bodies, if they are nonlinear.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     temperature, initial = (
-        problem.factors(own, instant[1]) for own in (problem.model.temperatures, problem.model.initial_states)
+        problem.factors(load, instant[1]) for load in (problem.model.temperatures, problem.model.initial_states)
     )
     pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
@@ -54,7 +54,7 @@ def recover(
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
     sections = problem.model.pretensions
     if sections:
-        pulls = [multiplier(own.ramp, problem.ramp, instant[1]) for own in sections]
+        pulls = [multiplier(load.ramp, problem.ramp, instant[1]) for load in sections]
         pretension = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
         iterations = {**iterations, "pretension": pretension}
     if bodies is None:
@@ -87,7 +87,7 @@ def contact_results(
     load : StepLoad
     settled : SettledContact
     end : State
-        At the end of the step; of it the displacements and the places of first contact are needed.
+        State at the end of the step, of which displacements and points of first contact are used.
     """
     displacement = problem.displacement(end.u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement

@@ -1,9 +1,9 @@
-"""A posteriori measure of locking: stresses of linear elements against recovered, continuous ones.
+"""A posteriori measure of locking: stresses of linear elements compared with recovered, continuous ones.
 
-The energy of the difference, over that of the solution, estimates the error (Zienkiewicz and Zhu, Int. J. Numer.
-Meth. Engng 24, 1987). Where cells are nearly incompressible the mean stress alone tells: the deviator stays smooth, while the
-mean stress, and with it the pressure of a contact, alternates from cell to cell (Hughes, The finite element method, 1987,
-section 4.3.7).
+The energy of the difference, relative to that of the solution, estimates the error (Zienkiewicz and Zhu, Int. J. Numer.
+Meth. Engng 24, 1987). In nearly incompressible cells only the mean stress is used: the deviator stays smooth, while the mean
+stress, and with it the contact pressure, alternates from cell to cell (Hughes, The finite element method, 1987, section
+4.3.7).
 """
 
 from __future__ import annotations
@@ -22,15 +22,16 @@ from fastcontact.mesh import elements
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Poisson's ratio from which on the mean stress is looked at. Under a ball it scatters by 14 to 23 % at nu = 0.3, where the
-# pressure is right, by 38 to 47 % at 0.45 and by 66 to 75 % at 0.48, where the pole's is 15 to 27 % and 27 to 43 % off.
+# Poisson's ratio above which the mean stress is examined. Under a ball it scatters by 14 to 23 % at nu = 0.3, where the
+# pressure is accurate, by 38 to 47 % at 0.45 and by 66 to 75 % at 0.48, where the pressure at the pole is off by 15 to
+# 27 % and 27 to 43 %.
 SUSPICIOUS, ALTERNATING = 0.45, 0.3
-# Error of the energy norm that is worth a warning: 25 % under the same ball on coarse triangles, 52 to 67 % in thin parts
-# that carry a third of what they should where they bend.
+# Error in the energy norm above which a warning is given: 25 % under the same ball on coarse triangles, 52 to 67 % in thin
+# parts that carry a third of the exact load in bending.
 BENDING = 0.45
-# Elements whose only dilatation is one condition too many of each cell.
+# Elements that are over-constrained by one dilatation per cell.
 SIMPLICES = ("tri3", "tet4")
-# Cells at a time.
+# Number of cells processed at a time.
 BATCH = 50_000
 
 
@@ -45,11 +46,11 @@ class StressScatter:
     Attributes
     ----------
     elements : list of str
-        Of first order, those with incompatible modes left out; there may be none.
+        Elements of first order without incompatible modes; may be empty.
     energy : float
-        Energy norm of recovered stress less stress, over that of the stress [-].
+        Energy norm of the recovered stress minus the stress, over that of the stress [-].
     pressure : float
-        The same of the mean stress alone, in the square mean, in nearly incompressible triangles and tetrahedra [-].
+        The same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra [-].
     nu : float
         The largest Poisson's ratio of these [-].
     """
@@ -68,7 +69,7 @@ class StressScatter:
         self.nu = float(nu.max(initial=-1.0))
         heat, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
         offset = problem.model.stress_offset(heat, initial, field, step.temperature)
-        if not self.elements or offset is not None:  # what heat strains freely has stresses of round-off alone
+        if not self.elements or offset is not None:  # free thermal expansion only causes round-off stresses
             return
         given = mesh, problem.model.kinematics, field
         smooth = smoothed_stress(*given, step.displacement, offset)
@@ -79,7 +80,7 @@ class StressScatter:
         strain = np.abs(step.displacement).max() / size.max()
         stretched = strain * np.sqrt(
             field.moduli.max() * np.prod(size)
-        )  # the root of an energy, as if all were strained
+        )  # root of an energy, as if all cells were strained
         if energy > LENGTH_ROUND_OFF * stretched:
             self.energy = float(off / energy)
             self.pressure = float(off_mean / mean) if mean > 0.0 else 0.0
@@ -105,7 +106,7 @@ class StressScatter:
 
 
 def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult) -> list[str]:
-    """Return a warning where the mean stress of nonlinear triangles and tetrahedra that keep their volume alternates."""
+    """Return a warning where the mean stress of nearly incompressible nonlinear triangles and tetrahedra alternates."""
     mesh, bodies = problem.model.mesh, problem.bodies
     names = [name for name in SIMPLICES if name in mesh.solids]
     nearly = problem.field.averaged & (problem.model.kinematics != "plane_stress")
@@ -129,7 +130,7 @@ def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult)
 
 
 def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
-    """Return a warning where the stresses of linear cells are far from recovered ones."""
+    """Return a warning where the stresses of linear cells differ much from recovered ones."""
     measure = StressScatter(problem, step)
     names = " and ".join(measure.elements)
     if measure.pressure > ALTERNATING:
@@ -140,7 +141,7 @@ def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
         ]
     if (
         measure.energy > BENDING and problem.model.kinematics != "axisymmetric"
-    ):  # where cells at the axis scatter by as much
+    ):  # cells at the axis scatter by this amount anyway
         return [
             f"{names} cells are too stiff, as where thin parts bend: their stress is off by {measure.energy:.0%} (energy "
             "norm of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "

@@ -21,8 +21,9 @@ from fastcontact.results.step import StepResult
 def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     """Return the resultant support force of each group with supports.
 
-    Unlike `StepResult.reaction`, it excludes the forces of multi-point constraints and of springs to the ground. A component
-    that several groups support at a node is counted for the first of them, so that the sum over the groups is complete.
+    Unlike `StepResult.reaction`, it excludes the forces of multi-point constraints and of springs to the ground. A
+    component that several groups support at a node is assigned to the first of them, so that the sum over the groups
+    is complete.
 
     Parameters
     ----------
@@ -58,7 +59,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
-    rows += [section.row(n) for section in model.pretensions]  # which may be locked
+    rows += [section.row(n) for section in model.pretensions]  # possibly locked
     forces = multipliers(reaction, rows, held.ravel())
     reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
@@ -74,9 +75,10 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
-    """Return the forces (m,) of relations with rows (m, n_dofs), found where no support acts [force].
+    """Return the forces (m,) of constraints with rows (m, n_dofs), from components without supports [force].
 
-    `reaction` (n_dofs,) are those of supports and relations [force]; `held` (n_dofs,) is where supports act.
+    `reaction` (n_dofs,) are the forces of supports and constraints [force]; `held` (n_dofs,) are the components with
+    supports.
     """
     if not rows:
         return []
@@ -87,7 +89,7 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[
 
 @typed(ModelError)
 def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the tension (m,) in springs by name, such as ``"spring on 'TOP'"`` [force].
+    """Return the tensions (m,) of the springs by name, such as ``"spring on 'TOP'"`` [force].
 
     Parameters
     ----------
@@ -138,12 +140,12 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     """
     steps = list(steps)
     names = list(dict.fromkeys(name for step in steps for name in step.pretension))
-    asked = [(name, kind) for name in names for kind in ("force", "shortening")]
+    columns_of = [(name, kind) for name in names for kind in ("force", "shortening")]
     rows = [
-        (step.index, step.load_factor, *(step.pretension.get(name, {}).get(kind, np.nan) for name, kind in asked))
+        (step.index, step.load_factor, *(step.pretension.get(name, {}).get(kind, np.nan) for name, kind in columns_of))
         for step in steps
     ]
-    columns = [(f"{name}_{kind}", float) for name, kind in asked]
+    columns = [(f"{name}_{kind}", float) for name, kind in columns_of]
     return np.array(rows, [("step", int), ("load_factor", float), *columns])
 
 

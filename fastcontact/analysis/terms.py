@@ -1,11 +1,11 @@
-r"""Terms of the equilibrium: what acts on the nodes by their displacements, each with its forces, tangent and history.
+r"""Terms of the equilibrium: nodal forces that depend on the displacements, each with its tangent and history.
 
 With the nodal forces :math:`f_i` of the terms, external forces and contact, a load step solves
 
 .. math:: \sum_i f_i(u) = f_{ext} + B(u)^T \lambda
 
-by the iterations of `newton`, for which a tangent that stays as it was prepared costs nothing. Contact is linearised with
-its inequalities, see `geometry_loop`; what it adds to the forces of terms, where fluid follows the surface, is `Fluid`.
+by the iterations of `newton`, in which a constant tangent costs nothing. Contact is linearised with its inequalities, see
+`geometry_loop`; fluid pressure that follows the surface adds the term `Fluid`.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ class Term(Protocol):
     """A part of the equilibrium of a load step; u (n_dofs,) are the displacements of all components [length]."""
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
-        """Return the nodal forces (n_dofs,) that hold the term at u [force], and its energies."""
+        """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
         ...
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
-        """Return the derivative of the forces (n, n), of components of the mesh [force / length]; None: as prepared.
+        """Return the derivative of the forces (n, n), for components of the mesh [force / length]; None: as prepared.
 
-        The caller may take it apart. How much `geometric` stiffness bodies have says `NonlinearBodies.at`.
+        The caller may modify it. For the part of the `geometric` stiffness see `NonlinearBodies.at`.
         """
         ...
 
@@ -76,7 +76,7 @@ class LinearBodies(_WithoutHistory):
 class Bodies:
     """Nonlinear bodies in a load step that begins at `start`.
 
-    Forces and tangent come from one loop over the cells: of the last two displacements these are kept.
+    Forces and tangent are computed in one loop over the cells, and cached for the last two displacements.
     """
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
@@ -85,12 +85,12 @@ class Bodies:
         self._taken: Array | None = None
 
     def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
-        """Return the bodies at u; whether their tangent is expected to be needed says `tangent`.
+        """Return the bodies at u; `tangent` is False if their tangent will probably not be needed.
 
         Raises
         ------
         ConvergenceError
-            If a cell turns inside out.
+            If a cell is inverted.
         """
         for known, bodies in self._kept:
             if known is u:
@@ -126,9 +126,9 @@ class SpringForces(_WithoutHistory):
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force, own = np.zeros_like(u), u[: self._n]
-        force[: self._n] = spring_force(self._springs, own)
-        return force, (0.5 * float(force[: self._n] @ own), 0.0)
+        force, of_points = np.zeros_like(u), u[: self._n]
+        force[: self._n] = spring_force(self._springs, of_points)
+        return force, (0.5 * float(force[: self._n] @ of_points), 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""
@@ -136,7 +136,7 @@ class SpringForces(_WithoutHistory):
 
 
 class FollowerLoad(_WithoutHistory):
-    """By how much a pressure that follows the surface pushes less than on the undeformed one, which external forces hold."""
+    """Force of a pressure on the undeformed surface, which is in the external forces, minus that on the deformed one."""
 
     def __init__(self, problem: Problem, pressure: FollowingPressure, factor: float) -> None:
         self._problem, self._pressure, self._factor = problem, pressure, factor
@@ -154,7 +154,7 @@ class FollowerLoad(_WithoutHistory):
 
 
 class Fluid(_WithoutHistory):
-    """By how much fluid in contact pushes less than at the displacements `at` (n_dofs,) where contact was linearised."""
+    """Fluid force at the displacements `at` (n_dofs,), where contact was linearised, minus the current one."""
 
     def __init__(self, problem: Problem, wetted: Wetted, at: Array) -> None:
         self._problem, self._wetted = problem, wetted
@@ -178,13 +178,13 @@ class Terms:
     ----------
     problem : Problem
     start : State
-        At the beginning of the step.
+        State at the beginning of the step.
     load : StepLoad
 
     Attributes
     ----------
     bodies : Bodies, optional
-        Where they are nonlinear.
+        The bodies, if they are nonlinear.
     """
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
@@ -198,7 +198,7 @@ class Terms:
 
     @property
     def prepared(self) -> bool:
-        """Whether all tangents are as they were prepared, at any displacement."""
+        """Whether all tangents are the prepared ones at any displacement."""
         return self.bodies is None
 
     def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
@@ -210,7 +210,7 @@ class Terms:
         return force, energy
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
-        """See `Term`; only where tangents change."""
+        """See `Term`; only if tangents vary."""
         assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)
         for term in self._parts[1:]:

@@ -1,8 +1,8 @@
-"""Heat and contact in turn: temperatures expand bodies, whose contact conducts by its pressures and gaps, until both settle.
+"""Staggered solution of heat conduction and contact, coupled by thermal expansion and contact conductance.
 
-Each exchange solves the equilibrium at given temperatures, then the temperatures at the conductances of its contact; the
-temperatures are mixed (Anderson). Where they depend neither on the contact nor on finite strains, they are solved once,
-before it.
+Each exchange solves the equilibrium at given temperatures, then the temperatures with the conductances of its contact; the
+temperatures are accelerated (Anderson). Where they depend neither on the contact nor on finite strains, they are solved once,
+before the contact.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.balance import Balance
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Temperatures
@@ -34,9 +34,9 @@ from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
-# Exchanges after which heat and contact have no common solution that this finds, and temperatures that are mixed.
-MOST_EXCHANGES, MIXED = 60, 8
-# Linear solutions leave temperatures to this many times their tolerance.
+# Largest number of exchanges.
+MOST_EXCHANGES = 60
+# Accuracy of temperatures over the tolerance of linear solutions.
 SETTLED = 10.0
 
 
@@ -46,7 +46,7 @@ class Heated(Temperatures):
 
     fluxes: dict[str, Array]
 
-    def told(self, problem: Problem, step: StepResult) -> StepResult:
+    def completed(self, problem: Problem, step: StepResult) -> StepResult:
         """Return the result of a load step with its heat."""
         assert problem.heat is not None
         flux = problem.heat.conductors(step.displacement).flux(self.rise)
@@ -61,7 +61,7 @@ class Heated(Temperatures):
 
 
 def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
-    """Return the rise of the temperature (n_points,) to begin a load step with [temperature]; None without heat."""
+    """Return the initial temperature rise (n_points,) of a load step [temperature]; None without heat."""
     if problem.heat is None:
         return None
     if not problem.heat.depends_on_equilibrium:
@@ -79,24 +79,24 @@ def settle_heat(
     ----------
     problem : Problem
     start : State
-        At the beginning of the step.
+        State at the beginning of the step.
     load : StepLoad
-        At its end, without what heat expands.
+        Load at its end, without thermal expansion.
     instant : float
-        Of its end.
+        Instant of its end.
     rise : ndarray (n_points,)
-        Of the temperature, to begin with [temperature].
+        Initial temperature rise [temperature].
     equilibrium : StepEquilibrium
-        At that temperature.
+        Equilibrium at that temperature.
     solve : callable
-        From a load and the equilibrium before to the next one.
+        Function of a load and the last equilibrium that returns the next one.
 
     Raises
     ------
     ConvergenceError
-        If temperatures and contact do not settle.
+        If temperatures and contact do not converge.
     """
-    heat, mixing = problem.heat, Anderson(MIXED, np.arange(len(rise)))
+    heat, mixing = problem.heat, Anderson(DEPTH, np.arange(len(rise)))
     assert heat is not None
     enough = max(problem.criteria.geometry, SETTLED * heat.linear_tolerance)
     change = np.inf
@@ -117,13 +117,13 @@ def settle_heat(
 
 
 def _pushes_little(problem: Problem, rise: Array, balance: Balance, enough: float) -> bool:
-    """Whether the expansion by a rise of the temperature (n_points,) pushes by next to nothing [temperature]."""
+    """Return whether the thermal forces of a temperature rise (n_points,) [temperature] are negligible."""
     forces = problem.model.expansion_forces(problem.field, rise)
     return largest(forces.ravel()) <= max(enough * balance.largest, balance.noise)
 
 
 def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
-    """Return a load with a rise of the temperature (n_points,) [temperature]; on linear bodies with its forces."""
+    """Return a load with a temperature rise (n_points,) [temperature]; for linear bodies including its forces."""
     if rise is None or not problem.model.expands:
         return load
     load = replace(load, rise=rise)
@@ -131,7 +131,7 @@ def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
 
 
 def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
-    """Return a load whose rise of the temperature is in its forces, those by which it would expand linear bodies."""
+    """Return a load in which the temperature rise is replaced by the forces of thermal expansion of linear bodies."""
     if load.rise is None:
         return load
     forces = problem.model.expansion_forces(problem.field, load.rise).ravel()
@@ -139,7 +139,7 @@ def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
 
 
 def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium) -> Heated:
-    """Return the temperatures at the conductances of the contact."""
+    """Return the temperatures with the conductances of the contact."""
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
     assert heat is not None
@@ -156,30 +156,30 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         at = problem.configuration(name, start, load, displacement, u)
         constraints, force, gap = _pressed(problem, settled, name, rows, at)
         assert constraints.nodal is not None
-        own = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
-        grown = np.ones(n)  # areas of the deformed surface over those of constraints
+        link = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
+        grown = np.ones(n)  # area ratio of the deformed surface and of the constraints
         if heat.finite:
             before, after = areas(pair, displacement)
             grown[pair.secondary.points] = after / before
-            own = replace(own, area=own.area * (own.secondary @ grown))
+            link = replace(link, area=link.area * (link.secondary @ grown))
         if law is not None:
-            h, facing = np.zeros(len(gap)), own.area > 0.0
-            h[facing] = law(force[facing] / own.area[facing], gap[facing])
+            h, facing = np.zeros(len(gap)), link.area > 0.0
+            h[facing] = law(force[facing] / link.area[facing], gap[facing])
             obstacle_rise = 0.0
             if pair.options.obstacle_temperature is None:
-                matrix = csr_array(matrix + own.matrix(h))
+                matrix = csr_array(matrix + link.matrix(h))
             else:
                 obstacle_rise = pair.options.obstacle_temperature - problem.model.reference_temperature
                 obstacles, given = (
-                    csr_array(obstacles + own.matrix(h)),
-                    given + own.secondary.T @ (h * own.area * obstacle_rise),
+                    csr_array(obstacles + link.matrix(h)),
+                    given + link.secondary.T @ (h * link.area * obstacle_rise),
                 )
-            crossings[name] = own, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
+            crossings[name] = link, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
         if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
-            rubbed += own.shared(pair.options.friction_heat * work / (instant - start.instant))
+            rubbed += link.shared(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, rubbed, (obstacles, given))
-    powers = {name: h * own.area * (own.jump @ steady.rise - at) for name, (own, _, h, at, _) in crossings.items()}
+    powers = {name: h * link.area * (link.jump @ steady.rise - at) for name, (link, _, h, at, _) in crossings.items()}
     fluxes = {name: crossings[name][1].over_whole_side(power) / crossings[name][4] for name, power in powers.items()}
     balance = {**steady.balance, "contacts": {name: float(power.sum()) for name, power in powers.items()}}
     return Heated(steady.rise, steady.reaction, balance, fluxes)
@@ -188,7 +188,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
 def _pressed(
     problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration
 ) -> tuple[Constraints, Array, Array]:
-    """Return the places where a pair touches, normal forces (m,) there [force] and gaps (m,), zero where it does [length]."""
+    """Return the constraints of a pair, their normal forces (m,) [force] and gaps (m,), zero where closed [length]."""
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
     touching = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
     forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)
@@ -202,7 +202,7 @@ def _pressed(
     gap = np.maximum(constraints.gaps(at.displacement), 0.0)
     if wet is not None:
         closed = closed & ~wet.rows
-    elif isinstance(layer, Layer):  # adhesion is closed up to its strength, a cohesive layer until it is broken
+    elif isinstance(layer, Layer):  # adhesion conducts up to its strength, a cohesive layer until it is broken
         closed = layer.damage == 0.0 if layer.law.reversible else layer.damage < 1.0
     elif pair.options.gap_only:
         closed, forces = np.zeros(len(gap), bool), np.zeros(len(gap))

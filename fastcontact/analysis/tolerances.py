@@ -6,19 +6,13 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.linear.protocol import LinearSolver
 
-# Relative residual of the first solution of a step by an iterative solver, and of later ones in units of the relative
-# change of the displacement and of the last residual: more accuracy than the pairing itself has is lost.
+# Relative residual of the first solution of a step by an iterative solver, and of later ones relative to the last change of
+# the displacement and to the last residual: more accuracy than that of the pairing is useless.
 FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
-# With friction the residual falls at least to this part of the last one, unless that of the friction law did not fall to
-# CONTRACTS of its last one so many times: loose solutions may be what keeps it.
-LEAST_FALL, CONTRACTS, STILL = 0.2, 0.7, 2
+# With friction the residual falls at least to this part of the last one: loose solutions may be what keeps that of its law.
+LEAST_FALL = 0.2
 # Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
-# Pairings after which errors of whole solutions are taken for what they are.
-PATIENT_UPDATES = 25
-# Changes of the displacement, in units of an iterative solver's tolerance, that its solutions alone may make beside what is
-# much stiffer.
-LEFT = 1e3
 
 
 class Tolerances:
@@ -31,9 +25,9 @@ class Tolerances:
     begin_inexact : bool
         Whether the first solutions may have a larger residual than the last one.
     round_off : float
-        Gaps are no more accurate than this [length].
+        Accuracy of gaps [length].
     expected : float
-        Displacement to expect in the first step, if forces alone act [length].
+        Expected displacement in the first step, if only forces act [length].
     """
 
     def __init__(
@@ -41,24 +35,22 @@ class Tolerances:
     ) -> None:
         self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
         self._residual = max(solver.tolerance, FIRST_RESIDUAL) if begin_inexact else solver.tolerance
-        self._law_residual, self._still = 1.0, 0
 
     @property
     def inexact(self) -> bool:
-        """Whether a solution to the present residual is not the last one of a step."""
+        """Whether a solution to the current residual cannot be the last one of a step."""
         return self._solver.iterative and self._residual > self._solver.tolerance
 
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
         """Lower the residual to the forcing term of the last relative change of the displacement.
 
-        Where the friction law is off by more (`law_residual`, over the largest force) and Newton's method goes down, to what
-        that is worth: its next step is no more accurate.
+        Where the friction law is off by more (`law_residual`, over the largest force), to what that is worth: the next step
+        of Newton's method is no more accurate.
         """
         worth = RESIDUAL * min(self._residual, relative_change)
-        self._still = 0 if law_residual < CONTRACTS * self._law_residual else self._still + 1
-        if self._still < STILL and RESIDUAL * law_residual > worth:
+        if RESIDUAL * law_residual > worth:
             worth = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
-        self._residual, self._law_residual = max(self._solver.tolerance, worth), law_residual
+        self._residual = max(self._solver.tolerance, worth)
 
     def accuracy(self, scale: float, single_iteration: bool) -> Accuracy:
         """Return the accuracy of a solution.
@@ -80,15 +72,8 @@ class Tolerances:
             max_newton_steps=1 if limit == 1 else INEXACT_NEWTON_STEPS if self.inexact else None,
         )
 
-    def noise(self, size: float) -> float:
-        """Return which changes of the displacement, whose size is given, linear solutions alone may make [length]."""
-        return LEFT * self._solver.tolerance * size if self._solver.iterative else 0.0
-
-    def enough(self, update: int, size: float) -> float:
+    def enough(self, size: float) -> float:
         """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
         # Iterative solvers leave a noise of their tolerance, times the contrast of cells; asking for less would never end.
         least = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
-        accuracy = max(self._criteria.geometry, least)
-        if update >= PATIENT_UPDATES:
-            accuracy = max(accuracy, self._solver.error)
-        return max(accuracy * size, self._round_off)
+        return max(max(self._criteria.geometry, least) * size, self._round_off)

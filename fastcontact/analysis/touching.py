@@ -21,15 +21,15 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Increments of a step at most.
+# Largest number of increments of a step.
 MOST = 128
 
 
 def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
     """Return the contact of a step whose friction is solved in increments, where its nodes slide while they close.
 
-    Increments are solved with the geometry that has settled without them. Where they do not converge the step is left as it
-    is. `expected` is that of `settle_geometry`.
+    Increments are solved with the geometry converged without them. If they do not converge the step is left unchanged.
+    `expected` is that of `settle_geometry`.
     """
     nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
     path = _path(step, settled, nodes)
@@ -48,7 +48,7 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
             return settled
         begun.u = step.dofs.put(begun.u, there)
         along = settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
-        if not Plan.of(step.problem).until_settled:  # their number is given
+        if not Plan.of(step.problem).until_settled:  # fixed number of updates
             del begun.history[: len(old.history)]
         return along
     except ConvergenceError as error:
@@ -57,7 +57,7 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
 
 
 def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None) -> Path | None:
-    """Return the path of a step, None where it makes no difference."""
+    """Return the path of a step, None where it has no effect."""
     constraints, solution = settled.constraints, settled.solution
     allowed = step.problem.criteria.friction_while_touching
     if allowed is None or allowed >= 1.0 or not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
@@ -98,9 +98,9 @@ def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> 
 
 
 def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, Array] | None:
-    """Return normal (m,) and tangential (m, dim) forces at the beginning of the step [force]; None where nobody knows.
+    """Return normal (m,) and tangential (m, dim) forces at the beginning of the step [force]; None if unknown.
 
-    Those of equations make no difference.
+    Forces of equations are not needed.
     """
     normal, traction = np.zeros(len(constraints)), np.zeros_like(constraints.positions)
     for name, rows in constraints.rows().items():
@@ -115,7 +115,7 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
 
 
 def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) -> Array:
-    """Return the gaps (m,) at the beginning of the step, where the sides stood then [length]."""
+    """Return the gaps (m,) at the beginning of the step, in the configuration of that time [length]."""
     state = step.state
     begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
     there = pair_surfaces(step.problem, state, begin, Iterate.of(state))

@@ -13,18 +13,17 @@ from fastcontact.results.step import ContactResult, half_width
 
 
 def on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
-    """Return a contact result with tractions and widths of the deformed shape (Cauchy's in place of nominal ones).
+    """Return a contact result with Cauchy instead of nominal tractions, and widths in the deformed configuration.
 
-    Tractions keep the force of each node's share of the surface (Nanson's formula, lumped: Bonet and Wood, 2008, equation
-    4.68).
+    The force of each node is preserved (lumped form of Nanson's formula: Bonet and Wood, 2008, equation 4.68).
 
     Parameters
     ----------
     pair : Formulation
     contact : ContactResult
-        Per reference area.
+        Result per reference area.
     displacement : ndarray (n_points, dim)
-        Of the mesh [length].
+        Displacement of the mesh [length].
     """
     before, after = areas(pair, displacement)
     ratio, stretch = before / after, _stretch(contact, displacement[contact.points], before, after)
@@ -35,16 +34,16 @@ def on_deformed_surface(pair: Formulation, contact: ContactResult, displacement:
 
 
 def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
-    """Return each secondary node's share (n_nodes,) of the surface before and after a displacement (n_points, dim) [area]."""
+    """Return the tributary areas (n_nodes,) of secondary nodes before and after a displacement (n_points, dim) [area]."""
     places = pair.points, pair.points + displacement
     before, after = (lumped_areas(pair.secondary, points, pair.axisymmetric) for points in places)
     return before, after
 
 
 def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
-    """Return how much both ends of the bracket of the contact width have grown [-].
+    """Return the stretch of both bounds of the contact width [-].
 
-    In space as the square root of the closed area does.
+    In space it is the square root of the area ratio of the closed nodes.
     """
     if not contact.active.any():
         return 1.0, 1.0

@@ -1,17 +1,17 @@
-"""Volumetric locking: a lower bound of the excess stiffness, from the solution itself.
+"""Volumetric locking: a lower bound of the excess stiffness, computed from the solution.
 
-Let S be the stiffness that a reference without locking does not have: K is the stiffness of the model, K - S that of the
-reference. For the forces of the solution u, the potential energy of the reference is lower than that of the model by
+Let K be the stiffness of the model, K - S that of a reference without locking, and S the excess. For the forces of the
+solution u, the potential energy of the reference is lower than that of the model by
 
     D = u.S u / 2 + max over x of (x.S u - x.(K - S) x / 2),
 
-and D over the elastic energy u.K u / 2 is the part by which the reference yields more under the same forces: the excess of
-stiffness where forces act, and less than the excess where displacements are prescribed. A few conjugate gradients, with K^-1
-as preconditioner, approach the maximum from below. The contact forces stay as they are.
+and D over the elastic energy u.K u / 2 is the additional compliance of the reference under the same forces: the excess of
+stiffness where forces act, and less than the excess where displacements are prescribed. A few conjugate gradient iterations,
+preconditioned by K^-1, approach the maximum from below. The contact forces are fixed.
 
-The reference takes the projected dilatation of `elasticity.dilatation`; in linear triangles, tetrahedra, wedges and pyramids,
-which lock with it or have none, the mean dilatation of the cells at each node (Bonet and Burton, Commun. Numer. Meth. Engng
-14, 1998).
+The reference uses the projected dilatation of `elasticity.dilatation`; in linear triangles, tetrahedra, wedges and pyramids,
+which lock with it or have none, it uses the mean dilatation of the cells at each node (Bonet and Burton, Commun. Numer. Meth.
+Engng 14, 1998).
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from fastcontact.mesh import elements
 from fastcontact.model.model import Model
 from fastcontact.round_off import ROUND_OFF
 
-# The excess of stiffness that is worth a warning, and the number of conjugate gradients.
+# Excess of stiffness above which a warning is given, and the number of conjugate gradient iterations.
 EXCESS, ITERATIONS = 0.05, 5
 # Elements whose dilatation is averaged at the nodes for comparison.
 AT_NODES = ("tri3", "tet4", "wedge6", "pyramid5")
 
 
 class Comparison:
-    """The forces S u of the stiffness that the reference does not have; see the module.
+    """The forces S u of the excess stiffness; see the module.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ class Comparison:
     Attributes
     ----------
     elements : list of str
-        Those that may lock; there may be none.
+        Elements that may lock; may be empty.
     nu : float
-        The largest Poisson's ratio of theirs [-].
+        The largest Poisson's ratio of these elements [-].
     """
 
     def __init__(self, model: Model) -> None:
@@ -136,7 +136,7 @@ def excess_of_stiffness(problem: Problem, u: Array, comparison: Comparison) -> f
         lower += 0.5 * slope**2 / curvature
         residual = residual - slope / curvature * product
         before = slope
-    problem.solver.put_back(kept)  # these loads are none of the analysis
+    problem.solver.put_back(kept)  # discards these loads, which do not belong to the analysis
     return lower / energy if energy > 0.0 else 0.0
 
 

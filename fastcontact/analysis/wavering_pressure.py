@@ -1,4 +1,4 @@
-"""A warning about nodal pressures that go up and down from node to node, as on triangles that are much deeper than wide."""
+"""A warning about nodal pressures that oscillate from node to node, as on triangles that are much deeper than wide."""
 
 from __future__ import annotations
 
@@ -9,31 +9,31 @@ import numpy as np
 from fastcontact.contact.formulations import Formulation
 from fastcontact.results.step import ContactResult
 
-# Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which pressures waver.
-# On rings of tri3 cells 4.6 times as deep as wide it is 0.30, and pressures are off by 0.16 to 0.27; on wider ones 0.16 (0.09
-# to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges, 0.10 to 0.12,
-# and under a hex8 sole that wears 0.22.
+# Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which a warning is
+# given. On rings of tri3 cells 4.6 times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones
+# 0.16 (0.09 to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges,
+# 0.10 to 0.12, and under a wearing hex8 sole 0.22.
 WAVERING = 0.25
-# Nodes that a median says something about.
+# Smallest number of nodes for which the median is meaningful.
 MANY = 10
 
 
 def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
-    """Yield a warning where pressures of nodes whose neighbours are all closed waver by much of their mean.
+    """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by much of their mean.
 
-    Sides that never part, or stick together, carry tension, too: their mean may be zero, or round-off, and says nothing.
+    Sides that never separate, or adhere, carry tension, too: their mean may be zero or round-off, and is not meaningful.
     """
     if pair.options.always_closed or pair.options.cohesion is not None:
         return
     neighbours = pair.secondary.beside
-    # A node is among its own neighbours here: so many less one are the others.
+    # A node is among its own neighbours here: the number of others is one less.
     others = np.asarray(neighbours.sum(axis=1)).ravel() - 1.0
     inside = contact.active & (neighbours @ ~contact.active == 0) & (others > 0)
     if inside.sum() < MANY:
         return
     pressure = contact.pressure[inside]
-    apart = pressure - ((neighbours @ contact.pressure)[inside] - pressure) / others[inside]
-    size, mean = float(np.median(np.abs(apart))), float(pressure.mean())
+    deviation = pressure - ((neighbours @ contact.pressure)[inside] - pressure) / others[inside]
+    size, mean = float(np.median(np.abs(deviation))), float(pressure.mean())
     if not size > WAVERING * mean > 0.0:
         return
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"

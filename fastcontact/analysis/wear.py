@@ -21,9 +21,9 @@ class Worn:
     Attributes
     ----------
     depth, pressure : ndarray (m,)
-        At the secondary nodes [length], and the pressure there [pressure].
+        Wear depth at the secondary nodes [length], and the pressure there [pressure].
     pace : float
-        The most that any step has worn off, by pressure [length / pressure].
+        The largest wear of any step over the pressure [length / pressure].
     """
 
     depth: Array
@@ -32,7 +32,7 @@ class Worn:
 
     @classmethod
     def nothing(cls, count: int) -> Worn:
-        """Return the beginning, for `count` nodes."""
+        """Return the initial state, for `count` nodes."""
         return cls(np.zeros(count), np.zeros(count))
 
     def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
@@ -46,19 +46,19 @@ class Worn:
 def worn_in_step(
     pair: Formulation, at: Configuration, contact: ContactResult, before: Array | float, coefficient: float
 ) -> Array:
-    """Return the depth (m,) that a load step wears off at the secondary nodes [length].
+    """Return the wear depth (m,) of a load step at the secondary nodes [length].
 
     Parameters
     ----------
     pair : Formulation
     at : Configuration
-        At the end of the step.
+        Configuration at the end of the step.
     contact : ContactResult
-        Likewise.
+        Contact result at the end of the step.
     before : ndarray (m,) or float
-        Pressures as the step began; what wears is the mean of both [pressure].
+        Pressures at the beginning of the step; wear follows from the mean of both [pressure].
     coefficient : float
-        Archard's, by hardness [1 / pressure].
+        Archard's coefficient over the hardness [1 / pressure].
     """
     distance = np.linalg.norm(slip_of_nodes(pair, at), axis=1)
     if pair.friction:
@@ -68,19 +68,19 @@ def worn_in_step(
 
 
 def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
-    """Return depths (m,) of wear at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
+    """Return wear depths (m,) at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
     whole = np.zeros(n_points)
     whole[points] = depth
     return whole
 
 
 def too_fast(pair: Formulation, worn: Worn) -> float:
-    """Return by how much load steps wear faster than pressures can follow: above 1 they may waver from node to node.
+    """Return the wear rate over its stability limit: above 1 pressures may oscillate from node to node.
 
-    A wave of gaps with the period of two edges h gives rise to pressures of ``pi E* / (2 h)`` times its height (Johnson,
-    Contact Mechanics, 13.2). What a step wears off follows from the mean of the pressures before and after, and takes effect
-    in the next one: such a wave dies out while pace times this stiffness is less than two. Pressures at integration points
-    answer up to twice as stiffly.
+    A wave of gaps with the period of two edges h causes pressures of ``pi E* / (2 h)`` times its height (Johnson, Contact
+    Mechanics, 13.2). The wear of a step follows from the mean of the pressures before and after, and affects the next
+    step: such a wave decays if the pace times this stiffness is less than two. The stiffness of pressures at integration
+    points is up to twice as large.
     """
     edge = np.inf
     for block in pair.secondary.blocks:

@@ -1,9 +1,9 @@
 """Energy balance of a load step: strain energy, external work, frictional work, penalties, imbalance.
 
-Over a step forces count as the mean of those at both ends, times the displacement between (trapezoidal rule). What is known
-of the path in between is put right: a normal force acts only on closed gaps, and friction slides where its traction is at
-the limit, whatever it was as the step began. The energy of deformation and these works add up to the external work, but for
-what contact forces do where gaps stay closed or sides stick: an error of long steps, in which normals turn.
+The work of a force over a step is the mean of the forces at both ends times the displacement between (trapezoidal rule), with
+two corrections: a normal force acts only on closed gaps, and friction slides with its traction at the limit, whatever it was
+at the beginning of the step. The strain energy and these works add up to the external work, except for the work of contact
+forces where gaps stay closed or sides stick: an error of long steps, in which normals rotate.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, diags_array
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.configuration import Configuration
@@ -31,17 +32,17 @@ class ContactForces:
     Attributes
     ----------
     positions : ndarray (m, dim)
-        Reference places of its constraints [length].
+        Reference positions of the constraints [length].
     pressure, traction : ndarray (m,), ndarray (m, dim)
-        There [pressure].
+        Contact pressure and tangential traction there [pressure].
     energy : ndarray (m,)
-        Of penalties along the normals, twice [energy].
+        Twice the energy of penalties along the normals [energy].
     rows : sequence of ndarray
-        Rows of the gaps times the normal forces: data, indices and starts of a sparse matrix (m, n_dofs) [force].
+        Rows of the gaps times the normal forces: data, indices and offsets of a sparse matrix (m, n_dofs) [force].
     tangential : ndarray (n_points, dim)
         Tangential forces on the nodes [force].
     pressing, added : ndarray (n_nodes,)
-        Normal forces on the secondary nodes [force], and what clearances and wear add to their gaps [length].
+        Normal forces on the secondary nodes [force], and the contribution of clearances and wear to their gaps [length].
     stored : float
         Energy of penalties [energy].
     """
@@ -57,21 +58,19 @@ class ContactForces:
     stored: float
 
     def at(self, positions: Array) -> tuple[Array, Array]:
-        """Return pressure (m,) and traction (m, dim) at the nearest of other places (m, dim) [pressure]."""
+        """Return pressure (m,) and traction (m, dim) at the constraints nearest to `positions` (m, dim) [pressure]."""
         if np.array_equal(positions, self.positions):
             return self.pressure, self.traction
         if not len(self.positions):
             return np.zeros(len(positions)), np.zeros_like(positions)
-        from scipy.spatial import cKDTree
-
-        nearest = cKDTree(self.positions).query(positions)[1]
-        return self.pressure[nearest], self.traction[nearest]
+        rows = nearest(self.positions, positions)[1]
+        return self.pressure[rows], self.traction[rows]
 
     def kept(self, other: ContactForces, moved: Array) -> float:
-        """Return the work that normal forces take over half a step where they act at its other end, too [energy].
+        """Return half the work of normal forces that also act at the `other` end of the step [energy].
 
-        Under relative motions `moved` (n_points, dim) [length]. Gaps that open or close are left out: no force acts on them,
-        for all that the mean of both ends tells.
+        The relative displacements are `moved` (n_points, dim) [length]. Gaps that open or close are left out: although
+        the mean force of both ends is not zero, no force acts on them.
         """
         shut = other.at(self.positions)[0] != 0.0
         data, indices, start = self.rows
@@ -90,13 +89,13 @@ class Work:
     Attributes
     ----------
     strain_energy : float
-        Of bodies and springs.
+        Strain energy of bodies and springs.
     friction, touching, imbalance : float
         `touching` is the part of friction at constraints that closed in their step.
     stored : float
         Energy of penalties, and of cohesive layers and adhesion.
     released : float
-        What breaking cohesive layers has taken.
+        Energy dissipated by the damage of cohesive layers.
     largest : float
         The largest of these energies and works so far.
     plastic : float
@@ -118,14 +117,14 @@ class Work:
         return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored + self.released
 
     def after(self, energy: tuple[float, float], stored: float, works: Sequence[float], released: float = 0.0) -> Work:
-        """Return the work after a step more, from its elastic energy, plastic work and the works of `contact_work`."""
+        """Return the work after another step, from its elastic energy, plastic work and the works of `contact_work`."""
         friction, touching, imbalance = works
         more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
         work = Work(energy[0], *more, stored, plastic=energy[1], released=released)
         terms = (self.largest, *energy, work.friction, abs(work.external))
         return replace(work, largest=max(terms))
 
-    def told(self) -> dict[str, float]:
+    def as_dict(self) -> dict[str, float]:
         """Return the reported quantities, see `StepResult.work`."""
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
@@ -146,14 +145,14 @@ def contact_work(
     pair : Formulation
     constraints : Constraints
     solution : Solution
-        Of all pairs; those of this one are its `rows`.
+        Solution of all pairs; this pair has the `rows` of it.
     rows : slice
     at : Configuration
-        At the end of the step.
+        Configuration at the end of the step.
     contact : ContactResult
-        Likewise.
+        Contact result at the end of the step.
     before : ContactForces, optional
-        At its beginning; None before the first step.
+        Contact forces at its beginning; None before the first step.
     """
     normal, tangents = constraints.contact_forces(solution.multiplier[rows]), np.zeros((len(constraints), 0))
     slip, directions = tangents, np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
@@ -176,11 +175,11 @@ def contact_work(
         friction, touching = (float(own) for own in solution.work[:, rows].sum(axis=1))
     sliding = float((along + earlier).sum())
     moved = _relative(pair, at)
-    taken = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
+    gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
     wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
-    taken -= 0.5 * float((now.pressing + before.pressing) @ wider)
-    taken -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
-    return now, (friction, touching, taken - (now.stored - before.stored) - sliding)
+    gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
+    gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
+    return now, (friction, touching, gained - (now.stored - before.stored) - sliding)
 
 
 def _areas(constraints: Constraints) -> Array:
@@ -206,7 +205,7 @@ def _forces(
     along = np.zeros(size)
     for tangent, own in zip(constraints.tangents, tangents.T, strict=False):
         along += (tangent.T @ own)[:size]
-    ours = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
+    rates = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
     share = 1.0 / np.where(_areas(constraints) > 0.0, _areas(constraints), np.inf)
     give = (
@@ -214,12 +213,12 @@ def _forces(
         if constraints.normal_compliance is None
         else constraints.normal_compliance.apply(normal)
     )
-    if constraints.law is not None:  # what the energy of a spring would take
+    if constraints.law is not None:  # replaces the energy of a linear spring
         energy = 2.0 * _areas(constraints) * constraints.law.energy(normal * share)
         give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
         constraints.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),
-        along.reshape(-1, dim), np.einsum("nd,nd->n", ours, facing), added, _stored(constraints, normal, tangents, give),
+        along.reshape(-1, dim), np.einsum("nd,nd->n", rates, facing), added, _stored(constraints, normal, tangents, give),
     )  # fmt: skip
 
 
@@ -237,7 +236,7 @@ def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Arra
 
 
 def _relative(pair: Formulation, at: Configuration) -> Array:
-    """Return the motion (n_points, dim) of the nodes in the step, past the obstacle where there is one [length]."""
+    """Return the displacement (n_points, dim) of the nodes in the step, relative to an obstacle if there is one [length]."""
     moved = at.displacement - at.start
     if isinstance(pair.primary, RigidSide):
         points = pair.secondary.points
@@ -247,7 +246,7 @@ def _relative(pair: Formulation, at: Configuration) -> Array:
 
 
 def _nothing(now: ContactForces) -> ContactForces:
-    """Return the beginning, without forces."""
+    """Return the initial state, without forces."""
     dim = now.positions.shape[1]
     rows = np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)
     return ContactForces(
@@ -260,5 +259,5 @@ def _added(pair: Formulation, at: Configuration, contact: ContactResult) -> Arra
     """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
     if pair.options.clearance is None and at.worn is None:
         return np.zeros(len(contact.gap))
-    bare = pair.nodal_gap(at, with_clearance=False)[0]
-    return np.subtract(contact.gap, bare, out=np.zeros_like(bare), where=np.isfinite(bare) & np.isfinite(contact.gap))
+    open = pair.nodal_gap(at, with_clearance=False)[0]
+    return np.subtract(contact.gap, open, out=np.zeros_like(open), where=np.isfinite(open) & np.isfinite(contact.gap))

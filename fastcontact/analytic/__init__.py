@@ -1,11 +1,11 @@
 """Closed-form solutions of contact mechanics.
 
-Each file holds one theory: a frozen result with its numbers and methods, and a factory that makes it. `THEORIES` names the
-factories for case files. Normal contacts share `radius` (half-width in the plane), `force`, `pressure_max` and
-`pressure(distance)`. Units are the caller's own; forces of plane problems are per unit length.
+Each file holds one theory: a frozen result class, and a function that returns it. `THEORIES` lists the functions that
+case files can name. All normal contacts have `radius` (half-width in the plane), `force`, `pressure_max` and
+`pressure(distance)`. Units are those of the caller; forces of plane problems are per unit length.
 
-Positions are numbers, or arrays of any shape (...), which results then have. A number out of range, and two loads where one
-is needed, raise ModelError.
+Positions are numbers or arrays of any shape (...), which is also the shape of results. Numbers out of range, or two
+loads where one is needed, raise ModelError.
 """
 
 from __future__ import annotations
@@ -72,5 +72,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # to whom all names are known
+if not TYPE_CHECKING:  # type checkers see the imports above
     __getattr__, __dir__ = names_of("fastcontact.analytic", __all__)

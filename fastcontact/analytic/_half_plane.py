@@ -1,4 +1,4 @@
-"""Elastic half plane under Hertz's pressure: stress and displacement anywhere, in closed form.
+"""Elastic half plane under Hertz's pressure: closed-form stress and displacement.
 
 The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root w =
 sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k) (McEwen 1949;
@@ -19,7 +19,7 @@ ComplexArray = NDArray[np.complex128]
 
 
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
-    """Return depth, k, w and w - k (...) [-], all over b."""
+    """Return depth, k, w and w - k (...) [-], all divided by b."""
     across, depth = np.broadcast_arrays(array("x", x) / b, below_surface(y, b) / b)
     k = depth + 1j * across
     square = np.empty(k.shape, dtype=np.complex128)

@@ -1,4 +1,4 @@
-"""Elastic half space under Hertz's axisymmetric pressure: stress and displacement anywhere, in closed form; von Mises stress.
+"""Elastic half space under Hertz's axisymmetric pressure: closed-form stress and displacement; von Mises stress.
 
 The half space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal coordinates s >=
 0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational function of s and t and the
@@ -17,12 +17,12 @@ from fastcontact.analytic._inputs import array
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-# From here on the series in 1/s is used: the closed forms lose digits as s grows.
+# From this s on the series in 1/s is used: the closed forms lose digits as s grows.
 _FAR = 4.0
 
 
 def below_surface(z: ArrayLike, a: float) -> Array:
-    """Return the depth -z (...) [length] of `z` (...) [length]; rounded coordinates above the surface count as on it."""
+    """Return the depth -z (...) [length] of `z` (...) [length]; points above the surface by round-off count as on it."""
     depth = -array("z", z)
     if depth.size and depth.min() < -1e-9 * a:
         raise ModelError(f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)")
@@ -33,7 +33,7 @@ def _spheroidal(r: ArrayLike, z: ArrayLike, a: float) -> tuple[Array, Array]:
     """Return s and t of points; s - i t is the square root of ((r^2 + z^2 - a^2) - 2 i a |z|)/a^2."""
     radial, depth = np.broadcast_arrays(np.abs(array("r", r)) / a, below_surface(z, a) / a)
     square = np.empty(radial.shape, dtype=np.complex128)
-    # (r - a)(r + a) rather than r^2 - a^2: the edge of the contact is where digits matter.
+    # (r - a)(r + a) rather than r^2 - a^2: it keeps its digits at the edge of the contact.
     square.real = (radial - 1.0) * (radial + 1.0) + depth**2
     square.imag = 2.0 * depth
     root = np.sqrt(square)

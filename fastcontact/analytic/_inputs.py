@@ -1,4 +1,4 @@
-"""Inputs of formulas: checks of numbers, whose messages name the parameter, and elastic constants and curvature of bodies."""
+"""Inputs of formulas: checks of numbers with messages that name the parameter, elastic constants, curvature of bodies."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 from fastcontact.arrays import REFUSAL, Array, is_masked
 from fastcontact.errors import ModelError, unknown
 
-# Size of any number of a formula: cubes of it are still finite.
+# Largest magnitude of an input: its cube is still finite.
 LARGEST = 1e60
 PLANE = ("plane_strain", "plane_stress")
 
 
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
-    # Compared as it is: whole numbers may be longer than floats can be; NaN is in no order.
+    # Compared without conversion, since integers may exceed the range of floats; comparisons with NaN are false.
     size: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
@@ -43,7 +43,7 @@ def array(name: str, values: ArrayLike) -> Array:
 
 
 def positive(name: str, value: object, *, infinite: bool = False) -> float:
-    """Return `value` as a positive float; infinity only where the formula has that limit."""
+    """Return `value` as a positive float; infinity is allowed only if the formula has that limit."""
     if infinite and isinstance(value, numbers.Real) and value == math.inf:
         return math.inf
     checked = number(name, value)

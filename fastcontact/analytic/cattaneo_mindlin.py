@@ -19,10 +19,10 @@ from fastcontact.errors import ModelError, warn
 
 @dataclass(frozen=True)
 class _PartialSlip:
-    """A tangential load up to a peak, then perhaps back: the common part of the line and the sphere.
+    """Common part of line and sphere: a tangential load up to a peak, possibly followed by unloading.
 
-    After Mindlin and Deresiewicz (1953). The traction of a first load T is f times the pressure less that of a smaller
-    contact, the stick zone, of the size a (1 - T/(f F))^p with p = `_POWER`. Coming back from a peak T* to T subtracts twice
+    After Mindlin and Deresiewicz (1953). The traction of a first load T is f times the pressure minus that of a smaller
+    contact, the stick zone, of the size a (1 - T/(f F))^p with p = `_POWER`. Unloading from a peak T* to T subtracts twice
     the traction of a first load (T* - T)/2.
     """
 
@@ -50,7 +50,7 @@ class _PartialSlip:
 
     @property
     def _reversal(self) -> float:
-        """First load that, taken twice, leads from the peak back to the present force."""
+        """First load (T* - T)/2, which counts twice on the way from the peak to the present force."""
         return 0.5 * (self.tangential_force_peak - self.tangential_force)
 
     @property
@@ -63,7 +63,7 @@ class _PartialSlip:
         return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
     def _present(self, of_first_load: Callable[[float], Any]) -> Any:
-        """Return a quantity of the present force from the function that gives it for a first load."""
+        """Return a quantity at the present force from its function of a first load."""
         return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
@@ -81,9 +81,9 @@ class _PartialSlip:
 class CattaneoMindlinLine(_PartialSlip):
     """Two cylinders under a normal and a tangential force per unit length (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(a). Fields are Coulomb's coefficient `friction`, the present
-    `tangential_force` and the largest so far, `tangential_force_peak`, equal while loading [force/length], and the normal
-    contact `normal`, a `HertzLine`.
+    Formulas as in Johnson (1985), section 7.2(a). Fields are the coefficient of friction `friction`, the current
+    `tangential_force` and the largest one so far, `tangential_force_peak`, which are equal during loading
+    [force/length], and the normal contact `normal`, a `HertzLine`.
     """
 
     normal: HertzLine
@@ -168,7 +168,7 @@ class CattaneoMindlinSphere(_PartialSlip):
 
 
 def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:
-    """Return coefficient and tangential force; warn where unlike materials couple it with the normal force."""
+    """Return coefficient and tangential force; warn if unlike materials couple it with the normal force."""
     f = positive("friction", friction)
     T = not_negative("tangential_force", tangential_force)
     limit = f * normal.force

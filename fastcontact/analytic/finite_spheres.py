@@ -29,7 +29,7 @@ class FiniteHalfSpheres:
     E, R : float
         Young's modulus [pressure] and radius [length] of both; nu is 0.3.
     approach, force : float
-        Approach of the two flat faces, which may slide sideways [length]; force over the full circle [force].
+        Approach of the two flat faces, which are free to move sideways [length]; force over the full circle [force].
     pressure_max, radius : float
         Pressure at the centre per reference area [pressure], contact radius on the reference geometry [length].
     """
@@ -56,7 +56,7 @@ def _hertz(E: float, R: float, approach: float) -> HertzPoint:
 
 
 def _table() -> Array:
-    """Return approach/R, force/(E R^2), pressure/E and radius/R, one row an approach; NaN where unknown."""
+    """Return approach/R, force/(E R^2), pressure/E and radius/R, one row per approach; NaN where unknown."""
     text = resources.files("fastcontact.analytic").joinpath("finite_spheres.json").read_text(encoding="utf-8")
     data = json.loads(text)
     R, E = data["R"], data["E"]
@@ -66,7 +66,7 @@ def _table() -> Array:
 def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
     """Return force, pressure and radius at approach/R = x, for E = R = 1.
 
-    What is interpolated is smooth down to small loads: with s = sqrt(x), the ratios to Hertz at equal
+    The interpolated quantities are smooth down to small loads: with s = sqrt(x), the ratios to Hertz at equal
     approach behave as 1 + s (A + B ln s), so (ratio - 1)/s is taken against ln s; the radius over Hertz's at
     equal force tends to 1, which gives one more point.
     """

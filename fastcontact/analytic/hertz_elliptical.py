@@ -12,7 +12,7 @@ from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactl
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-_FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is a line for every purpose
+_FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is regarded as a line
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class HertzElliptical:
 def _ratio_of_radii(ratio: float) -> float:
     """Return R'/R'' >= 1 of an ellipse with ratio of axes b/a <= 1 (Johnson 1985, eq. 4.28).
 
-    Carlson's integral R_D stands for [(a/b)^2 E - K]/[K - E] of the textbooks: near the circle both differences vanish.
+    Carlson's integral R_D replaces [(a/b)^2 E - K]/[K - E] of the textbooks, where both differences vanish near the circle.
     """
     from scipy.special import elliprd
 
@@ -94,7 +94,7 @@ def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> H
     E_star, R_mean = bodies.E_star, math.sqrt(R_x * R_y)
     k = _ratio_of_axes(max(R_x, R_y) / min(R_x, R_y))
     integrals = math.sqrt(elliprd(0.0, 1.0, k**2) * elliprd(0.0, k**2, 1.0)) / 3.0
-    # Sizes for a unit force; then all grow with powers of the force.
+    # Quantities for a unit force; all scale with powers of the force.
     mean = (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals) ** (1.0 / 3.0)
     pressure = 1.5 / (math.pi * mean**2)
     approach = pressure * mean * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
@@ -145,7 +145,7 @@ def hertz_elliptical(
     >>> hertz.radius_x == hertz.radius_y
     True
     """
-    given = exactly_one(force=force, approach=approach, pressure_max=pressure_max)
+    load = exactly_one(force=force, approach=approach, pressure_max=pressure_max)
     R_x = effective_radius(R1x, R2x, ("R1x", "R2x"))
     R_y = effective_radius(R1y, R2y, ("R1y", "R2y"))
-    return _solve(Bodies(E1, nu1, E2, nu2), R_x, R_y, *given)
+    return _solve(Bodies(E1, nu1, E2, nu2), R_x, R_y, *load)

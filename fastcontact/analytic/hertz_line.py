@@ -18,10 +18,10 @@ from fastcontact.arrays import Array
 class HertzLine:
     """Frictionless contact of two parallel cylinders, formulas as in Johnson (1985), section 4.2(c).
 
-    Positions are x across the contact and y along the outward normal of the body: each body is the half plane y <= 0, and a
-    point above it raises ModelError. Stresses come in the order xx, yy, zz, xy, tension positive; zz depends on the Poisson
-    ratio, that of the first body unless `nu` is given. There is no `approach`: in the plane it depends on the shape of the
-    bodies far away and on their supports.
+    Positions are x across the contact and y along the outward normal of the body: each body is the half plane y <= 0,
+    and a point above it raises ModelError. Stress components are xx, yy, zz, xy, positive in tension; zz depends on
+    Poisson's ratio, which is that of the first body unless `nu` is given. There is no `approach`: in the plane it
+    depends on the shape and the supports of the bodies far from the contact.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class HertzLine:
 
     @property
     def half_width(self) -> float:
-        """Half-width b of the contact, another word for `radius` [length]."""
+        """Half-width b of the contact, an alias of `radius` [length]."""
         return self.radius
 
     def at_force(self, force: float) -> HertzLine:
@@ -76,8 +76,8 @@ class HertzLine:
     def displacement(self, x: ArrayLike, y: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of body 1 or 2 at points `x` (...) [length], `y` (...) [length].
 
-        They are measured from the point (0, 0), since the displacement of a half plane has no value at infinity: the integral
-        of McEwen's (1949) field. A rigid body raises ModelError.
+        They are relative to the point (0, 0), since the displacement of a half plane is unbounded at infinity, and
+        follow from the stresses of McEwen (1949) by integration. A rigid body raises ModelError.
         """
         E, nu = self.bodies.constants(body)
         return _half_plane.displacement(x, y, self.radius, self.pressure_max, E, nu, self.kinematics)
@@ -157,5 +157,5 @@ def hertz_line(
     >>> round(roller.half_width, 4), round(roller.pressure_max, 2)
     (6.2146, 3585.36)
     """
-    given = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
-    return _solve(Bodies(E1, nu1, E2, nu2), plane_kinematics(kinematics), effective_radius(R1, R2), *given)
+    load = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
+    return _solve(Bodies(E1, nu1, E2, nu2), plane_kinematics(kinematics), effective_radius(R1, R2), *load)

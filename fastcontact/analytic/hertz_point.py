@@ -18,9 +18,9 @@ from fastcontact.arrays import Array
 class HertzPoint:
     """Frictionless contact of two spheres after Hertz (1881), see Johnson (1985), sections 3.4 and 4.2.
 
-    Positions are the distance r from the axis and the height z along the outward normal of the body: each body is the half
-    space z <= 0, and a point above it raises ModelError. Stresses come in the order rr, zz, hoop, rz, tension positive; their
-    Poisson ratio is that of the first body unless `nu` is given.
+    Positions are the distance r from the axis and the height z along the outward normal of the body: each body is the
+    half space z <= 0, and a point above it raises ModelError. Stress components are rr, zz, hoop, rz, positive in
+    tension, with Poisson's ratio of the first body unless `nu` is given.
 
     Attributes
     ----------
@@ -86,8 +86,8 @@ class HertzPoint:
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        The stationary point of ``|rr - zz|`` of Johnson (1985), eq. 3.45, found to rounding. For nu >= -0.3 it is the largest
-        anywhere in the body; with a Poisson ratio below that the stress at the edge of the contact is larger.
+        The stationary point of ``|rr - zz|`` of Johnson (1985), eq. 3.45, to round-off. For nu >= -0.3 it is the
+        maximum in the whole body; for a smaller Poisson's ratio the stress at the edge of the contact is larger.
         """
         from scipy.optimize import brentq
 
@@ -153,5 +153,5 @@ def hertz_point(
     >>> round(hertz.pressure_max, 4), hertz.radius
     (2798.3287, 10.0)
     """
-    given = exactly_one(force=force, approach=approach, radius=radius, pressure_max=pressure_max)
-    return _solve(Bodies(E1, nu1, E2, nu2), effective_radius(R1, R2), *given)
+    load = exactly_one(force=force, approach=approach, radius=radius, pressure_max=pressure_max)
+    return _solve(Bodies(E1, nu1, E2, nu2), effective_radius(R1, R2), *load)

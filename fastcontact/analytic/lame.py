@@ -154,14 +154,14 @@ def thick_sphere(
 
 @dataclass(frozen=True)
 class PressFit:
-    """An inner body pressed into an outer one.
+    """Press fit of an inner body in an outer one.
 
-    Radii are nominal: the interference is taken to be small against them.
+    Radii are nominal: the interference is assumed to be small.
 
     Attributes
     ----------
     interference, pressure : float
-        Radius of the inner body less that of the hole, before fitting [length]; contact pressure [pressure].
+        Radius of the inner body minus that of the hole, before fitting [length]; contact pressure [pressure].
     inner, outer : LameShell
         The two bodies, with their displacements and stresses.
     """
@@ -198,7 +198,7 @@ def press_fit_cylinders(
     inner_radius, interface_radius, outer_radius : float
         Radii, increasing; `inner_radius` 0 is a solid shaft [length].
     interference : float
-        Radius of the shaft less that of the hole [length].
+        Radius of the shaft minus that of the hole [length].
     kinematics : str
         "plane_strain" or "plane_stress"; the latter also holds for long cylinders with free ends.
 
@@ -245,13 +245,13 @@ def _pair(
     inner: tuple[float, float], outer: tuple[float, float], radii: tuple[float, float, float], interference: float,
     kinematics: str,
 ) -> PressFit:  # fmt: skip
-    """Return the fit of an inner and an outer body, each with its E and nu."""
+    """Return the press fit of an inner and an outer body, each given by E and nu."""
     for side, (E, nu) in (("inner", inner), ("outer", outer)):
         positive(f"E_{side}", E)
         poisson(f"nu_{side}", nu)
     a, b, c = radii
     positive("interface_radius", b)
-    # Under a unit pressure on the interface first.
+    # First for a unit pressure on the interface.
     shaft, hub = LameShell(a, b, 0.0, 1.0, *inner, kinematics), LameShell(b, c, 1.0, 0.0, *outer, kinematics)
     d = positive("interference", interference)
     pressure = d / float(hub.displacement(b) - shaft.displacement(b))

@@ -28,14 +28,15 @@ class HertzBox:
 
     The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement` prescribed on
     the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box ``|x| <= width``: prescribed on both sides).
-    In three dimensions z stands for y, and y is a second coordinate like x, up to the same width. The box is the rigid
-    obstacle over its own top, too (see `distance`), for a model with ``Criteria(geometry_updates=0)``. Choose a contact
-    radius that no mesh node hits, or results superconverge by chance. Points above the top raise ModelError.
+    In three dimensions z replaces y, and y is a second horizontal coordinate like x. The object is also the rigid
+    obstacle on top of the box (see `distance`), for a model with ``Criteria(geometry_updates=0)``. Choose a contact
+    radius that does not coincide with a mesh node, to avoid accidental superconvergence. Points above the top raise
+    ModelError.
 
     Attributes
     ----------
     hertz : HertzLine or HertzPoint
-        The contact whose field this is.
+        The contact that defines the field.
     kinematics : str
         "plane_strain", "plane_stress", "axisymmetric" (x is the distance from the axis) or "3d".
     E, nu, width, height : float
@@ -66,7 +67,7 @@ class HertzBox:
 
     @property
     def force(self) -> float:
-        """Exact contact force of the whole contact; half of it acts on a plane model of x >= 0 only.
+        """Exact force of the whole contact; a plane model of x >= 0 carries half of it.
 
         Full circle [force] in axisymmetry and three dimensions, per unit length [force/length] in the plane.
         """
@@ -87,7 +88,7 @@ class HertzBox:
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return the gap (n,) [length] under the parabola and its downward normals (n, dim) [-], as rigid obstacles do.
 
-        At `points` (n, dim) [length]. The problem is linear: the gap is vertical, not at right angles to the parabola.
+        At `points` (n, dim) [length]. The problem is linear: the gap is vertical, not normal to the parabola.
         """
         points = array("points", points)
         normal = np.zeros_like(points)
@@ -121,7 +122,7 @@ class HertzBox:
         return np.stack([xx, yy, vertical, xy, shear * sine, shear * cosine], axis=-1)
 
     def _in_plane(self, points: ArrayLike) -> tuple[tuple[Array, Array], tuple[Array, ...]]:
-        """Return (distance from the axis, height), and the direction that leads there in the coordinates of the top."""
+        """Return (distance from the axis, height), and the radial direction in the coordinates of the top."""
         places = array("points", points)
         if places.ndim == 0 or places.shape[-1] != self.dim:
             raise ModelError(f"points has shape {places.shape}: it must be (..., {self.dim})")

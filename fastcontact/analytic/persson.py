@@ -67,7 +67,7 @@ def _clearance_ratio(angle: float) -> float:
 
 
 def persson_limit_angle() -> float:
-    """Return half the contact angle of a pin without clearance, the same under any force [degrees].
+    """Return half the contact angle of a pin without clearance, which does not depend on the force [degrees].
 
     Examples
     --------
@@ -92,12 +92,12 @@ def persson_pin(
 ) -> PerssonPin:
     """Return the contact of a pin with the hole of an infinite plate of the same material (Persson 1964).
 
-    ModelError also if `contact_angle` exceeds what a pin with clearance can reach, or is given without clearance.
+    ModelError also if `contact_angle` exceeds the limit for a pin with clearance, or is given without clearance.
 
     Parameters
     ----------
     E, nu : float
-        Material of both [pressure], [-]; in plane stress `nu` does not matter.
+        Material of both [pressure], [-]; in plane stress `nu` has no effect.
     R, clearance : float
         Radius of the hole, and that less the radius of the pin, >= 0 [length].
     force, contact_angle : float

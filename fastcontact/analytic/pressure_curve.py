@@ -1,4 +1,4 @@
-"""The pressure of a theory over the distance from the middle of the contact, along its surface."""
+"""Pressure of a theory over the distance from the middle of the contact, along its surface."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastcontact.analytic.persson import PerssonPin
 from fastcontact.analytic.punches import PowerLawPunch
 from fastcontact.arrays import Array
 
-# Who a theory is called after.
+# Authors after whom the theories are named.
 NAMES: dict[type, str] = {
     HertzPoint: "Hertz",
     HertzLine: "Hertz",
@@ -39,13 +39,13 @@ class PressureCurve:
     Attributes
     ----------
     name : str
-        Who the theory is called after.
+        Author after whom the theory is named.
     pressure : callable
         From distances (...) [length] to pressures (...) [pressure].
     pressure_max : float
         [pressure]
     radius : float
-        Where the pressure ends along the surface [length]; infinite where it is the same everywhere.
+        End of the pressure along the surface [length]; infinite for a uniform pressure.
     """
 
     name: str

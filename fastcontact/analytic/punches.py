@@ -147,7 +147,7 @@ def _modulus(E: float, nu: float) -> float:
 
 
 def bonded_stiffness_ratio(nu: float) -> float:
-    """Return stiffness bonded over frictionless of a flat punch, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
+    """Return the stiffness of a bonded flat punch relative to a frictionless one, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
 
     Mossakovskii (1954); Spence (1968). The ratio is 1 for nu = 0.5.
 
@@ -224,8 +224,8 @@ def power_law_punch(
     >>> from fastcontact import analytic
     >>> punch = analytic.power_law_punch(E=1000.0, nu=0.3, coefficient=0.01, exponent=4.0, approach=0.1)
     """
-    given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *given)
+    load = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), positive("coefficient", coefficient), positive("exponent", exponent), *load)
 
 
 def cone_punch(
@@ -245,9 +245,10 @@ def cone_punch(
     E, nu, force, approach, radius : float
         As for `power_law_punch`.
     slope_angle : float, optional
-        Angle between the cone's side and the surface, above 0 and below 90 [degrees]; the formula is linear: choose it small.
+        Angle between the side of the cone and the surface, above 0 and below 90 [degrees]; the formula holds for small
+        angles.
     slope : float, optional
-        In its place, its tangent, as of `obstacles.cone` [-].
+        Tangent of this angle, instead of `slope_angle`, as in `obstacles.cone` [-].
 
     Examples
     --------
@@ -257,9 +258,9 @@ def cone_punch(
     name, value = exactly_one(slope_angle=slope_angle, slope=slope)
     if name == "slope_angle" and not 0.0 < value < 90.0:
         raise ModelError(f"slope_angle is {value:g}: it must lie between 0 and 90 degrees")
-    given = exactly_one(force=force, approach=approach, radius=radius)
+    load = exactly_one(force=force, approach=approach, radius=radius)
     rise = math.tan(math.radians(value)) if name == "slope_angle" else value
-    return _solve(_modulus(E, nu), rise, 1.0, *given)
+    return _solve(_modulus(E, nu), rise, 1.0, *load)
 
 
 def paraboloid_punch(
@@ -289,8 +290,8 @@ def paraboloid_punch(
     >>> round(ball.radius, 9)  # sqrt(R * approach)
     1.0
     """
-    given = exactly_one(force=force, approach=approach, radius=radius)
-    return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *given)
+    load = exactly_one(force=force, approach=approach, radius=radius)
+    return _solve(_modulus(E, nu), 0.5 / positive("R", R), 2.0, *load)
 
 
 @dataclass(frozen=True)
@@ -312,13 +313,13 @@ class FlatPunch2D:
 
     @property
     def radius(self) -> float:
-        """Half-width of the contact, another word for `half_width` [length]."""
+        """Half-width of the contact, an alias of `half_width` [length]."""
         return self.half_width
 
     def pressure(self, x: ArrayLike) -> Array:
         """Return the pressure (...) [pressure] at `x` (...) [length], infinite at the edges, zero outside.
 
-        Johnson (1985), eqs 2.64 and 2.69. Bonded, it changes sign ever faster towards the edge: the field oscillates there.
+        Johnson (1985), eqs 2.64 and 2.69. Under a bonded punch it oscillates at the edge, with increasing frequency.
         """
         amplitude, phase = self._polar(x)
         return amplitude * np.cos(phase)
@@ -326,7 +327,7 @@ class FlatPunch2D:
     def shear(self, x: ArrayLike) -> Array:
         """Return the shear traction (...) [pressure] along x on the half plane at `x` (...) [length] (Johnson, eq. 2.69).
 
-        It pulls the surface outward; without bond it is zero.
+        It acts outward on the surface; it is zero unless the punch is bonded.
         """
         amplitude, phase = self._polar(x)
         inside = np.abs(array("x", x)) < self.half_width
@@ -347,12 +348,12 @@ class FlatPunch2D:
 def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = False) -> FlatPunch2D:
     """Return the tractions under a flat rigid punch on a half plane in plane strain.
 
-    There is no indentation: in a half plane it depends on the supports far away.
+    There is no indentation: in a half plane it depends on distant supports.
 
     Parameters
     ----------
     nu, half_width, force, bonded
-        As the attributes of `FlatPunch2D`; without bond there is no friction.
+        As the attributes of `FlatPunch2D`; a punch that is not bonded is frictionless.
 
     Examples
     --------
@@ -365,12 +366,12 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
 
 
 def spence_stick_ratio(*, nu: float, friction: float) -> float:
-    """Return the half-width of the stick zone under a flat rigid punch over that of the punch, c/a.
+    """Return the ratio c/a of the half-widths of the stick zone and of a flat rigid punch.
 
     The root of K(sqrt(1 - k^2))/K(k) = beta/f with k = c/a, beta = (1 - 2 nu)/(2 (1 - nu)) and the complete elliptic
     integral K of modulus k (Spence 1973; Johnson 1985, eq. 2.73), for a monotonic load in plane strain. The formula
-    leaves out what the shear does to the pressure; solutions with that coupling by boundary elements stick less far, by
-    3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for less friction.
+    neglects the effect of the shear on the pressure; boundary-element solutions with this coupling have a smaller
+    stick zone, by 3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for less friction.
 
     Parameters
     ----------

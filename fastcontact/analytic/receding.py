@@ -12,21 +12,21 @@ from fastcontact.analytic._inputs import Bodies, array, not_negative, plane_kine
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-_TERMS = 80  # of the Chebyshev series: errors of half-width and pressure below 1e-6 in all the range below
-_LARGEST_RATIO = 100.0  # of the moduli: beyond, the contact is so wide that the layer is a beam
-_LARGEST_LOAD = 10.0  # half-width of the load over thickness
+_TERMS = 80  # terms of the Chebyshev series: errors of half-width and pressure below 1e-6 in the range below
+_LARGEST_RATIO = 100.0  # largest ratio of the moduli: beyond, the contact is so wide that the layer is a beam
+_LARGEST_LOAD = 10.0  # largest half-width of the load over thickness
 
 
 @dataclass(frozen=True)
 class RecedingLayer:
     """Contact of a layer under a strip load with a half plane (Keer, Dundurs and Tsai 1972).
 
-    The contact does not depend on the size of the force.
+    The contact width does not depend on the force.
 
     Attributes
     ----------
     thickness, load_half_width : float
-        Thickness of the layer, on whose top the force is spread evenly over ``|x| <= load_half_width`` [length].
+        Thickness of the layer, and half-width of the uniform load ``|x| <= load_half_width`` on its top [length].
     force, radius : float
         Force per unit length [force/length], and half-width c of the contact [length].
     series : tuple of float
@@ -41,7 +41,7 @@ class RecedingLayer:
 
     @property
     def half_width(self) -> float:
-        """Half-width c of the contact, another word for `radius` [length]."""
+        """Half-width c of the contact, an alias of `radius` [length]."""
         return self.radius
 
     @property
@@ -53,7 +53,7 @@ class RecedingLayer:
         """Return the contact pressure (...) [pressure] at positions `x` (...) [length], zero outside."""
         position = np.abs(array("x", x)) / self.radius
         theta = np.arccos(np.minimum(position, 1.0))
-        # The coefficients sum to zero: with cos(2 k theta) - 1 in its place there is no 0/0 at the edge.
+        # The coefficients sum to zero: cos(2 k theta) - 1 in place of cos(2 k theta) avoids 0/0 at the edge.
         terms = sum((b * np.sin(k * theta) ** 2 for k, b in enumerate(self.series)), np.zeros_like(theta))
         return -2.0 * terms / np.maximum(np.sin(theta), 1e-300)
 
@@ -71,7 +71,7 @@ def _layer(xi: Array) -> tuple[Array, Array]:
 
 
 def _wave_numbers(panels: int) -> tuple[Array, Array]:
-    """Return points and weights on (0, 40), where all compliances have become those of a half plane."""
+    """Return points and weights on (0, 40); at the upper end all compliances are those of a half plane."""
     points, weights = np.polynomial.legendre.leggauss(12)
     width = 40.0 / panels
     start = width * np.arange(panels)[:, None]
@@ -90,7 +90,7 @@ def _series(c: float, ratio: float, a: float) -> Array:
     theta = (np.arange(half) + 0.5) * math.pi / _TERMS
     t, x = np.cos(theta), np.cos(np.arange(1, half) * math.pi / _TERMS)
     sines = np.sin(np.outer(c * x, xi)) * weight
-    # The whole force is 1: with its part taken out, the kernel stays bounded at small wave numbers.
+    # The total force is 1: without its contribution, the kernel stays bounded at small wave numbers.
     kernel = sines @ (0.5 * (bend - squeeze) * -2.0 * np.sin(0.5 * np.outer(c * t, xi)) ** 2).T
     singular = 1.0 / (x[:, None] - t) + 1.0 / (x[:, None] + t)
     right = sines @ (squeeze + 0.5 * (bend + squeeze) * (np.sinc(xi * a / math.pi) - 1.0))
@@ -136,7 +136,7 @@ def receding_layer(
     thickness, force : float
         Thickness of the layer [length], and force per unit length [force/length].
     load_half_width : float
-        The force is spread evenly over ``|x| <= load_half_width``, at most ten thicknesses; 0 is a line force [length].
+        Half-width of the uniform load, at most ten thicknesses; 0 is a line force [length].
     kinematics : str
         "plane_strain" or "plane_stress".
 
@@ -170,7 +170,7 @@ def _modulus_ratio(bodies: Bodies, kinematics: str) -> float:
 
 
 def _half_width(ratio: float, a: float) -> float:
-    """Return c over thickness, where the pressure is not singular at the edge."""
+    """Return the c over thickness for which the pressure is not singular at the edge."""
     from scipy.optimize import brentq
 
     high = 1.0  # the contact of a soft layer under a line force has 0.86

@@ -1,4 +1,4 @@
-"""Case files: a contact problem as TOML, checked as a whole before anything runs. They hold data, no code."""
+"""Case files: a contact problem as TOML data without code, checked as a whole before anything runs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.cases.shipped import case_path, shipped_cases
-from fastcontact.errors import CaseError, in_file, unknown
+from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.mesh import generate
@@ -30,9 +30,9 @@ from fastcontact.results.units import known_units
 if TYPE_CHECKING:
     from fastcontact.cases.decks.deck import Deck
 
-# A quantity or a parameter of sensitivities.
-Asked = tuple[str | int, ...]
-# Suffix of input decks of Abaqus and CalculiX.
+# Label of a quantity or a parameter of sensitivities.
+Label = tuple[str | int, ...]
+# File suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
 
 
@@ -53,21 +53,21 @@ class Case:
     probes : dict of str to int
         Point number by probe name.
     theories : dict of str to dict
-        By contact pair: ``"theory"`` and, where given, ``"mesh_converged"``, objects of `fastcontact.analytic`; and
-        ``"share"``, the part of the theory's contact that the model holds: 0.25 for a quarter of it.
+        By contact pair: ``"theory"`` and optionally ``"mesh_converged"``, objects of `fastcontact.analytic`; and
+        ``"share"``, the modelled fraction of the theory's contact, e.g. 0.25 for a quarter.
     checks : list of Check
     units : dict of str to str
         Names of the units of length, force and pressure, for labels.
     approach : dict of str to float
-        Approach of the theory by contact pair, where it was given [length].
+        Approach of the theory by contact pair, if given [length].
     folder : pathlib.Path
-        In which the files lie that the case names, absolute.
+        Folder of the files that the case names, absolute.
     sensitivities : list of (tuple, list of tuple)
         Quantities and their parameters, see `fastcontact.sensitivities`.
     modes : dict, optional
-        Arguments of `fastcontact.modes` about the last step; None where none are asked for.
+        Arguments of `fastcontact.modes` about the last step; None without ``[modes]``.
     deck : Deck, optional
-        The input deck of which the case was made.
+        The input deck from which the case was built.
     """
 
     name: str
@@ -85,12 +85,18 @@ class Case:
     units: dict[str, str] = field(default_factory=dict)
     approach: dict[str, float] = field(default_factory=dict)
     folder: Path = Path()
-    sensitivities: list[tuple[Asked, list[Asked]]] = field(default_factory=list)
+    sensitivities: list[tuple[Label, list[Label]]] = field(default_factory=list)
     modes: dict[str, Any] | None = None
     deck: Deck | None = None
 
+    @property
+    def solution(self) -> dict[str, Any]:
+        """How the case is solved: keyword arguments of `solve`."""
+        chosen = {"linear_solver": self.linear_solver, "linear_tolerance": self.linear_tolerance}
+        return {**chosen, "criteria": self.criteria}
+
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step of the model as results have it: of a deck with forces of the whole thickness."""
+        """Return a step of the model as in results; for a deck with forces for the whole thickness."""
         return step if self.deck is None else self.deck.finished(step)
 
 
@@ -100,9 +106,9 @@ def read_case(path: str | Path) -> Case:
     Raises
     ------
     CaseError
-        If the file is missing, no TOML, or has an unknown key or a wrong value; the message names file and key.
+        If the file is missing, is not TOML, or has an unknown key or an invalid value; the message names file and key.
     FastcontactError
-        If its mesh or model is wrong.
+        If its mesh or model is invalid.
     """
     path = case_path(path)
     if path.suffix.lower() == DECK:
@@ -112,13 +118,13 @@ def read_case(path: str | Path) -> Case:
         with in_file(path):
             return build_case(data, name=path.stem, folder=path.parent, text=text)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        # A value that passed all checks by key: Python's own message is all there is.
+        # A value that passed all checks by key: only Python's message says what is wrong.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready cases") from error
 
 
 def _case_of_deck(path: Path) -> Case:
-    """Return an input deck of Abaqus or CalculiX as a case."""
+    """Return the case made from an input deck of Abaqus or CalculiX."""
     from fastcontact.cases.decks.deck import read_deck
 
     deck = read_deck(path)
@@ -159,8 +165,8 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
             raise CaseError(
                 f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
             )
-        text = path.read_text(encoding="utf-8-sig")  # editors of Windows begin texts with a byte order mark
-    except (OSError, ValueError) as error:  # also a name with a zero in it, and no UTF-8
+        text = path.read_text(encoding="utf-8-sig")  # Windows editors begin files with a byte order mark
+    except (OSError, ValueError) as error:  # also a name with a null byte, and text that is not UTF-8
         raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
     try:
         return text, toml_text.parsed(text)
@@ -169,7 +175,7 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
 
 
 def _unreadable(path: Path, error: Exception) -> str:
-    """Return why a case file cannot be read, and what to do."""
+    """Return the reason why a case file cannot be read, and a remedy."""
     if path.is_dir():
         return "it is a folder; name a file in it"
     if not path.exists():
@@ -177,7 +183,7 @@ def _unreadable(path: Path, error: Exception) -> str:
         return f"it does not exist{ready}"
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__
-    return "it is no text in UTF-8; name a TOML file"
+    return "it is not UTF-8 text; name a TOML file"
 
 
 def build_case(
@@ -185,9 +191,9 @@ def build_case(
 ) -> Case:
     """Build a case from the parsed data of a case file, as `tomllib` returns them.
 
-    Its mesh file lies relative to `folder`; a `mesh` replaces the one that ``[mesh]`` names. Result files keep the `text`;
-    studies take it too, or make one of the data.
-    Raises CaseError if a key is unknown or a value wrong, FastcontactError if the mesh or the model is wrong.
+    The path of its mesh file is relative to `folder`; `mesh` replaces the mesh of ``[mesh]``. Result files and studies
+    store `text`; studies otherwise generate it from the data. CaseError if a key is unknown or a value invalid,
+    FastcontactError if the mesh or the model is invalid.
     """
     check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
     check_settings(data)
@@ -226,7 +232,7 @@ def build_case(
 
 
 def _text(data: dict[str, Any]) -> str:
-    """Return data as the text of a case file, from which studies make their cases; empty where TOML cannot say it."""
+    """Return data as the text of a case file, from which studies make their cases; empty where TOML cannot express it."""
     try:
         return toml_text.written(data)
     except ValueError:
@@ -234,7 +240,7 @@ def _text(data: dict[str, Any]) -> str:
 
 
 def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
-    """Return the table of each contact pair and obstacle; pairs that were found have one in common."""
+    """Return the table of each contact pair and obstacle; pairs found automatically share one."""
     named = data.get("contact", {})
     named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
     return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
@@ -250,10 +256,10 @@ def _checks(
     return checks
 
 
-def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list[Asked]]]:
+def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
     asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
     if entries:
-        from fastcontact.analysis.sensitivities import check_asked  # half of the solver
+        from fastcontact.analysis.sensitivities import check_labels  # imports half of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
@@ -268,7 +274,7 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Asked, list
             )
         quantity, *by = (tuple(row) for row in rows)
         with at(where):
-            check_asked(model, quantity, by)
+            check_labels(model, quantity, by)
         asked_for.append((quantity, by))
     return asked_for
 
@@ -280,8 +286,7 @@ def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:
     if "generator" not in data:
         raise CaseError("'mesh' needs either the key 'file' or the key 'generator'")
     name = data["generator"]
-    if not isinstance(name, str) or name not in generate.GENERATORS:
-        raise CaseError(unknown("mesh.generator", str(name), generate.GENERATORS))
+    check_known("mesh.generator", name, generate.GENERATORS, CaseError)
     arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in data.items() if key != "generator"}
     return called("mesh", generate.GENERATORS[name], arguments)
 
@@ -297,7 +302,7 @@ def _ramp(data: dict[str, Any]) -> Ramp:
         raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
     wrong = [t for t in data["instants"] if isinstance(t, bool) or not isinstance(t, NUMBER)]
     if wrong:
-        raise CaseError(f"ramp.instants holds {wrong[0]!r}, which is no number")
+        raise CaseError(f"ramp.instants holds {wrong[0]!r}, which is not a number")
     instants = tuple(float(t) for t in data["instants"])
     table = points(data["table"]) if "table" in data else ((0.0, 0.0), (1.0, 1.0))
     return Ramp(instants, table)
@@ -336,7 +341,7 @@ def _theories(
 
 
 def _share(where: str, data: dict[str, Any]) -> float:
-    """Return the part of the theory's contact that the model holds, 1 by default."""
+    """Return the fraction of the theory's contact that the model represents, 1 by default."""
     check_keys(where, {"share": data.get("share", 1.0)}, {"share": NUMBER})
     share = float(data.get("share", 1.0))
     if not 0.0 < share <= 1.0:
@@ -349,8 +354,7 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
     if not isinstance(data, dict) or "kind" not in data:
         raise CaseError(f"'{where}' needs the key 'kind', one of {', '.join(analytic.THEORIES)}")
     kind, arguments = data["kind"], {key: value for key, value in data.items() if key != "kind"}
-    if not isinstance(kind, str) or kind not in analytic.THEORIES:
-        raise CaseError(unknown(f"{where}.kind", str(kind), analytic.THEORIES))
+    check_known(f"{where}.kind", kind, analytic.THEORIES, CaseError)
     return called(where, analytic.THEORIES[kind], arguments)
 
 

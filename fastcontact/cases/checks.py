@@ -1,4 +1,4 @@
-"""Checks of a case: one number of its last step compared with a theory or with a documented number."""
+"""Checks of a case: a number of its last step compared with a theory or with a documented value."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHECK: dict[str, Any] = {
     **dict.fromkeys(("value", "factor", "tolerance"), NUMBER),
 }
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
-# Quantities of a pair that has an option, and what to do without.
+# Quantities that need an option of the pair, and the message where it is missing.
 NEEDED = {
     "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
     "heat": ("conductance", "only a contact with the option 'conductance' passes any"),
@@ -32,7 +32,7 @@ NEEDED = {
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the contact whose secondary side has a point, the last one of several, and its row there."""
+    """Return the contact whose secondary side contains a point, the last of several, and the row of the point there."""
     contact_row = None
     for contact in step.contact.values():
         rows = np.flatnonzero(contact.points == point)
@@ -42,13 +42,13 @@ def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
 
 
 def _middle(bracket: tuple[float, float]) -> float:
-    """Return the middle of a bracket of a radius, or its lower end where the other is not known."""
+    """Return the middle of the bracket of a radius, or its lower end where the upper one is unknown."""
     inside, outside = bracket
     return 0.5 * (inside + outside) if math.isfinite(outside) else inside
 
 
 def _at_surface(field: str) -> Callable[[StepResult, int], float]:
-    """Return what gives the size of a field of the contact surface at a point; NaN elsewhere."""
+    """Return a function for the magnitude of a contact field at a point; NaN where the point is not in contact."""
 
     def value(step: StepResult, point: int) -> float:
         contact, row = at_point(step, point) or (None, 0)
@@ -58,11 +58,11 @@ def _at_surface(field: str) -> Callable[[StepResult, int], float]:
 
 
 def _entry(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
-    """Return what gives an entry of what another function returns."""
+    """Return a function for one entry of what another function returns."""
     return lambda *of: vector(*of)[index]
 
 
-# Quantities of a contact pair: the kind of their unit, and what gives them at a step, from the pair; None for none.
+# Quantities of a contact pair: the kind of their unit, and the function that evaluates them; None where there is none.
 OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
     "pressure_max": ("pressure", lambda contact: contact.pressure_max),
@@ -70,11 +70,11 @@ OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "stick_radius": ("length", lambda contact: _middle(contact.stick_radius)),
     "torque": ("moment", lambda contact: contact.torque),
     "wear_max": ("length", lambda contact: None if contact.wear is None else contact.wear.max(initial=0.0)),
-    "heat": ("power", lambda contact: None),  # which the step has
+    "heat": ("power", lambda contact: None),  # read from the step instead
     **{f"force.{axis}": ("force", _entry(lambda contact: contact.force, i)) for axis, i in _AXES.items()},
     **{f"moment.{axis}": ("moment", _entry(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
 }  # fmt: skip
-# The same of a probe, from the step and the point.
+# The same for a probe, evaluated from the step and the point.
 OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
     "pressure": ("pressure", _at_surface("pressure")),
     "shear": ("pressure", _at_surface("shear")),
@@ -88,29 +88,31 @@ OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
 
 @dataclass(frozen=True)
 class Check:
-    """A comparison of a number of the last step with a theory or a documented value.
+    """Comparison of a number of the last step with a theory or a documented value.
 
     Attributes
     ----------
     name, quantity : str
         `quantity` is ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.stress.yy"`` or
         ``"PROBE.displacement.x"``; or ``"PAIR.force"`` and its component ``"PAIR.force.x"``, on the secondary side;
-        ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, in the middle of their brackets;
-        ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a turning obstacle about its axis;
-        ``"PAIR.wear_max"``, the deepest wear; ``"PAIR.heat"`` that crosses to the primary side, and ``"PROBE.temperature"``.
+        ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, the mean of their brackets;
+        ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a rotating obstacle about its axis;
+        ``"PAIR.wear_max"``, the largest depth of wear; ``"PAIR.heat"``, the heat flow to the primary side; and
+        ``"PROBE.temperature"``.
     tolerance : float
-        Of the relative deviation.
+        Largest admissible relative deviation.
     theory : str
-        Contact pair whose theory has the target; empty for a documented value.
+        Contact pair whose theory provides the target; empty for a documented value.
     of : str
-        Name of the target in the theory, such as ``"stick_radius"`` or ``"normal.pressure_max"``. The target of a
-        stress is minus the number, since pressures are positive in compression.
+        Name of the target in the theory, such as ``"stick_radius"`` or ``"normal.pressure_max"``. For a stress, the
+        sign of the target is reversed, since pressures are positive in compression.
     value : float, optional
         The documented value.
     source : str
-        Where that is documented.
+        Source of the documented value.
     factor : float
-        What the number is multiplied with first; by default 4 for the force on a quarter of the theory's contact.
+        Factor by which the number is multiplied first; by default e.g. 4 for the force on a quarter of the theory's
+        contact.
     """
 
     name: str
@@ -136,7 +138,7 @@ class Check:
         return -number if ".stress." in self.quantity and self.theory else number
 
     def described(self) -> str:
-        """Return what is compared with what, in one line."""
+        """Return a description of the comparison in one line."""
         source = f" ({self.source})" if self.source else ""
         against = f"the theory's {self.of}" if self.theory else f"{self.value:g}{source}"
         return f"{self.quantity} against {against} within {self.tolerance:g}"
@@ -150,7 +152,7 @@ def read_check(
     theories: Mapping[str, Any],
     kinematics: str = "3d",
 ) -> Check:
-    """Return the check that an entry of a case file with the right keys describes; raises CaseError for wrong values."""
+    """Return the check that an entry of a case file describes. Its keys are checked; wrong values raise CaseError."""
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")
@@ -181,7 +183,7 @@ def read_check(
     if check.value is not None and not math.isfinite(check.value):
         raise CaseError(f"{where}.value = {check.value:g} must be finite")
     if check.value == 0.0:
-        raise CaseError(f"{where}: the value is 0, so no relative deviation can be told; check another quantity")
+        raise CaseError(f"{where}: the value is 0, so there is no relative deviation; check another quantity")
     if check.theory:
         check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
@@ -189,28 +191,28 @@ def read_check(
 
 
 def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics: str) -> None:
-    """Raise CaseError for a quantity that is not there: in the plane along z, but stresses and moments; of circles."""
+    """Raise CaseError for a quantity that the kinematics lack, such as a force along z in a plane model."""
     if kinematics != "3d":
         allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
-    if kinematics == "axisymmetric":  # over the circle no moment is left, and no force along the radius
+    if kinematics == "axisymmetric":  # moments and radial forces cancel over the circle
         allowed = [name for name in allowed if name not in ("moment.z", "force.x")]
     check_known(f"quantity in {where}", field, allowed, CaseError)
 
 
 def _whole(field: str, theory: Mapping[str, Any]) -> float:
-    """Return the factor that makes the force of a part of a contact that of the whole, 1 for other quantities."""
+    """Return the factor from the force of the modelled fraction of a contact to the whole, 1 for other quantities."""
     return 1.0 / float(theory.get("share", 1.0)) if field.split(".")[0] == "force" else 1.0
 
 
 def check_target(where: str, check: Check, theory: Any) -> None:
-    """Raise CaseError where a theory has no such number, or one that no deviation can be relative to."""
+    """Raise CaseError if the theory has no such number, or if it is zero, so that no relative deviation exists."""
     try:
         target = check.target(theory)
     except (AttributeError, TypeError):
         numbers = [name for name in dir(theory) if not name.startswith("_") and _is_number(theory, name)]
         raise CaseError(unknown(f"number of the theory in {where}.of", check.of, numbers)) from None
     if not (math.isfinite(target) and target):
-        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so no relative deviation can be told")
+        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so there is no relative deviation")
 
 
 def _is_number(theory: Any, name: str) -> bool:
@@ -219,7 +221,7 @@ def _is_number(theory: Any, name: str) -> bool:
 
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:
-    """Return the number of a step that a check is about; NaN where there is none, such as the radius of no contact."""
+    """Return the number that a check measures in a step; NaN where there is none, such as a radius without contact."""
     owner, _, field = check.quantity.partition(".")
     if owner in probes:
         value = OF_PROBES[field][1](step, probes[owner])
@@ -231,10 +233,10 @@ def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float
 
 
 def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a check with what came out: value, target, deviation and whether it passed.
+    """Return a check with its outcome: value, target, deviation and whether it passed.
 
-    Where the theory has a mesh-converged solution beside it, also how far from that the value lies, and that from the
-    theory.
+    If the theory comes with a mesh-converged solution, the deviation of the value from it and its deviation from the
+    theory are added.
     """
     theory = theories[check.theory] if check.theory else {}
     value, target = measured(check, step, probes), check.target(theory.get("theory"))

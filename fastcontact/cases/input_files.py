@@ -1,4 +1,4 @@
-"""Files that a case reads: itself, meshes, fields, surfaces of obstacles, and what these name in turn."""
+"""Files that a case reads: itself, meshes, fields, obstacle surfaces, and the files that these include."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.mesh.files.meshio_files import files_of
 
 
 def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
-    """Yield all files that the parsed data of a case file name, relative to `folder`, and those that are read with them."""
+    """Yield all files that the parsed data of a case file name, relative to `folder`, and the files read with them."""
     for key, value in data.items():
         entries = value if isinstance(value, list) else [value]
         for entry in entries:
@@ -23,7 +23,7 @@ def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
 
 
 def digest(paths: Iterator[Path]) -> str:
-    """Return a hash of the contents of files, the same wherever they lie; a file that cannot be read counts as missing."""
+    """Return a hash of the contents of files, independent of their folder; an unreadable file counts as missing."""
     whole = hashlib.sha256()
     for path in paths:
         try:

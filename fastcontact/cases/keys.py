@@ -1,4 +1,4 @@
-"""Keys of case files, the types of their values, and the check of a table against them."""
+"""Keys of case files, the types of their values, and checks of tables against them."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ SOLVE: dict[str, Any] = {
     **dict.fromkeys(("linear_tolerance", "relative", "absolute", "geometry", "friction_while_touching"), NUMBER),
     **dict.fromkeys(("geometry_updates", "max_geometry_updates", "max_active_set_iterations", "max_halvings"), int),
 }
-# A rigid surface: the facets of a group of a file, or of the mesh of the model.
+# A rigid surface: the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
-# How a rigid obstacle, or a support, turns.
+# Rotation of a rigid obstacle or a support.
 ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}
 FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
@@ -36,7 +36,7 @@ STUDY: dict[str, Any] = {
     **dict.fromkeys(("halve", "double", "curves", "combinations", "quantities"), list),
     **dict.fromkeys(("triangles", "quadrangles", "options", "parameters"), dict),
 }
-# What the lists and tables in it hold, and how one entry is written.
+# Entries of the lists and tables in it, each with an example of the notation.
 STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("halve", "double"), (str, 'the name of an argument, "size"')),
     "quantities": (str, 'the name of a quantity, "PROBE.stress.yy"'),
@@ -58,7 +58,7 @@ TOP: dict[str, Any] = {
 
 
 def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
-    """Raise CaseError for a key that is not in `known`, or a value not of the type there (None: any)."""
+    """Raise CaseError for a key that is not in `known`, or a value that is not of its type (None: any)."""
     if not isinstance(data, dict):
         raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")
     for key, value in data.items():
@@ -74,7 +74,7 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
 
 
 def check_settings(data: Mapping[str, Any]) -> None:
-    """Raise CaseError if a key of a table of settings, such as ``[study]``, is unknown, or a value not of its type."""
+    """Raise CaseError if a table of settings such as ``[study]`` has an unknown key or a value of a wrong type."""
     for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE), ("modes", MODES)):
         if not (key == "units" and isinstance(data.get(key), str)):
             check_keys(key, data.get(key, {}), known)
@@ -120,13 +120,13 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
 
 @contextlib.contextmanager
 def at(where: str) -> Iterator[None]:
-    """Put the place in the case file before the message of an error from inside the block."""
+    """Prefix errors raised in the block with the table of the case file."""
     try:
         yield
     except CaseError:
         raise
     except FastcontactError as error:
-        if where.replace(".", " '", 1) + "'" in str(error):  # it names the place already
+        if where.replace(".", " '", 1) + "'" in str(error):  # it names the table already
             raise
         if message := _of_key(where, str(error)):
             raise CaseError(message) from error
@@ -134,7 +134,7 @@ def at(where: str) -> Iterator[None]:
 
 
 def _of_key(where: str, text: str) -> str:
-    """Return what is wrong with an argument of a Python function as what is wrong with a key; empty for all else."""
+    """Return a message on an argument of a function as a message on the key; empty for other messages."""
     wrong = _ARGUMENT.fullmatch(text)
     if wrong is None:
         return ""
@@ -143,7 +143,7 @@ def _of_key(where: str, text: str) -> str:
 
 
 def tables(where: str, entries: Any) -> list[dict[str, Any]]:
-    """Return the tables of a list of tables, checked to be one."""
+    """Return a list of tables, after a check that it is one."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
     return entries

@@ -1,4 +1,4 @@
-"""The model of a case file: materials, supports, loads, relations, springs, contact pairs and obstacles."""
+"""The model of a case file: materials, supports, loads, constraints, springs, contact pairs and obstacles."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_conductivity, check_expansion
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
-from fastcontact.errors import CaseError, unknown
+from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -36,11 +36,11 @@ VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coef
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
-    """Add the material whose constants are given, see `_material_law`."""
+    """Add a material with the given constants, see `_material_law`."""
     kind = _material_law(constants)
     constants.pop("law", None)
     if kind is LinearElastic:
-        if isinstance(constants.get("expansion"), list):  # no array over cells: case files have tables for that
+        if isinstance(constants.get("expansion"), list):  # not an array over cells: case files use tables for these
             check_expansion(constants["expansion"], 1)
         if isinstance(constants.get("conductivity"), list):
             check_conductivity(constants["conductivity"], 1)
@@ -49,7 +49,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
 
 
 def _add_temperature(model: Model, **given: Any) -> None:
-    """Add a temperature by its value, or by a field of files."""
+    """Add a temperature given by a value or by a field in files."""
     if ("value" in given) == ("file" in given):
         raise CaseError("a temperature needs either 'value', or 'file' and 'field'")
     if "value" in given:
@@ -65,15 +65,14 @@ def _add_temperature(model: Model, **given: Any) -> None:
 
 @functools.wraps(Model.add_coupling)
 def _add_coupling(model: Model, place: Any = None, **given: Any) -> None:
-    """Add a coupling; the mesh has its reference point already, whose `place` one of the couplings tells."""
+    """Add a coupling; its reference point, whose `place` one of the couplings gives, is in the mesh already."""
     model.add_coupling(**given)
 
 
 def _material_law(entry: dict[str, Any]) -> type[Material]:
-    """Return the `law` of a material; without one isotropic, orthotropic where E, nu or G are lists, anisotropic with D."""
+    """Return the `law` of a material; by default isotropic, orthotropic if E, nu or G are lists, anisotropic with D."""
     law = entry.get("law", "elastic_plastic" if "yield_stress" in entry else "linear_elastic")
-    if law not in NONLINEAR and law != "linear_elastic":
-        raise CaseError(unknown("law", law, ["linear_elastic", *NONLINEAR]))
+    check_known("law", law, ["linear_elastic", *NONLINEAR], CaseError)
     if law in NONLINEAR:
         return NONLINEAR[law]
     if "D" in entry:
@@ -84,12 +83,12 @@ def _material_law(entry: dict[str, Any]) -> type[Material]:
 
 
 def _without_default(function: Callable[..., Any]) -> list[str]:
-    """Return the arguments that a function needs."""
+    """Return the required arguments of a function."""
     return [key for key, given in inspect.signature(function).parameters.items() if given.default is given.empty]
 
 
 def _check_material(where: str, entry: dict[str, Any]) -> None:
-    """Raise CaseError for a key that the law of a material does not take."""
+    """Raise CaseError for a key that the material law does not take."""
     law = _material_law(entry)
     for key in entry:
         if key not in ("groups", "law") and key not in inspect.signature(law).parameters:
@@ -104,19 +103,19 @@ NONLINEAR: dict[str, type[Material]] = {
     "yeoh": Yeoh,
     "ogden": Ogden,
 }
-# What each law is called.
+# Names of the laws in messages.
 _LAWS: dict[type[Material], str] = {
     LinearElastic: "isotropic",
     Orthotropic: "orthotropic (E, nu and G are lists of three)",
     Anisotropic: "anisotropic (D is a matrix)",
     **{law: f"{name} (its law)" for name, law in NONLINEAR.items()},
 }
-# Types of values as messages list them.
+# Names of the types of values in messages.
 _ORDER = (*NUMBER, list, dict)
 
 
 def _constants() -> dict[str, tuple[type, ...]]:
-    """Return the types of values by the keys of all laws of materials, as their fields are annotated."""
+    """Return the types of values for the keys of all material laws, from the annotations of their fields."""
     known: dict[str, set[type]] = {}
     for law in _LAWS:
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
@@ -125,7 +124,7 @@ def _constants() -> dict[str, tuple[type, ...]]:
     return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
-# By kind of table, in the order in which they are added to the model.
+# Functions by kind of table, in the order in which the tables are added to the model.
 _ADD: dict[str, Callable[..., None]] = {
     "material": _add_material,
     "support": Model.prescribe,
@@ -154,17 +153,17 @@ _ADD: dict[str, Callable[..., None]] = {
     "spring": Model.add_spring,
     "pretension": Model.add_pretension,
 }
-# What names contact pairs, which are there before.
+# Tables that refer to contact pairs, to be added after these.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
 
 
 def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return the types of values by the keys of a table, and the keys that it needs: the arguments of what adds it."""
+    """Return the value types of the keys of a table, and its required keys, from the signatures of `adding`."""
     known: dict[str, Any] = {}
     needed = []
     for add in adding:
         annotated = types_of(inspect.unwrap(add))
-        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # but for the model
+        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # without the model
             kinds = _toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
                 known |= AXES
@@ -174,7 +173,7 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
     return {**known, **further}, needed
 
 
-# Numbers, functions of the position and series as they stand in a case file.
+# Numbers, functions of the position and time series in a case file.
 _TOML: dict[Any, tuple[type, ...]] = {
     float: NUMBER,
     abc.Callable: (dict,),
@@ -183,7 +182,7 @@ _TOML: dict[Any, tuple[type, ...]] = {
 
 
 def _toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the types of values in a case file that an annotated argument takes; a table stands for a function."""
+    """Return the case-file types that an annotated argument takes; a function is given as a table."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if kind in (typing.Union, types.UnionType):
         return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in _toml_types(member)))
@@ -192,7 +191,7 @@ def _toml_types(annotation: Any) -> tuple[type, ...]:
     return _TOML.get(kind, ())
 
 
-# By kind of table: the types of the values of its keys, and the keys that are needed.
+# By kind of table: the value types of its keys, and its required keys.
 LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
     **{
         kind: _keys(add)
@@ -208,13 +207,13 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
         },
         (),
     ),
-    # By its value or by a file: neither has what the other needs.
+    # Given by a value or by a file: neither needs the keys of the other.
     "temperature": (_keys(Model.add_temperature, Model.add_temperature_file)[0], ()),
 }
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
-    """Return the model that the parsed `data` of a case file describe; meshes of obstacles lie relative to `folder`."""
+    """Return the model of the parsed `data` of a case file; paths of obstacle meshes are relative to `folder`."""
     mesh = _with_references(_cut(mesh, data.get("pretension", [])), data.get("coupling", []))
     model = Model(
         mesh,
@@ -233,7 +232,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
 
 
 def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
-    """Add what the lists of tables of some kinds tell."""
+    """Add the entries of the lists of tables of some kinds."""
     for kind, add in adding.items():
         known, needed = LISTS[kind]
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
@@ -246,11 +245,11 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
                 given = _from_files(where, entry, model.mesh, folder) if kind == "material" else entry
-                add(model, **_arguments(where, _found(folder, _placed(where, given))))
+                add(model, **_arguments(where, _with_paths(folder, _changed(where, given, VALUES, _function))))
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
-    """Add the contact pairs that the data name, and then those that are to be found."""
+    """Add the contact pairs named in the data, then those to be found automatically."""
     named = data.get("contact", {})
     if isinstance(named, str) and named != "auto":
         raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(named)}")
@@ -268,7 +267,7 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
 
 
 def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
-    """Return a material with arrays in place of the constants that are fields of files."""
+    """Return a material with arrays in place of constants given as fields in files."""
 
     def read(name: str, value: Any) -> Any:
         if not (isinstance(value, dict) and "file" in value):
@@ -276,32 +275,27 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
         check_keys(name, value, FIELD)
         if "field" not in value:
             raise CaseError(f"'{name}' needs 'field', its name in the file")
-        return read_field(mesh, groups=entry.get("groups"), **_found(folder, value))
+        return read_field(mesh, groups=entry.get("groups"), **_with_paths(folder, value))
 
+    return _changed(where, entry, CONSTANTS, read)
+
+
+def _changed(
+    where: str, entry: dict[str, Any], keys: Sequence[str], change: Callable[[str, Any], Any]
+) -> dict[str, Any]:
+    """Return an entry with the values of some keys changed, those in a list one by one, by their place in the case."""
     values = dict(entry)
-    for key in CONSTANTS:
-        value = entry.get(key)
+    for key in (key for key in keys if key in entry):
+        value = entry[key]
         if isinstance(value, list):
-            values[key] = [read(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
-        elif value is not None:
-            values[key] = read(f"{where}.{key}", value)
+            values[key] = [change(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
+        else:
+            values[key] = change(f"{where}.{key}", value)
     return values
 
 
-def _placed(where: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry with functions in place of the tables of values that depend on the position."""
-    values = dict(entry)
-    for key in VALUES:
-        value = entry.get(key)
-        if isinstance(value, list):
-            values[key] = [_function(f"{where}.{key}[{i}]", member) for i, member in enumerate(value)]
-        elif key in entry:
-            values[key] = _function(f"{where}.{key}", value)
-    return values
-
-
-def _found(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry with the paths of its files seen from the folder of the case file."""
+def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
+    """Return an entry with its paths taken relative to the folder of the case file."""
     file = entry.get("file")
     if file is None:
         return entry
@@ -313,11 +307,12 @@ def _found(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _function(where: str, value: Any) -> Any:
+    """Return a function in place of a table of values that depend on the position."""
     return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 
 def _cut(mesh: Mesh, sections: Any) -> Mesh:
-    """Return the mesh cut along the sections that have no opposite side yet."""
+    """Return the mesh cut along the pretension sections that have no opposite side yet."""
     for i, entry in enumerate(tables("pretension", sections)):
         name = entry.get("section")
         if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
@@ -327,7 +322,7 @@ def _cut(mesh: Mesh, sections: Any) -> Mesh:
 
 
 def _with_references(mesh: Mesh, couplings: Any) -> Mesh:
-    """Return the mesh with the reference points that couplings place."""
+    """Return the mesh with the reference points of the couplings."""
     for i, entry in enumerate(tables("coupling", couplings)):
         name, place = entry.get("reference"), entry.get("place")
         if isinstance(name, str) and isinstance(place, list):
@@ -337,7 +332,7 @@ def _with_references(mesh: Mesh, couplings: Any) -> Mesh:
 
 
 def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
-    """Add a rigid obstacle: its shape by kind and arguments, the other keys as for `Model.add_obstacle`."""
+    """Add a rigid obstacle: its shape from kind and arguments, the other keys as for `Model.add_obstacle`."""
     where = f"obstacle.{name}"
     if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
@@ -354,7 +349,7 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
 
 
 def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
-    """Return the rigid shape that a table with its kind and arguments describes; `mesh` is that of the model."""
+    """Return the rigid shape of a table with a kind and its arguments; `mesh` is that of the model."""
     kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
     if not isinstance(shape, dict) or kind not in (*SHAPES, "mesh"):
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
@@ -370,7 +365,7 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
 
 
 def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry as arguments of a method of the model, its lists of numbers and terms checked."""
+    """Return an entry as arguments of a model method, with its lists of numbers and terms checked."""
     arguments = dict(entry)
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])

@@ -1,4 +1,4 @@
-"""Ready cases: the case files that come with the package, found by name."""
+"""Ready cases: the case files that come with the package, available by name."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from fastcontact.errors import CaseError, check_known
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# The folder in an installed package, and the folder in a checkout.
+# The folders in an installed package and in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
@@ -30,6 +30,8 @@ def case_path(given: str | Path) -> Path:
     try:
         if path.exists() or path.suffix or path.name != str(given):
             return path
+        if path.name == "-":  # the standard input, to other programs
+            return Path("/dev/stdin")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise CaseError(f"cannot look for the case file '{str(given)[:200]}' ({reason}): check its name") from None

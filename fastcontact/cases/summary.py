@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fastcontact._tools.versions import versions
 from fastcontact.analysis.contact_resultants import contact_resultants
-from fastcontact.cases.case import Asked, Case
+from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.results.step import CANCELLED, ContactResult, StepResult
@@ -18,9 +18,9 @@ from fastcontact.results.units import units_of_results, valued, with_unit
 if TYPE_CHECKING:
     from fastcontact.analysis.modal.shapes import Modes
 
-# Of contact resultants, those that a summary has.
+# Contact resultants included in a summary.
 RESULTANTS = ("normal_force", "moment", "area", "centre", "mean_gap", "pressure_mean")
-# Numbers that a theory must have to be compared as a whole.
+# Numbers that a theory must provide for a full comparison.
 COMPARED = ("force", "pressure_max", "radius")
 
 
@@ -69,8 +69,8 @@ def summarise(
     }
 
 
-def _sensitivity(case: Case, last: StepResult, quantity: Asked, by: Sequence[Asked]) -> dict[str, Any]:
-    """Return derivatives of a quantity, or why there are none in this state."""
+def _sensitivity(case: Case, last: StepResult, quantity: Label, by: Sequence[Label]) -> dict[str, Any]:
+    """Return the derivatives of a quantity, or the reason why there are none in this state."""
     from fastcontact.analysis.sensitivities import sensitivities
 
     try:
@@ -131,7 +131,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
 
 
 def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return what `contact_resultants` tell of the last step, with the work of friction of all `steps`."""
+    """Return `contact_resultants` of the last step, with the friction work of all `steps`."""
     (resultants,) = contact_resultants(case.model, [last], name)
     return {
         **{name: _plain(getattr(resultants, name)) for name in RESULTANTS},
@@ -140,17 +140,17 @@ def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping
 
 
 def _plain(value: Any) -> Any:
-    """Return a number, or an array of them, for JSON."""
+    """Return a number or an array in a form for JSON."""
     return [finite(member) for member in value] if np.ndim(value) else finite(value)
 
 
 def finite(value: float) -> float | None:
-    """Return a number that JSON can hold: None for NaN and infinity."""
+    """Return a number for JSON: None for NaN and infinity."""
     return float(value) if np.isfinite(value) else None
 
 
 def _extremes(step: StepResult) -> dict[str, list[float]]:
-    """Return the smallest and the largest number of the fields of cells."""
+    """Return the smallest and largest values of the cell fields."""
     return {name: _range(values) for name, values in step.cell_fields.items()}
 
 
@@ -170,7 +170,7 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
 
 
 def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
-    """Return the stress of each side at a point where materials meet, by number of the material; else empty."""
+    """Return the stress of each side at a point where materials meet, by material number; otherwise empty."""
     values = step.material_stress.at(point) if step.material_stress is not None else {}
     return {str(number): stress.tolist() for number, stress in values.items()}
 
@@ -191,13 +191,13 @@ def _against_theory(
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
     """Return the theory's numbers, and the relative deviations of the computed ones from them."""
-    exact = {name: finite(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip has no bound
+    exact = {name: finite(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
     off = {name: finite(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
     return {**exact, "deviation": off}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return the summary as lines for a person: contact, maximum of von Mises, theory, checks."""
+    """Return the summary as lines of text: contact, maximum von Mises stress, theory, checks."""
     unit = summary["units"]
     steps = summary["steps"]
     rows = [
@@ -242,57 +242,54 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     return rows
 
 
-def _mode_lines(table: Mapping[str, Any]) -> list[str]:
-    """Return the frequencies in lines, one for each number of nodal diameters, where pairs of modes are told once."""
+def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
+    """Return lines of frequencies, one for each number of nodal diameters; pairs of modes are listed once."""
     frequencies = table["frequencies"]
     diameters, twins = (
         table.get("nodal_diameters", [None] * len(frequencies)),
         table.get("twins", range(len(frequencies))),
     )
-    rows = []
     for d in dict.fromkeys(diameters):
         modes = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
         shown = ", ".join(f"{frequencies[k]:.6g}" for k in modes)
         pairs = ", each of two modes" if any(twins[k] > k for k in modes) else ""
         where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
-        rows.append(f"  frequencies about the last step{where}: {shown}")
-    return rows
+        yield f"  frequencies about the last step{where}: {shown}"
 
 
 def count(number: int, noun: str) -> str:
-    """Return a number of things in words: "1 load step", "2 load steps"."""
+    """Return a number with its noun in singular or plural: "1 load step", "2 load steps"."""
     return f"{number} {noun}" + "s" * (number != 1)
 
 
-def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> list[str]:
+def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
     inside, outside = contact["radius"]
     force = valued(contact["force"], unit, "force", 6)
     if contact["force"] < CANCELLED * contact["normal_force"]:
         force += f", normal {valued(contact['normal_force'], unit, 'force', 6)} all round"
-    rows = [
+    yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(inside, outside, unit)}"
-    ]
+    )
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        rows.append(f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest")
+        yield f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest"
     if "torque" in contact:
-        rows.append(
+        yield (
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
             + valued(contact["torque"], unit, "moment", 6)
         )
     if "wear_max" in contact:
-        rows.append(f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}")
+        yield f"  contact '{name}' is worn by up to {valued(contact['wear_max'], unit, 'length')}"
     if contact["penalty"] is not None:
-        rows.append(
+        yield (
             f"  contact '{name}' penetrates by up to {valued(contact['penetration'], unit, 'length')}, with a penalty of "
             + (valued(soft, unit, "penalty") if isinstance(soft := contact["penalty"], float) else "its law")
         )
-    return rows
 
 
 def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
-    """Return the radius of a contact as text; `outside` is None where it reaches the end of the surface."""
+    """Return the radius of a contact as text; `outside` is None if it reaches the end of the surface."""
     if inside is None:
         return "open"
     if outside is None:
@@ -349,7 +346,7 @@ def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
 
 
 def _why(check: Mapping[str, Any]) -> list[str]:
-    """Return a line on why a check fails where the theory, and no mesh, is to blame."""
+    """Return a line of explanation if a check fails because of its theory, not the mesh."""
     off = check["mesh_converged_deviation"]
     if check["passed"] or off is None or abs(off) <= check["tolerance"]:
         return []

@@ -1,4 +1,4 @@
-"""The command line: one file a sub-command; only here do things print and parse arguments."""
+"""The command line, with one file per sub-command; only these modules print and parse arguments."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import signal
 import sys
 from collections.abc import Sequence
 
-INTERRUPTED = 130  # as shells have it
-STOPPED = (129, 130, 143)  # by a signal
+INTERRUPTED = 130  # exit code of shells
+STOPPED = (129, 130, 143)  # exit codes after a signal
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        from fastcontact.cli._main import main as run  # may be interrupted, too
+        from fastcontact.cli._main import main as run  # the import may be interrupted, too
 
         return run(argv)
     except KeyboardInterrupt:
@@ -26,27 +26,27 @@ def main(argv: Sequence[str] | None = None) -> int:
 def entry_point() -> None:
     """Run the command line and exit with its code."""
     _open_standard_files()
-    # Threads of BLAS spin between the small products here; loops of our own have those of Numba.
+    # BLAS threads spin between the small products here; the loops of the package use threads of Numba.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = main()
-    except SystemExit as asked:  # of --help and --version
+    except SystemExit as asked:  # raised by --help and --version
         code = int(asked.code or 0)
     from fastcontact.cli._terminal import flushed
 
     code = flushed(code)
     if code in STOPPED:
-        for stopped in STOPPED:  # nothing that comes now changes the exit code
-            with contextlib.suppress(ValueError):  # a system without this signal
+        for stopped in STOPPED:  # later signals do not change the exit code
+            with contextlib.suppress(ValueError):  # the system lacks this signal
                 signal.signal(stopped - 128, signal.SIG_IGN)
-        sys.unraisablehook = lambda found: None  # finalisers of what was left half made
+        sys.unraisablehook = lambda ignored: None  # from finalisers of partly made objects
     else:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # nothing is left to say: Ctrl-C ends at once
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is done: Ctrl-C ends at once
     sys.exit(code)
 
 
 def _open_standard_files() -> None:
-    """Open files 0 to 2 on nothing where a process is started without them: the next file opened would take their place."""
+    """Open missing standard files 0 to 2 on the null device: otherwise the next opened file would take their place."""
     for number in range(3):
         try:
             os.fstat(number)

@@ -1,4 +1,4 @@
-"""Completion of commands, options and names of files in shells, by the library shtab."""
+"""Shell completion of commands, options and file names, by the library shtab."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError
 
 SHELLS = ("bash", "zsh", "tcsh")
-# Arguments whose values are files, by their name or by what stands for their value.
+# Arguments whose values are files, by name or metavar.
 FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
 
 
 class PrintCompletion(argparse.Action):
-    """``--print-completion SHELL``: print the script that makes a shell complete this command line, and end."""
+    """``--print-completion SHELL``: print the completion script of a shell for this command line, and exit."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
-        """Print it; raises FastcontactError without shtab."""
+        """Print the script; raises FastcontactError without shtab."""
         try:
             import shtab
         except ImportError as error:
@@ -28,7 +28,7 @@ class PrintCompletion(argparse.Action):
 
 
 def _mark_files(parser: argparse.ArgumentParser, kind: Any) -> None:
-    """Tell shtab which arguments of a parser and its sub-commands are names of files."""
+    """Mark for shtab the arguments of a parser and its sub-commands that are file names."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for sub in action.choices.values():

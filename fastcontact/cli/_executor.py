@@ -1,4 +1,4 @@
-"""Where the runs of a study are computed: processes of this machine, of MPI, or of a Dask cluster."""
+"""Executors of the runs of a study: processes of this machine, of MPI, or of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MPI_COMMAND = "mpiexec -n N python -m mpi4py.futures -m fastcontact ..."
 
 @contextlib.contextmanager
 def executor(where: str) -> Iterator[Any]:
-    """Give an executor to run on, None for processes of this machine, and shut it down at the end.
+    """Yield an executor, None for processes of this machine, and shut it down at the end.
 
-    Raises CaseError if the library for it is not installed, no process can be started, one is lost, nothing answers at the
-    address, or the word is unknown.
+    Raises CaseError if its library is not installed, no process can be started, a process is lost, there is no scheduler at
+    the address, or the word is unknown.
     """
     if where == "processes":
         yield None
@@ -45,10 +45,10 @@ def executor(where: str) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _mpi() -> Iterator[Any]:
-    """Give the processes of MPI.
+    """Yield the executor of MPI.
 
-    Most launchers end all processes when one of them dies. Where that is not so, the thread of mpi4py that speaks with them
-    fails, and nobody would ever answer for the runs still to come.
+    Most launchers end all processes when one of them dies. Otherwise the communication thread of mpi4py fails, and the
+    remaining runs would never be answered.
     """
     try:
         from mpi4py.futures import MPIPoolExecutor
@@ -70,7 +70,7 @@ def _mpi() -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
-    """Interrupt the main thread when another one ends by an error; collect these errors instead of printing them."""
+    """Interrupt the main thread when another thread ends with an error; collect these errors instead of printing them."""
     failures: list[BaseException] = []
     before = threading.excepthook
 

@@ -1,10 +1,10 @@
-"""Ctrl-C, SIGTERM and SIGHUP, which wait until they can be heard.
+"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are repeated if Python loses the exception.
 
-SIGTERM, by which schedulers end a program, and SIGHUP, which a terminal sends as it closes, are taken as Ctrl-C is: by
-default they would leave files that are half written.
-Python raises KeyboardInterrupt wherever it happens to be. In a finaliser, and in a function that a library in C calls back,
-such as LLVM while a kernel is compiled, it prints the exception and forgets it: the command would go on. Modules in C make
-another error of it while they are imported.
+SIGTERM, sent by schedulers, and SIGHUP, sent by a closing terminal, are handled like Ctrl-C: by default they would leave
+incomplete files.
+Python raises KeyboardInterrupt at any point of the program. In a finaliser, and in a callback from a C library, such as LLVM
+while a kernel is compiled, the exception is printed and dropped, and the command would continue. C extension modules turn
+it into another error while they are imported.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from collections.abc import Iterator
 from types import FrameType
 from typing import Any
 
-AGAIN = 0.05  # [s]
-# A signal that follows another one so soon means the same [s].
+AGAIN = 0.05  # delay before a signal is repeated [s]
+# Time within which a further signal counts as the same [s].
 REPEATED = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
     HANDLERS[signal.SIGHUP] = signal.SIG_DFL
-# Exit codes as shells have them.
+# Exit codes of shells.
 CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
 IMPORTING = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
@@ -33,14 +33,14 @@ COMMAND_LINE = "fastcontact.cli._main"
 
 @contextlib.contextmanager
 def interruptible(raised: list[int] | None = None) -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and SIGHUP interrupt the block where the exception is not lost.
+    """Let Ctrl-C, SIGTERM and SIGHUP interrupt the block at a point where the exception is not lost.
 
-    The numbers of the signals that did so come into the list `raised`. Those that have another handler keep it.
+    The numbers of these signals are appended to the list `raised`. Signals with another handler keep it.
     """
-    heard: list[float] = []  # when the last one interrupted the block, unless that was lost
+    heard: list[float] = []  # times at which signals interrupted the block, unless the exception was lost
     raised = [] if raised is None else raised
-    ours = threading.current_thread() is threading.main_thread()
-    numbers = [number for number, usual in HANDLERS.items() if ours and signal.getsignal(number) == usual]
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    numbers = [number for number, usual in HANDLERS.items() if in_main_thread and signal.getsignal(number) == usual]
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         if heard and time.monotonic() - heard[-1] < REPEATED:
@@ -64,20 +64,20 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def meant(raised: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt where a signal was `raised` and functions in C made another error of it."""
+    """Raise KeyboardInterrupt if a signal was `raised` and C functions turned it into another error."""
     try:
         yield
     except Exception as error:
         if raised and not isinstance(
             error.__context__, KeyboardInterrupt
-        ):  # else it was caught, and the error is meant
+        ):  # otherwise it was caught, and the error is genuine
             raise KeyboardInterrupt from error
         raise
 
 
 @contextlib.contextmanager
 def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[None]:
-    """Repeat an interruption that Python would print and forget; once one was `raised`, finalisers have nothing to say."""
+    """Repeat an interruption that Python would print and drop; once one was `raised`, finalisers print nothing."""
     before = sys.unraisablehook
 
     def lost(unraisable: sys.UnraisableHookArgs) -> None:
@@ -95,8 +95,8 @@ def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[Non
 
 
 def forget(error: BaseException | None) -> None:
-    """Let go of what was being made when a command was interrupted: finalisers of half of it may fail, and say so."""
-    before, sys.unraisablehook = sys.unraisablehook, lambda found: None
+    """Release the objects under construction when a command was interrupted: their finalisers may fail and print."""
+    before, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
     try:
         while error is not None:
             traceback.clear_frames(error.__traceback__)
@@ -106,7 +106,7 @@ def forget(error: BaseException | None) -> None:
 
 
 def to_main_thread(number: int) -> None:
-    """Send a signal to the main thread, which wakes it also where it waits for a lock."""
+    """Send a signal to the main thread, which wakes it even while it waits for a lock."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
         signal.pthread_kill(main, number)
@@ -121,7 +121,7 @@ def _again(number: int) -> None:
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether something is imported between the command line and the place where Python is."""
+    """Return whether a frame lies within an import below the command line."""
     while frame is not None and frame.f_globals.get("__name__") != COMMAND_LINE:
         if frame.f_globals.get("__name__") in IMPORTING:
             return True

@@ -1,7 +1,7 @@
-"""Dispatch to the sub-commands, and turn errors into exit codes.
+"""Dispatch to the sub-commands, and conversion of errors to exit codes.
 
-0: done; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 3: a check of the case
-failed (``run --strict``); 130: interrupted from the keyboard, like 2; 143, 129: the same by SIGTERM, SIGHUP.
+0: success; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 3: a check of the
+case failed (``run --strict``); 130: interrupted from the keyboard, files as for 2; 143, 129: likewise by SIGTERM, SIGHUP.
 """
 
 from __future__ import annotations
@@ -27,39 +27,39 @@ from fastcontact.errors import ConvergenceError, FastcontactError, printable, un
 
 log = logging.getLogger("fastcontact")
 _FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
-# What argparse says of a wrong choice, and the names that it lists.
+# Message of argparse for a wrong choice, with the names that it lists.
 _CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)")
 _NAME = re.compile(r"[\w-]+")
 
 
 class _Printable(logging.StreamHandler[Any]):
-    """A handler that shows characters that steer a terminal, which names from files may hold."""
+    """A handler that escapes terminal control characters, which names from files may contain."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line to write; on a terminal it takes the place of the progress bar."""
+        """Return the line to write; on a terminal it overwrites the progress bar."""
         line = encodable(printable(super().format(record)), self.stream)
         return f"\r\x1b[K{line}" if somebody_watches() else line
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are those of the library: one line, exit code 1."""
+    """An argument parser that reports errors like the library: one line, exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise instead of exiting with code 2, which means no convergence; of a wrong choice offer the nearest."""
+        """Raise instead of exiting with code 2, which means no convergence; for a wrong choice suggest the nearest."""
         wrong = _CHOICE.search(message)
         if wrong:
             message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
     def print_help(self, file: Any = None) -> None:
-        """Print the help; argparse would not tell that it cannot be written."""
+        """Print the help; argparse would ignore write errors."""
         if file is None:
             say(self.format_help().rstrip("\n"))
         else:
             super().print_help(file)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuse a flag that this command does not know, and offer the nearest; argparse would ask the parser above."""
+        """Refuse an unknown flag of this command and suggest the nearest; argparse would leave it to the parent parser."""
         options, rest = super().parse_known_args(args, namespace)
         for flag in (text.partition("=")[0] for text in rest if _FLAG.match(text)):
             known = [*_FLAG.findall(self.format_usage()), "--help"]
@@ -68,7 +68,7 @@ class Parser(argparse.ArgumentParser):
 
 
 class PrintVersion(argparse.Action):
-    """``--version``: print it, and end; argparse would not tell that it cannot be written."""
+    """``--version``: print the version and exit; argparse would ignore write errors."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
         """Print the version."""
@@ -77,7 +77,7 @@ class PrintVersion(argparse.Action):
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of `command`, or of every sub-command of this package if it is none of them."""
+    """Return the parser of the sub-command `command`, or of all sub-commands if there is none of this name."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
@@ -98,21 +98,21 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     raised: list[int] = []
-    with interruptible(raised):  # also while it is told why the command ends
-        return _told(sys.argv[1:] if argv is None else list(argv), raised)
+    with interruptible(raised):  # also while the reason of the end is printed
+        return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), raised)
 
 
-def _told(given: list[str], raised: list[int]) -> int:
-    """Run a command; an error is told, and becomes an exit code. `raised` are the signals that came."""
+def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
+    """Run a command; print an error and return its exit code. `raised` are the signals received."""
     try:
         with meant(raised):
-            return _run(given)
+            return _run(words)
     except ConvergenceError as error:
         say("\n".join([f"no convergence: {error}", *history_lines(error.history), *_notes(error)]), error=True)
         return 2
     except FastcontactError as error:
         say(f"error: {error}", error=True)
-        forget(error)  # a study that was stopped tells it by such an error
+        forget(error)  # a stopped study raises such an error
         return CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
     except BrokenPipeError:
         return 1
@@ -123,19 +123,19 @@ def _told(given: list[str], raised: list[int]) -> int:
         return CODES[number]
 
 
-def _run(given: list[str]) -> int:
-    arguments = parser(given[0] if given else None).parse_args(given or ["--help"])
+def _run(words: list[str]) -> int:
+    arguments = parser(words[0] if words else None).parse_args(words or ["--help"])
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-    notify = somebody_watches() and not (arguments.quiet or arguments.verbose)  # the log tells it with -v
+    notify = somebody_watches() and not (arguments.quiet or arguments.verbose)  # with -v it is in the log
     compiling.listeners[:] = [_say_compiling] if notify else []
     with warnings_shown():
         return int(arguments.run(arguments) or 0)
 
 
 def _say_compiling() -> None:
-    """Say once that kernels are being compiled."""
+    """Print once that kernels are being compiled."""
     compiling.listeners.remove(_say_compiling)
     say(f"{compiling.TEXT} ...", error=True)
 
@@ -146,7 +146,7 @@ def _notes(error: BaseException) -> list[str]:
 
 
 def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
-    """Return the last iterations of a step that failed as lines: change of the displacement, residual, active set."""
+    """Return the last iterations of a failed step as lines: change of the displacement, residual, active set."""
     if not history:
         return []
     first = max(len(history) - shown, 0)

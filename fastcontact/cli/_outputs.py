@@ -1,4 +1,4 @@
-"""Files that a command writes when its work is done: checked before it begins, and written; pictures among them."""
+"""Output files of commands, including pictures: checks before the work, and writing after it."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def check_outputs(
     files: Iterable[str | os.PathLike[str] | None],
     pictures: Iterable[str | os.PathLike[str] | None] = (),
 ) -> None:
-    """Refuse files that could not be written, or would replace one to `read` or another output; None means no file.
+    """Refuse files that could not be written, or would replace a file to `read` or another output; None means no file.
 
-    Every command that writes calls this before it opens anything. Files are told apart by what they are, not by name: a
-    link to a file is that file.
+    Every command that writes files calls this before it opens any. Files are identified by device and number, not by name: a
+    link to a file is the same file.
 
-    Raises FileError if a folder is missing or write-protected, a path is a folder, the file to read or that of another
-    output, or a picture of no known format; FastcontactError if there is no matplotlib.
+    Raises FileError if a folder is missing or write-protected, a path is a folder, a file to read or another output, or the
+    format of a picture is unknown; FastcontactError if matplotlib is missing.
     """
     from fastcontact._tools.paths import checked_target, is_stream
 
@@ -49,7 +49,7 @@ def check_outputs(
 
 
 def _identity(path: Path) -> object:
-    """Return device and number of a file, the same for all its names; of a file to come its folder's, and its name."""
+    """Return device and number of a file, equal for all its names; for a new file those of its folder, and its name."""
     try:
         status = path.stat()
     except OSError:
@@ -71,7 +71,7 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text file, whole or not at all, or to a stream; raises FileError if it cannot be written."""
+    """Write a text file, completely or not at all, or to a stream; raises FileError if it cannot be written."""
     from fastcontact._tools.paths import replacing
 
     with replacing(path) as target:
@@ -79,20 +79,20 @@ def write_text(path: str, content: str) -> None:
 
 
 def say_written(options: Any, *paths: object) -> None:
-    """Print which files were written, unless the options ask for quiet; None means no file."""
+    """Print which files were written, unless the option ``--quiet`` is set; None means no file."""
     if not options.quiet:
         say(f"wrote {', '.join(str(path) for path in paths if path)}")
 
 
 def write_json(path: str, numbers: Any, indent: int = 2) -> None:
-    """Write a JSON file; raises like `write_text`."""
+    """Write a JSON file; errors as for `write_text`."""
     write_text(path, json.dumps(numbers, indent=indent) + "\n")
 
 
 def save(axes: Any, path: str) -> None:
     """Write the figure of `axes` to `path`; raises FileError if it cannot be written or its format is unknown.
 
-    What Matplotlib warns of, such as characters that its font lacks, is told in one line each.
+    Warnings of Matplotlib, such as characters missing in its font, are shown in one line each.
     """
     from fastcontact._tools.paths import replacing
 
@@ -107,17 +107,17 @@ def save(axes: Any, path: str) -> None:
 
 
 def profile_picture(case: Any, step: StepResult, path: str) -> None:
-    """Plot the pressure of the first contact pair with the theories of its case."""
+    """Plot the pressure of the first contact pair and the theories of its case."""
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))
-    given = {"approach": case.approach.get(name), "load": load_multiplier(case.ramp.table, step)}
-    curves = pressure_curves(case.theories.get(name, {}), contact, **given)
+    options = {"approach": case.approach.get(name), "load": load_multiplier(case.ramp.table, step)}
+    curves = pressure_curves(case.theories.get(name, {}), contact, **options)
     draw_profile(contact, step, curves, path, case.title)
 
 
 def draw_profile(contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str) -> None:
-    """Plot the pressure of a contact pair with theories by legend."""
+    """Plot the pressure of a contact pair and theories, given by legend text."""
     from fastcontact.results import plot
     from fastcontact.results.tables import normal_stress
 

@@ -1,4 +1,4 @@
-"""Parts that the commands on result files share: the step, the contact pair, the case kept in the file."""
+"""Common parts of the commands on result files: the step, the contact pair, the case stored in the file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def chosen_step(results: Any, number: int) -> Any:
-    """Return the step with a number from 1, or the last for -1; raises CaseError if there is no such step."""
+    """Return the step with a number counted from 1, or the last one for -1; raises CaseError if there is no such step."""
     if not len(results):
         raise CaseError(f"'{results.path}' holds no finished step yet")
     if number == -1:
@@ -33,9 +33,9 @@ def chosen_step(results: Any, number: int) -> Any:
 
 
 def chosen_contact(options: argparse.Namespace, step: Any) -> str:
-    """Return the name of the contact pair that the options ask for; without one the first, with a hint at the others.
+    """Return the name of the contact pair in the options, by default the first one, with a hint at the others.
 
-    Raises CaseError if there is none, or none of that name.
+    Raises CaseError if there is no contact pair, or none of this name.
     """
     if not step.contact:
         raise CaseError("this result holds no contact pair")
@@ -50,7 +50,7 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
 
 
 def case_data(results: Any) -> dict[str, Any]:
-    """Return title, theories, approaches and ramp of the case text kept in the file; empty without one."""
+    """Return title, theories, approaches and ramp of the case text in the file; empty without a text."""
     from fastcontact.cases.case import described
 
     try:
@@ -61,27 +61,27 @@ def case_data(results: Any) -> dict[str, Any]:
 
 
 def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:
-    """Return the multiplier of the loads at a step, from the table of the ramp."""
+    """Return the load multiplier at a step from the table of the ramp."""
     return float(np.interp(step.load_factor, *np.transpose(table)))
 
 
 def pressure_curves(
     theories: Mapping[str, Any], contact: Any, *, approach: float | None = None, load: float = 1.0
 ) -> dict[str, Any]:
-    """Return what to draw over the pressure of a contact, by legend: its theory at equal approach and at equal force.
+    """Return curves to compare with the pressure of a contact, by legend: theory at equal approach and at equal force.
 
     Parameters
     ----------
     theories : mapping
-        Of the pair, as `Case.theories` holds them.
+        Theories of the pair in the form of `Case.theories`.
     contact : ContactResult
     approach : float, optional
-        That the case gives the theory, reached at a multiplier of 1 [length]; without one the theory was given otherwise.
+        Approach given in the case, reached at a multiplier of 1 [length]; None if the theory is given otherwise.
     load : float
         Multiplier of the loads at this step [-].
 
-    There is nothing without a theory whose pressure can be drawn; that of a flat punch is infinite. Of finite half spheres it
-    is Hertz's.
+    The result is empty without a theory whose pressure can be drawn; that of a flat punch is infinite. For finite half
+    spheres Hertz's pressure is drawn.
     """
     theory: Any = theories.get("theory")
     theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
@@ -94,7 +94,7 @@ def pressure_curves(
 
 
 def drawn(theory: Any) -> PressureCurve:
-    """Return the pressure of a theory that `pressure_curves` found."""
+    """Return the pressure curve of a theory from `pressure_curves`."""
     curve = pressure_curve(theory)
     assert curve is not None
     return curve
@@ -103,9 +103,9 @@ def drawn(theory: Any) -> PressureCurve:
 def compared(
     name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
 ) -> dict[str, Any]:
-    """Return a theory by its legend at the approach and at the force of a contact, where these are known.
+    """Return a theory, by legend, at the approach and at the force of a contact, if these are known.
 
-    The model holds a `share` of the contact [-]; `approach` is that at a multiplier `load` of 1.
+    The model represents a `share` of the contact [-]; `approach` is that at a multiplier `load` of 1.
     """
     curves, force = {}, float(np.linalg.norm(contact.force)) / share
     if approach is not None and load == 1.0:
@@ -118,7 +118,7 @@ def compared(
 
 
 def law(theories: Mapping[str, Any]) -> Any:
-    """Return what gives force and radius of a contact by its approach, from none on; None where nothing does."""
+    """Return the law of force and radius of a contact over its approach, from zero on; None if there is none."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     return theory if hasattr(theory, "at_approach") else None

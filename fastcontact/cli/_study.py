@@ -1,4 +1,4 @@
-"""Parts that the commands of studies share: arguments, executors, interruption, files to write."""
+"""Common parts of the commands of studies: arguments, executors, interruption, output files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastcontact.errors import FastcontactError
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the files to write and how to run."""
+    """Add the arguments for output files and execution."""
     parser.add_argument("--json", metavar="FILE", help="write all numbers")
     parser.add_argument("--csv", metavar="FILE", help="write the table")
     parser.add_argument("--png", metavar="FILE", help="write a picture")
@@ -30,19 +30,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_targets(options: argparse.Namespace, *also: str | None) -> None:
-    """Refuse files that cannot be written, before anything runs; raises like `check_outputs`."""
+    """Refuse files that cannot be written, before anything runs; errors as for `check_outputs`."""
     from fastcontact.cases.case import files_of_case
 
     check_outputs(files_of_case(options.case), [options.json, options.csv, options.html, *also], [options.png])
 
 
 def names(text: str | None) -> list[str] | None:
-    """Return names separated by commas."""
+    """Return the names in a comma-separated text."""
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
-    """Return the result of a study, run on the executor of the options; the error of an interruption says how to go on."""
+    """Return the result of a study, run on the executor of the options; an interruption is reported with how to resume."""
     from fastcontact.studies.progress import Runs
 
     progress = Runs(show=somebody_watches() and not options.quiet)
@@ -65,9 +65,9 @@ def stopped(options: argparse.Namespace) -> str:
 def report(
     options: argparse.Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()
 ) -> int:
-    """Write the files of the options; print why runs failed, the lines of the result, and the files written.
+    """Write the files of the options; print the reasons of failed runs, the lines of the result, and the files written.
 
-    `also` are files written before; without any file, the `hint` says how to get one. Returns the exit code.
+    `also` are files written before; without any file, the `hint` is printed. Returns the exit code.
     """
     if options.json:
         write_json(options.json, result.as_dict())

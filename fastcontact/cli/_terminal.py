@@ -1,7 +1,7 @@
-"""What is printed: names and titles come from files, so that characters that steer a terminal are shown, not sent.
+"""Printing on terminals: control characters, which names and titles from files may contain, are escaped.
 
-Escape sequences could change what a terminal shows or does; characters that turn the direction of writing could hide a
-part of a line (Boucher and Anderson, 2023). Characters that the terminal's encoding lacks are shown by their number.
+Escape sequences could change the display or the behaviour of a terminal; characters that change the direction of writing
+could hide a part of a line (Boucher and Anderson, 2023). Characters missing in the terminal's encoding are escaped, too.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fastcontact.errors import FileError, printable
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
-    """Add the options of every command on how much it prints, set to `default` where they are not given."""
+    """Add the verbosity options of every command, with `default` as their default value."""
     loudness = parser.add_mutually_exclusive_group()
     for flags, text in {
         ("-v", "--verbose"): "say what is being done and why",
@@ -25,12 +25,12 @@ def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
 
 
 def somebody_watches() -> bool:
-    """Return whether standard error is a terminal; a process may be started without any."""
+    """Return whether standard error is a terminal; it may be missing."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 def say(text: object, *, error: bool = False) -> None:
-    """Print a text on standard output, or on standard error, of which nobody could be told that it cannot be written."""
+    """Print a text on standard output, or on standard error, whose write errors are ignored."""
     stream: TextIO | None = sys.stderr if error else sys.stdout
     if stream is None:  # closed before the process was started
         return
@@ -44,12 +44,12 @@ def say(text: object, *, error: bool = False) -> None:
 
 
 def flushed(code: int) -> int:
-    """Return an exit code when all that was printed is written; if it cannot be, say so in one line and return 1."""
+    """Flush the output and return the exit code; if writing fails, report it in one line and return 1."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as refused:
-        # Python would try once more as it ends, and tell it in words of its own.
+        # Python would flush again at exit and print its own message.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not code and not isinstance(refused, BrokenPipeError):
             say(f"error: {_unwritten(refused)}", error=True)
@@ -58,11 +58,11 @@ def flushed(code: int) -> int:
 
 
 def _unwritten(error: OSError) -> str:
-    """Return what is said where standard output leads to a full disk."""
+    """Return the message for a failed write to standard output, e.g. on a full disk."""
     return f"cannot write to standard output ({error.strerror}): send it elsewhere"
 
 
 def encodable(text: str, stream: TextIO) -> str:
-    """Return a text with all characters that a stream cannot write replaced by their escapes."""
+    """Return a text in which characters that a stream cannot encode are replaced by escapes."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)

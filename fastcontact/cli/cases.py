@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _lines(path: Path) -> list[str]:
-    """Return what one case is and what it checks."""
+    """Return the description of a case and of its checks."""
     from fastcontact.cases.case import read_case
 
     case = read_case(path)

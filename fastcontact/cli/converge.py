@@ -1,4 +1,4 @@
-"""``fastcontact converge``: a case on finer and finer meshes, and why it differs from theory."""
+"""``fastcontact converge``: mesh-convergence study of a case, and its difference from theory."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.cli._terminal import somebody_watches
 from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import CaseError
 
-HELP = "mesh-convergence study: orders, limits with error bars, model error told from mesh error"
+HELP = "mesh-convergence study: orders, limits with error bars, model error and mesh error"
 HINT = "--html FILE makes a report to send on"
 
 
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _adaptive(options: argparse.Namespace) -> int:
-    """Refine until the quantity is accurate, write the files of the options, print the table; 2 if it is not."""
+    """Refine until the quantity is accurate, write the files of the options, print the table; 2 if it is not reached."""
     from fastcontact.studies.adaptive import adaptive_study
 
     with warnings_shown():

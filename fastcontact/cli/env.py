@@ -38,22 +38,22 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _warm_up(show: bool) -> int:
-    """Compile all kernels of the table, side by side in a process for each processor; return their number."""
+    """Compile all kernels of the table in parallel, with one process per processor; return their number."""
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 
-    total, ours, theirs, done = len(ahead.kernels_of(())), *os.pipe(), 0
+    total, ours, writing_end, done = len(ahead.kernels_of(())), *os.pipe(), 0
     with tempfile.TemporaryFile("w+", encoding="utf-8") as errors:
-        processes = ahead.start((), decorators.threads(), theirs, errors.fileno())
-        os.close(theirs)
+        processes = ahead.start((), decorators.threads(), writing_end, errors.fileno())
+        os.close(writing_end)
         with open(ours, encoding="ascii") as lines, StatusLine(len("compiling kernels: 000 of 000"), show) as status:
             for done, _ in enumerate(lines, start=1):
                 status.draw(f"compiling kernels: {done} of {total}")
         failed = [code for code in (process.wait() for process in processes) if code]
         errors.seek(0)
-        told = errors.read().split("\n")
+        error_lines = errors.read().split("\n")
     if failed:
         how = f"by {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
-        why = next(filter(None, reversed(told)), "was it lack of memory?")
+        why = next(filter(None, reversed(error_lines)), "was it lack of memory?")
         raise FastcontactError(f"a process that compiles kernels ended {how}, {done} of {total} kernels begun: {why}")
     return done

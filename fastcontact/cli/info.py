@@ -1,15 +1,16 @@
-"""``fastcontact info``: what a mesh or result file holds."""
+"""``fastcontact info``: content of a mesh, case, deck or result file."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
-HELP = "show what a mesh, case, deck or result file holds: groups, sizes, steps, iterations, versions"
+HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what the file holds."""
+    """Print the content of the file."""
     if options.contacts or options.png:
         return _contacts(options)
     if Path(options.file).suffix == ".vtkhdf":
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _contacts(options: argparse.Namespace) -> int:
-    """Print the contacts that are found in a mesh, and draw them."""
+    """Print the contact pairs found in a mesh, and draw them."""
     from fastcontact.cases.case import files_of_case, read_case
     from fastcontact.contact.found_contacts import find_contacts
     from fastcontact.results import plot
@@ -73,7 +74,7 @@ def _contacts(options: argparse.Namespace) -> int:
 
 
 def _is_case(path: Path) -> bool:
-    """Whether a file is a case file, or a deck that is more than a mesh."""
+    """Whether a file is a case file, or a deck with more than a mesh."""
     return path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
 
 
@@ -98,13 +99,11 @@ def _is_deck(path: Path) -> bool:
         return any(line.lstrip().upper().startswith(words) for line in file)
 
 
-def _deck_lines(deck: Any) -> list[str]:
-    rows = [
-        f"{deck.path}: {deck.title}",
-        repr(deck.model),
-        f"load factors: {', '.join(f'{t:g}' for t in deck.ramp.instants)}",
-    ]
-    return rows + [f"  note: {text}" for text in deck.notes]
+def _deck_lines(deck: Any) -> Iterator[str]:
+    yield f"{deck.path}: {deck.title}"
+    yield repr(deck.model)
+    yield f"load factors: {', '.join(f'{t:g}' for t in deck.ramp.instants)}"
+    yield from (f"  note: {text}" for text in deck.notes)
 
 
 def _mesh_lines(mesh: Any) -> list[str]:
@@ -115,29 +114,28 @@ def _mesh_lines(mesh: Any) -> list[str]:
     return rows
 
 
-def _result_lines(results: Any) -> list[str]:
-    rows = [f"{len(results)} steps, {results.kinematics}; versions: "]
-    rows[0] += ", ".join(f"{name} {version}" for name, version in results.versions.items())
+def _result_lines(results: Any) -> Iterator[str]:
+    versions = ", ".join(f"{name} {version}" for name, version in results.versions.items())
+    yield f"{len(results)} steps, {results.kinematics}; versions: {versions}"
     if results.error:
-        rows.append(f"  stopped: {results.error}")
+        yield f"  stopped: {results.error}"
     elif not results.complete:
-        rows.append("  incomplete: the run was killed, or goes on")
+        yield "  incomplete: the run was killed, or goes on"
     for step in results:
         closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
         counts = step.iterations
-        rows.append(
-            f"  step {step.index:>3}  load factor {step.load_factor:<8.5g} geometry updates "
+        yield (
+            f"  step {step.index:>3}  {step.instant:<20} geometry updates "
             f"{counts.get('geometry_updates', 0):>3}  active-set iterations "
             f"{counts.get('active_set_iterations', 0):>3}  linear {counts.get('linear_iterations', 0):>4}  {closed}"
         )
         if "substeps" in counts:
             ends = ", ".join(f"{end:.6g}" for end in counts["substeps"])
-            rows.append(f"    did not converge whole, went in parts up to {ends}")
-        rows += [f"    warning: {text}" for text in step.warnings]
+            yield f"    did not converge whole, went in parts up to {ends}"
+        yield from (f"    warning: {text}" for text in step.warnings)
     meet = results[-1].material_stress if len(results) else None
     if meet is not None:
-        rows.append(
+        yield (
             f"  materials meet at {len(set(meet.points.tolist()))} nodes: stress there is that of the side with the largest "
             "von Mises stress, material_stress has each side's"
         )
-    return rows

@@ -1,4 +1,4 @@
-"""``fastcontact mesh``: make a mesh with its named groups."""
+"""``fastcontact mesh``: generate a mesh with named groups."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ HELP = "make a mesh with named groups and report its quality"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add one sub-command a generator, its options read from the generator's own signature."""
+    """Add one sub-command per generator, with options from the signature of the generator."""
     from fastcontact.mesh.generate import GENERATORS
 
     kinds = parser.add_subparsers(dest="generator", metavar="GENERATOR", required=True)
@@ -27,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         )
         for parameter in inspect.signature(make).parameters.values():
             sub.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **_option(make, parameter))
-        add_loudness(sub, default=argparse.SUPPRESS)  # what stands before the name of the generator holds
+        add_loudness(sub, default=argparse.SUPPRESS)  # keeps the options before the name of the generator
 
 
 class _Raw(argparse.RawDescriptionHelpFormatter):
@@ -59,8 +59,8 @@ def run(options: argparse.Namespace) -> int:
     check_outputs((), [options.output])
     make = GENERATORS[options.generator]
     names = inspect.signature(make).parameters
-    given = {name: value for name, value in vars(options).items() if name in names}
-    mesh = make(**{name: tuple(value) if isinstance(value, list) else value for name, value in given.items()})
+    arguments = {name: value for name, value in vars(options).items() if name in names}
+    mesh = make(**{name: tuple(value) if isinstance(value, list) else value for name, value in arguments.items()})
     write_mesh(options.output, mesh)
     if not options.quiet:
         say(quality(mesh))

@@ -1,4 +1,4 @@
-"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, what happens over the load."""
+"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, and its history over the load."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
-HELP = "plot the deformed mesh with a field, a section, the contact, or what happens over the load"
-# Pictures of one contact pair.
+HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load"
+# Kinds of pictures of one contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
 
 
@@ -80,7 +80,7 @@ def _plane(text: str) -> tuple[int, float]:
     try:
         return "xyz".index(name.strip()), float(value)
     except ValueError:
-        raise CaseError(f"'{text}' is no plane: write for example y=0") from None
+        raise CaseError(f"'{text}' is not a plane: write for example y=0") from None
 
 
 def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
@@ -101,7 +101,7 @@ def _of_bodies(
     from fastcontact.results import plot
 
     at = f"section {options.section}, " if plane else ""
-    title = f"{case['title']}\n{at}load factor {step.load_factor:g}, displacements x {options.scale:g}".strip()
+    title = f"{case['title']}\n{at}{step.instant}, displacements x {options.scale:g}".strip()
     labels = {"field": options.field, "scale": options.scale, "zoom": options.zoom, "title": title}
     if plane is None:
         return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
@@ -111,14 +111,14 @@ def _of_bodies(
 
 
 def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw of one contact pair its map, its zones or history over the load, or the stresses under it."""
+    """Draw a contact pair: its map, its zones or history over the load, or the stresses under it."""
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
     name = _results.chosen_contact(options, step)
     theories = case["theories"].get(name, {})
     if options.map:
-        labels["title"] = f"{case['title']}\ncontact '{name}', load factor {step.load_factor:g}".strip()
+        labels["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
         beside = options.field.removeprefix("contact_") if options.field.startswith("contact_") else "shear"
         return plot.contact_map(results.mesh, step.contact[name], beside=beside, **labels)[0]
     if options.zones:
@@ -126,12 +126,12 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     if options.history:
         given = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
         return plot.history(list(results), name, law=_results.law(theories), **given, **labels)[0]
-    labels["title"] = f"{case['title']}\nstresses on the axis, load factor {step.load_factor:g}".strip()
+    labels["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
     return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
 
 
 def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str, Any]) -> dict[str, Any]:
-    """Return theories of the stresses on the axis by label, at equal approach and at equal force."""
+    """Return theories of the stresses on the axis, by label, at equal approach and at equal force."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     if theory is None or not hasattr(theory, "stress_on_axis"):

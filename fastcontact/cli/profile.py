@@ -1,4 +1,4 @@
-"""``fastcontact profile``: pressure along the contact line, as table, XMGRACE file and picture, against theory."""
+"""``fastcontact profile``: pressure along the contact line compared with theory, as table, XMGRACE file and picture."""
 
 from __future__ import annotations
 

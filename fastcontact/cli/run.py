@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
 # Cell field of the estimated error.
 ERROR = "error"
-# Steps of meshes of so many points are written while the next one is computed; of others writing takes no time.
+# Number of mesh points from which steps are written while the next one is computed; smaller ones take no time.
 LARGE = 30_000
 
 
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
         case = read_case(options.case)
     read = time.perf_counter()
     with in_file(case_path(options.case)):
-        case.model.check(case.ramp)  # a wrong model must not replace the results of a right one
+        case.model.check(case.ramp)  # an invalid model must not replace existing results
         early += _checked_study(case)
     with warnings_shown() as caught:
         caught += early
@@ -81,7 +81,7 @@ def run(options: argparse.Namespace) -> int:
     if options.plot:
         profile_picture(case, last, options.plot)
     for text in texts:
-        if text not in caught:  # of the steps that were there already
+        if text not in caught:  # warnings of steps from an earlier run
             say(f"warning: {text}", error=True)
     if not options.quiet:
         say("\n".join(summary.lines(numbers)))
@@ -106,14 +106,14 @@ def _checked_study(case: Case) -> list[str]:
 
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
-    """Return the modes that the case or the command asks for, written to their file; None for none."""
-    asked = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
-    if case.modes is None and not options.modes and not asked:
+    """Return the modes requested by the case or the command, after writing them to their file; None for none."""
+    arguments = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
+    if case.modes is None and not options.modes and not arguments:
         return None
     from fastcontact.analysis.modes import modes
     from fastcontact.results.writer import ResultWriter
 
-    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **asked})
+    computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **arguments})
     if options.modes:
         shapes, of = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
         with ResultWriter(options.modes, of, case_text=case.text) as writer:
@@ -133,7 +133,7 @@ def _diameters(text: str | None) -> dict[str, Any]:
 
 
 def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
-    """Write all steps; return how many were there before, their warnings, the last one, and the summaries of all."""
+    """Write all steps; return the number of earlier steps, their warnings, the last step, and all summaries."""
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.analysis.run import solve_steps
@@ -146,24 +146,20 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
     ) as writer:
         _check_same(case, writer.done, output)
         last = writer.done[-1] if writer.done else None
-        done = [(of_step(step), step.warnings) for step in writer.done]  # each is read once: they may be many and large
+        done = [
+            (of_step(step), step.warnings) for step in writer.done
+        ]  # each is read only once: there may be many large ones
         steps = [summary for summary, _ in done]
-        _tell_other_steps(case, [summary["load_factor"] for summary in steps], output)
+        _warn_of_other_steps(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
         progress = Progress(total, show=somebody_watches() and not options.quiet, done=len(steps))
         try:
-            for last in solve_steps(
-                case.model,
-                case.ramp,
-                linear_solver=options.linear or case.linear_solver,
-                linear_tolerance=case.linear_tolerance,
-                criteria=case.criteria,
-                resume=writer.done,
-            ):
+            chosen = {**case.solution, "linear_solver": options.linear or case.linear_solver}
+            for last in solve_steps(case.model, case.ramp, **chosen, resume=writer.done):
                 last = case.finished(last)
                 writer.write(_estimated(case.model, last) if fields else last)
                 steps.append(of_step(last))
-                progress.step(last, writer.n_steps)  # what is still being written does not count
+                progress.step(last, writer.n_steps)  # steps still being written do not count
             writer.wait()
         except (ConvergenceError, KeyboardInterrupt) as error:
             _stopped(error, writer, output, options.json)
@@ -174,18 +170,18 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
 
 
 def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
-    """Say in an error, and in the file of the summary, how many steps are complete."""
+    """Add the number of complete steps to an error and to the summary file."""
     try:
         writer.wait()
     except FileError as failure:
         error.add_note(str(failure))
-    error.add_note(_kept(output, writer.n_steps))
-    if summary:  # in place of the summary of an earlier run
+    error.add_note(_kept_steps(output, writer.n_steps))
+    if summary:  # replaces the summary of an earlier run
         write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
 
 def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
-    """Refuse to go on with the steps of another case."""
+    """Refuse to resume with the steps of another case."""
     from fastcontact.analysis import restart
 
     if done:
@@ -195,19 +191,19 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
             raise ModelError(f"'{output}' cannot be resumed: {error}") from error
 
 
-def _tell_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
-    """Warn where load factors of steps that were there before are none of the case now."""
+def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
+    """Warn if load factors of existing steps are not in the current case."""
     known = case.ramp.instants
     others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
     if others:
         warn(
             f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file stay, also at load factor "
-            f"{others[0]:g}, which is none of the case's; without --resume all are solved anew"
+            f"{others[0]:g}, which is not in the case; without --resume all are solved anew"
         )
 
 
-def _kept(output: Path, steps: int) -> str:
-    """Return which steps the result file of a stopped run holds."""
+def _kept_steps(output: Path, steps: int) -> str:
+    """Return a message on the complete steps in the result file of a stopped run."""
     if not steps:
         return f"'{output}' holds no complete step"
     many = "one complete step" if steps == 1 else f"all {steps} complete steps"
@@ -215,7 +211,7 @@ def _kept(output: Path, steps: int) -> str:
 
 
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:
-    """Return the names of the files written, and how many steps were there before."""
+    """Return a message on the files written and the number of earlier steps."""
     if done == total:
         nothing = f"{output} was complete with {total} steps, nothing was left to solve"
         return "; wrote ".join([nothing, ", ".join(others)] if others else [nothing])

@@ -1,4 +1,4 @@
-"""``fastcontact sweep``: a case for many values of its parameters, held against theory."""
+"""``fastcontact sweep``: a case for many values of its parameters, compared with theory."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact.cli import _study
 from fastcontact.errors import CaseError
 
-HELP = "solve a case for many values of its parameters, held against theory"
+HELP = "solve a case for many values of its parameters, and compare with theory"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,13 +42,13 @@ def run(options: argparse.Namespace) -> int:
         if name in wanted:
             raise CaseError(f"--set {name} is given twice: give all its values at once, as in {name}=1,2,5")
         wanted[name] = listed
-    given = {"element": options.element, "formulation": options.formulation, "level": options.level}
-    sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **given))
+    chosen = {"element": options.element, "formulation": options.formulation, "level": options.level}
+    sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **chosen))
     return _study.report(options, sweep, "--png FILE makes a picture", [text for _, text in sweep.failed])
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """Return a parameter and its values from ``NAME=VALUES``; raises CaseError if the text is of another form."""
+    """Return a parameter and its values from ``NAME=VALUES``; raises CaseError if the text has another form."""
     name, equals, listed = text.partition("=")
     if not (name and equals and listed):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")
@@ -57,13 +57,13 @@ def values(text: str) -> tuple[str, list[Any]]:
     return name.strip(), [_value(entry.strip()) for entry in listed.split(",") if entry.strip()]
 
 
-def _range(text: str, parts: list[str]) -> list[float]:
+def _range(text: str, fields: list[str]) -> list[float]:
     from fastcontact.studies.affordable import check_runs
 
-    logarithmic = parts[-1] == "log"
+    logarithmic = fields[-1] == "log"
     try:
-        first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
-        if len(parts) != 3 + logarithmic or count < 1 or (logarithmic and first * last <= 0):
+        first, last, count = float(fields[0]), float(fields[1]), int(fields[2])
+        if len(fields) != 3 + logarithmic or count < 1 or (logarithmic and first * last <= 0):
             raise ValueError
         if not (math.isfinite(first) and math.isfinite(last)):
             raise ValueError

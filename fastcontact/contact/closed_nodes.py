@@ -1,10 +1,10 @@
 r"""Non-negative nodal pressures that vanish at open nodes and integrate to the contact force.
 
-A pressure field that is found by projection undershoots beyond the edge of the contact, and what an open node has of it is
-part of the force all the same: :math:`\int p_h\,dA = \sum_j A_j p_j` holds for all nodes together. So the share
-:math:`A_j p_j` of an open node is not dropped but handed to the closed nodes next to it, those of its facets and of the
-facets around these, all of which change by the same pressure. That is the least change over so few nodes; fewer take a kink,
-and more are farther from where the error is. A tension at a closed node makes it an open one.
+A pressure field obtained by projection undershoots beyond the edge of the contact, and its values at open nodes contribute to
+the force: :math:`\int p_h\,dA = \sum_j A_j p_j` holds for all nodes together. The share :math:`A_j p_j` of an open node is
+therefore not dropped but distributed over the closed nodes nearby, those of its facets and of the adjacent facets, all of
+which change by the same pressure. This is the smallest change over this set of nodes; fewer nodes would produce a kink, and
+more would lie farther from the error. A closed node in tension becomes an open one.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import SUM_ROUND_OFF
 
-# A node with less than this part of the mean area takes no share: its pressure would be anything.
+# Less than this fraction of an area counts as none: a node would have any pressure, a multiplier next to no equation.
 NO_AREA = 1e-3
 
 
 def carried(
     closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface, may_pull: bool = False
 ) -> tuple[Mask, Array]:
-    """Return which nodes are closed without tension, and the pressures (m,) with which they carry all shares.
+    """Return the nodes that are closed without tension, and the pressures (m,) with which they carry all shares.
 
     Parameters
     ----------
@@ -31,12 +31,12 @@ def carried(
     nodal : ndarray (m,)
         Pressures of all nodes [pressure].
     shares : ndarray (m,)
-        Shares of all nodes in the resultant: their pressures times their areas, but for nodes without area [force].
+        Shares of all nodes in the resultant: their pressures times their areas, except at nodes without area [force].
     areas : ndarray (m,)
         Integrals of the nodes' shape functions over the whole side [area].
     side : Surface
     may_pull : bool
-        Leave tension where it is.
+        Whether closed nodes may be in tension.
     """
     while True:
         if not may_pull:
@@ -57,7 +57,7 @@ def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Sur
     moving[takers | (np.abs(moving) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
     if not moving.any():
         return np.zeros_like(moving)
-    # From ring to ring towards the takers, the farthest first.
+    # From ring to ring towards the receiving nodes, the farthest first.
     rings = _rings(takers, moving, side)
     for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
         room = np.where(inner, areas if inner is takers else 1.0, 0.0)
@@ -71,14 +71,14 @@ def _takers(closed: Mask, areas: Array) -> Mask:
 
 
 def _alone(shares: Array, areas: Array) -> tuple[Mask, Array]:
-    """Return the node with the largest share as the only closed one, and pressures (m,) with which it carries them all."""
+    """Return the node with the largest share as the only closed one, and pressures (m,) with which it carries all shares."""
     most = np.argmax(np.where(_takers(np.ones(len(areas), bool), areas), shares, -np.inf))
     closed = np.arange(len(areas)) == most
     return closed, np.where(closed, shares.sum() / areas[most], 0.0)
 
 
 def _rings(takers: Mask, moving: Array, side: Surface) -> list[Mask]:
-    """Return the takers, the nodes near them, those near these, and so on until all that moves is reached."""
+    """Return the receiving nodes, their neighbours, and so on, until all nodes with shares to move are included."""
     rings, reached = [takers], takers.copy()
     while (moving[~reached] != 0.0).any():
         ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~reached

@@ -1,8 +1,8 @@
-"""Tension between the sides of a contact pair, up to a limit beyond which it falls: cohesive layers, and adhesion.
+"""Traction-separation laws of cohesive layers and of adhesion.
 
 Traction is ``(1 - damage) stiffness`` times the opening and the sliding of the sides (Camanho and Davila,
 NASA/TM-2002-211737, with the mixed-mode limits of Turon, Camanho, Costa and Davila, 2006). Damage grows so that the traction
-falls linearly with the largest separation; unloading follows the secant. What is pressed together has the full
+falls linearly with the largest separation; unloading follows the secant. In compression the layer has its undamaged
 stiffness.
 """
 
@@ -13,9 +13,10 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 
-# Of the opening at which a layer is broken, that of its largest traction, where no stiffness is given.
+# Opening at the largest traction over the opening at break, where no stiffness is given.
 ELASTIC = 0.01
 
 
@@ -28,18 +29,19 @@ class CohesiveLaw:
     strength, shear_strength : float
         Largest traction in pure opening and in pure sliding [pressure].
     energy, shear_energy : float
-        What breaking takes by area in pure opening and in pure sliding: the areas below the law [pressure length].
+        Fracture energies per area in pure opening and in pure sliding: the areas below the law [pressure length].
     stiffness : float
         Slope of the law before any damage [pressure / length].
     exponent : float
-        Of Benzeggagh and Kenane, or of the power law, between the modes [-].
+        Exponent of the mixed-mode criterion: Benzeggagh and Kenane's, or that of the power law [-].
     reversible : bool
         Whether the law has no memory, and no resistance to sliding: adhesion.
     initiation : str
-        When damage of mixed modes begins: ``"bk"``, a limit between those of the modes as for the energies; ``"quadratic"``,
-        where the squares of the tractions over their limits sum to one; ``"maximum"``, where one of them reaches its limit.
+        Criterion of damage initiation in mixed mode: ``"bk"``, interpolated between the modes as the energies are;
+        ``"quadratic"``, the squares of the tractions over their limits sum to one; ``"maximum"``, one of them reaches
+        its limit.
     mixed_mode : str
-        What breaking by mixed modes takes: ``"bk"``, or ``"power"``: powers of the energies over their limits sum to one.
+        Fracture energy in mixed mode: ``"bk"``, or ``"power"``: powers of the energies over their limits sum to one.
     """
 
     strength: float
@@ -53,7 +55,7 @@ class CohesiveLaw:
     mixed_mode: str = "bk"
 
     def limits(self, opening: Array, sliding: Array) -> tuple[Array, Array]:
-        """Return the separations (m,) at which damage begins and ends, by the ratio of opening and sliding (m,) [length]."""
+        """Return the separations (m,) at damage initiation and at break for a mode ratio opening to sliding (m,) [length]."""
         normal, shear = self.strength / self.stiffness, self.shear_strength / self.stiffness
         square = np.maximum(opening, 0.0) ** 2 + sliding**2
         share = np.divide(sliding**2, square, out=np.zeros_like(square), where=square > 0.0)
@@ -72,21 +74,21 @@ class CohesiveLaw:
         return onset, 2.0 * energy / (self.stiffness * onset)
 
     def damage(self, opening: Array, sliding: Array, before: Array) -> Array:
-        """Return the damage (m,) at openings and slidings (m,) [length], after that of `before` (m,) [-]."""
+        """Return the damage (m,) at openings and slidings (m,) [length], at least the earlier damage `before` (m,) [-]."""
         onset, end = self.limits(opening, sliding)
         separation = np.maximum(np.hypot(np.maximum(opening, 0.0), sliding), onset)
         now = np.minimum(end * (separation - onset) / (separation * (end - onset)), 1.0)
         return now if self.reversible else np.maximum(now, before)
 
     def released(self, opening: Array, sliding: Array, damage: Array) -> Array:
-        """Return the energy by area that damage (m,) has taken, at the ratio of modes of opening and sliding (m,)."""
+        """Return the energy per area dissipated by damage (m,), at the mode ratio of opening and sliding (m,)."""
         onset, end = self.limits(opening, sliding)
         separation = onset * end / (end - damage * (end - onset))
         return 0.5 * self.stiffness * onset * end * (separation - onset) / (end - onset)
 
 
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **given: Any) -> CohesiveLaw:
-    """Return a law, with shear as opening and a stiffness that reaches its limit at a small part of the opening at break."""
+    """Return a law; by default shear is as opening, and the stiffness reaches the strength at a small opening."""
     stiffness = given.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
     shear = {"shear_strength": given.pop("shear_strength", strength), "shear_energy": given.pop("shear_energy", energy)}
     return CohesiveLaw(strength, energy, stiffness, **shear, **given, reversible=reversible)
@@ -94,20 +96,20 @@ def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **
 
 @dataclass(frozen=True, eq=False)
 class Bond:
-    """What a cohesive layer is like at the end of a load step.
+    """State of a cohesive layer at the end of a load step.
 
     Attributes
     ----------
     positions : ndarray (m, dim)
-        Reference places [length].
+        Reference positions [length].
     sliding : ndarray (m, dim)
-        Relative tangential displacement so far [length].
+        Relative tangential displacement since the beginning [length].
     damage : ndarray (m,)
-        0 as new, 1 broken [-].
+        Damage, from 0 (intact) to 1 (broken) [-].
     released : float
-        Energy that breaking has taken so far [energy]; of adhesion that of the law less `stored`.
+        Energy dissipated by damage so far [energy]; for adhesion, that of the law less `stored`.
     stored : float
-        Energy of the springs that are left [energy].
+        Elastic energy of the undamaged fraction [energy].
     """
 
     positions: Array
@@ -117,10 +119,8 @@ class Bond:
     stored: float = 0.0
 
     def at(self, positions: Array) -> tuple[Array, Array]:
-        """Return sliding (n, dim) [length] and damage (n,) at the nearest of other places (n, dim) [length]."""
+        """Return sliding (n, dim) [length] and damage (n,) at the positions nearest to `positions` (n, dim) [length]."""
         if np.array_equal(positions, self.positions):
             return self.sliding, self.damage
-        from scipy.spatial import cKDTree
-
-        nearest = cKDTree(self.positions).query(positions)[1]
-        return self.sliding[nearest], self.damage[nearest]
+        rows = nearest(self.positions, positions)[1]
+        return self.sliding[rows], self.damage[rows]

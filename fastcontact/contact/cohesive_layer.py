@@ -1,7 +1,8 @@
 """A cohesive layer between the sides of a contact pair: equations whose compliance follows its law.
 
-In each pairing the traction is a line: through zero where the layer has not been stretched as far before, and level where it
-falls. Matrices so stay positive definite, and pairings approach every state that is stable under prescribed displacements.
+In each pairing the traction is linearised: by the secant where the layer unloads or reloads, and by a nearly constant
+traction where it softens. Matrices then stay positive definite, and the pairings converge to every state that is stable under
+prescribed displacements.
 """
 
 from __future__ import annotations
@@ -55,14 +56,12 @@ class Layer:
     def after(self, constraints: Constraints, u: Array) -> Bond:
         """Return the layer at the end of a step with displacements u (n_dofs,) [length]."""
         end = (constraints.gap0 + constraints.B @ u).reshape(self.rest.shape) + self.rest
-        opening, *slides = np.where(
-            self.damage < 1.0, end, self.separation
-        )  # what is broken has no rows along the sides
+        opening, *slides = np.where(self.damage < 1.0, end, self.separation)  # broken: no tangential rows
         sliding = sum((s[:, None] * t for s, t in zip(slides, self.directions)), np.zeros_like(self.before.sliding))
         size, law = np.linalg.norm(sliding, axis=1), self.law
         areas = np.where(np.isfinite(self.areas), self.areas, 0.0)
-        whole = np.where(self.damage < 1.0, 1.0 - self.damage, 0.0)
-        stretched = np.where(opening < 0.0, 1.0, whole) * opening**2 + whole * size**2
+        integrity = np.where(self.damage < 1.0, 1.0 - self.damage, 0.0)
+        stretched = np.where(opening < 0.0, 1.0, integrity) * opening**2 + integrity * size**2
         grown = law.released(opening, size, self.damage) - law.released(opening, size, self.before.damage)
         released = self.before.released + float(areas @ grown)
         return Bond(
@@ -96,21 +95,21 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying:
         u, start
     ):  # an obstacle has moved, and the body follows in this pairing only
         damage = np.minimum(damage, before.damage)
-    whole, now = damage < 1.0, np.stack([opening, *slides])
-    secant = np.tile(np.where(whole, 1.0 - damage, 1.0), (len(now), 1))
+    intact, now = damage < 1.0, np.stack([opening, *slides])
+    secant = np.tile(np.where(intact, 1.0 - damage, 1.0), (len(now), 1))
     secant[0, opening < 0.0] = 1.0
-    falls = whole & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
+    falls = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
     slope = np.where(falls, LEVEL, secant)
     layer = Layer(law, constraints.directions, constraints.areas, before, damage, now, now * (1.0 - secant / slope))
     return replace(
         constraints,
         B=csr_array(vstack([constraints.B, *constraints.tangents], format="csr")),
-        gap0=np.concatenate([constraints.gap0 - np.where(whole, lying, 0.0), *along]) - layer.rest.ravel(),
-        equality=np.tile(whole, len(now)),
+        gap0=np.concatenate([constraints.gap0 - np.where(intact, lying, 0.0), *along]) - layer.rest.ravel(),
+        equality=np.tile(intact, len(now)),
         softness=1.0 / (slope * law.stiffness * constraints.areas).ravel(),
         positions=np.tile(constraints.positions, (len(now), 1)),
         areas=np.tile(constraints.areas, len(now)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(now)),
         compliance=None, tangents=(), directions=(), slip0=None, friction=None, tied=layer,
-        branches=(falls + 2 * (opening < 0.0) + 4 * ~whole).ravel().astype(np.int8),
-    ).without(np.concatenate([none > 0.0, *[~whole] * len(along)]))  # fmt: skip
+        branches=(falls + 2 * (opening < 0.0) + 4 * ~intact).ravel().astype(np.int8),
+    ).without(np.concatenate([none > 0.0, *[~intact] * len(along)]))  # fmt: skip

@@ -1,8 +1,8 @@
-"""Conductance of a contact: how much heat crosses it by pressure and gap, and between which temperatures.
+"""Thermal contact conductance as a function of pressure and gap, and the temperatures on both sides.
 
-The heat that crosses at a constraint is ``h * area * (T_secondary - T_primary)``, the temperatures weighted with the
-functions that the constraint weights gaps with: its transpose gives the powers of the nodes. Mortar functions sum to one, so
-that a uniform flux passes between meshes that do not match without error (Hueber and Wohlmuth, 2009, section 3).
+The heat flow at a constraint is ``h * area * (T_secondary - T_primary)``, the temperatures weighted with the test functions
+of the constraint's gap; the transpose gives the nodal powers. Mortar functions sum to one, so that a uniform flux is
+transmitted exactly between non-matching meshes (Hueber and Wohlmuth, 2009, section 3).
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ TABLES = ("pressure", "gap")
 
 
 class Conductance:
-    """The heat that crosses a contact by area and difference of temperatures.
+    """The heat flow across a contact, per area and temperature difference.
 
-    ContactError if it is not one.
+    Raises ContactError for a value that is no conductance.
 
     Parameters
     ----------
     name : str
-        Of the contact pair, for messages.
+        Name of the contact pair, for messages.
     given : float, callable, sequence or mapping
         A number, where the sides touch; a function of pressures and gaps (m,), also where they are open; pairs (pressure,
         conductance), where they touch; or a mapping of ``"pressure"`` to such pairs, ``"gap"`` to pairs (gap, conductance)
@@ -76,7 +76,7 @@ class Conductance:
 
     @property
     def sampled(self) -> Any:
-        """What tells it from others: a number or tables as they are given, values of a function."""
+        """Values that identify the conductance: the number or tables as given, sampled values of a function."""
         if not callable(self.given):
             return self.given
         scale = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
@@ -85,7 +85,7 @@ class Conductance:
     def __call__(self, pressure: Array, gap: Array) -> Array:
         """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,), zero where the sides touch [length].
 
-        ContactError if a function returns anything else.
+        Raises ContactError if a function returns anything else.
         """
         touching = gap == 0.0
         if self._number is not None:
@@ -115,14 +115,14 @@ class Conductance:
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """Where heat crosses a contact pair.
+    """The discrete heat transfer of a contact pair.
 
     Attributes
     ----------
     secondary, primary : csr_array (m, n_points)
         Weights of the temperatures on both sides of each constraint, which sum to one [-].
     area : ndarray (m,)
-        That it stands for, zero where it faces nothing [area].
+        Area of each constraint, zero where it faces nothing [area].
     """
 
     secondary: csr_array
@@ -131,7 +131,7 @@ class Crossing:
 
     @property
     def jump(self) -> csr_array:
-        """Rows (m, n_points) of temperatures of the secondary less those of the primary side [-]."""
+        """Rows (m, n_points) of the temperature jump, secondary minus primary side [-]."""
         return csr_array(self.secondary - self.primary)
 
     def matrix(self, h: Array) -> csr_array:
@@ -139,28 +139,28 @@ class Crossing:
         return csr_array(self.jump.T @ diags_array(h * self.area) @ self.jump)
 
     def shared(self, power: Array) -> Array:
-        """Return the powers (n_points,) of nodes by heat (m,) that is made between the sides, half of it for each [power]."""
+        """Return the nodal powers (n_points,) of heat generated at the interface (m,), half of it on each side [power]."""
         return np.asarray(0.5 * (self.secondary.T @ power + self.primary.T @ power))
 
 
 def crossing(
     constraints: Constraints, secondary: Surface, primary: Surface | RigidSide, shape: tuple[int, ...]
 ) -> Crossing:
-    """Return where heat crosses between two sides by constraints, whose rows weight motions along one normal each.
+    """Return the heat transfer between two sides at constraints, whose rows weight displacements along one normal each.
 
     A rigid primary side has no points, and no weights. `shape` is that of the points of the mesh, (n_points, dim).
     """
     n, dim = shape
-    mine = np.zeros(n, bool)
-    mine[secondary.points] = True
+    on_secondary = np.zeros(n, bool)
+    on_secondary[secondary.points] = True
     if isinstance(primary, Surface):
-        mine[primary.points] = False
+        on_secondary[primary.points] = False
     by_axis = [csr_array(constraints.B[:, : n * dim][:, axis::dim]) for axis in range(dim)]
-    normal = np.stack([rows @ mine for rows in by_axis], axis=1)
+    normal = np.stack([rows @ on_secondary for rows in by_axis], axis=1)
     length = np.einsum("md,md->m", normal, normal)
     scale = normal / np.where(length > 0.0, length, np.inf)[:, None]
     rows = sum(diags_array(scale[:, axis]) @ by_axis[axis] for axis in range(dim))
     assert constraints.areas is not None
     facing = np.isfinite(constraints.areas) & (length > 0.0)
-    rows_of_side = csr_array(rows @ diags_array(mine.astype(float)))
+    rows_of_side = csr_array(rows @ diags_array(on_secondary.astype(float)))
     return Crossing(rows_of_side, csr_array(rows_of_side - rows), np.where(facing, constraints.areas, 0.0))

@@ -24,29 +24,29 @@ class Configuration:
     obstacle, obstacle_start : ndarray (dim,)
         Displacement of a rigid obstacle, now and at the beginning of the load step [length].
     clearance_factor : float
-        What the clearances of the pair are multiplied with.
+        Factor on the clearances of the pair.
     never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
-        Reference places of constraints at the end of the load step before [length], and which of them never open again;
-        None where all may open.
+        Reference positions of the constraints at the end of the previous load step [length], and which of them cannot
+        separate any more; None where all may open.
     elastic_slip : (ndarray (k, dim), ndarray (k, dim)), optional
-        Reference places of constraints at the end of the load step before, and the slips by which their own compliance gave
-        way to the forces there [length]; None where nothing gives.
+        Reference positions of the constraints at the end of the previous load step, and their elastic slips there [length];
+        None without tangential compliance.
     angle, angle_start : float
-        By which a rigid obstacle has turned, likewise [radian].
+        Rotation of a rigid obstacle, now and at the beginning of the load step [radian].
     worn : ndarray (n_points,), optional
-        Depth worn off at the secondary nodes before the load step [length]; None for nothing.
+        Wear depth at the secondary nodes before the load step [length]; None for no wear.
     bond : Bond, optional
-        The cohesive layer at the end of the load step before; None where there is none, or none yet.
+        The cohesive layer at the end of the previous load step; None where there is none, or none yet.
     fluid_pressure : float
-        Of the fluid at its source [pressure].
+        Pressure of the fluid at its source [pressure].
     pressure : ndarray (n_nodes,), optional
-        What the last pairing has found at the secondary nodes, fluid included [pressure]; None before.
+        Pressure at the secondary nodes in the last pairing, fluid included [pressure]; None before the first one.
     rounded : bool
-        Whether facet normals turn at rounded edges, see `pairing.pair`.
+        Whether facet normals vary at rounded edges, see `pairing.pair`.
     linearised : ndarray (n_points, dim), optional
         Displacement at which the tangent of bodies is taken in finite strain [length]; None for small strains.
     friction_factor : float
-        What the coefficient of friction is multiplied with [-].
+        Factor on the coefficient of friction [-].
     """
 
     displacement: Array
@@ -73,7 +73,7 @@ class Configuration:
 
     @property
     def pose_start(self) -> Pose:
-        """Where a rigid obstacle stood as the load step began."""
+        """Position of a rigid obstacle at the beginning of the load step."""
         return Pose(self.obstacle_start, self.angle_start)
 
     @classmethod

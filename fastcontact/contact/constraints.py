@@ -42,14 +42,14 @@ class NodalField(Protocol):
     nodal_areas : ndarray (n_nodes,)
         Integrals of the nodes' shape functions over the whole secondary side [area].
     covered : ndarray (n_nodes,) or float
-        What part of a node's area faces the primary side, or takes part in contact at all [-].
+        Fraction of each node's area that faces the primary side, or takes part in contact at all [-].
     """
 
     nodal_areas: Array
 
     @property
     def covered(self) -> Array | float:
-        """See the class: all of it, unless a formulation knows parts of facets."""
+        """See the class: 1, unless a formulation integrates over parts of facets."""
         return 1.0
 
     def pressure(self, force: Array) -> Array:
@@ -61,7 +61,7 @@ class NodalField(Protocol):
         return np.column_stack([self.pressure(component) for component in force.T])
 
     def over_whole_side(self, force: Array) -> Array:
-        """Return nodal pressures (n_nodes,) per area of the whole secondary side, whatever part of it faces the other.
+        """Return nodal pressures (n_nodes,) per area of the whole secondary side, whether or not it faces the primary side.
 
         The integral of this field over the side is the sum of the forces.
         """
@@ -70,43 +70,43 @@ class NodalField(Protocol):
     def shares(self, force: Array) -> Array:
         """Return the shares (n_nodes,) of the nodes in the sum of the forces [force].
 
-        The pressures over the whole side times the areas, but for nodes whose areas vanish.
+        The pressures over the whole side times the areas, except at nodes whose areas vanish.
         """
         return self.over_whole_side(force) * self.nodal_areas
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
-        """Return gaps at the nodes (n_nodes,), of those (m,) of constraints, and the nearest node of each of these (m,).
+        """Return the nodal gaps (n_nodes,) from those (m,) of constraints, and the node nearest to each constraint (m,).
 
-        Infinite where nothing is faced [length].
+        Infinite where a node faces nothing [length].
         """
         return gaps, np.arange(len(gaps))
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
         """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure].
 
-        Those of active constraints, unless a formulation has more or fewer than one a node.
+        These are the nodes of active constraints, unless a formulation does not have one constraint per node.
         """
         return active
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
-        """Return the set (m,) to start from, from gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
+        """Return an initial active set (m,) from gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
 
-        None where constraints are the same in every pairing: then the last set is better.
+        None where the constraints are the same in every pairing: then the last active set is the better guess.
         """
         return None
 
 
 class Wetted(Protocol):
-    """Where fluid has come; see `fluid_pressure.Wetted`."""
+    """Region reached by fluid; see `fluid_pressure.Wetted`."""
 
     @property
     def rows(self) -> Mask:
-        """Constraints (m,)."""
+        """Constraints in that region (m,)."""
         ...
 
     @property
     def pressure(self) -> Array:
-        """Of the fluid at the secondary nodes (n_nodes,) [pressure]."""
+        """Fluid pressure at the secondary nodes (n_nodes,) [pressure]."""
         ...
 
     def force(self, displacement: Array) -> Array:
@@ -146,44 +146,45 @@ class Constraints:
     compliance : Compliance, optional
         C [length / force]; None stands for zero.
     tangents : tuple of csr_array (m, n_dofs)
-        Tangential motion relative to the primary side, a matrix for each tangent [-]; empty without friction.
+        Rows of the tangential displacement relative to the primary side, a matrix for each tangent [-]; empty without
+        friction.
     directions : tuple of ndarray (m, dim)
-        The tangents themselves [-].
+        Unit tangents [-].
     coupled_directions : tuple of ndarray (m, dim)
         The same in the axes in which C couples the components of forces, where these are not those of the mesh [-].
     slip0 : ndarray (len(tangents), m), optional
-        Slip of the step that the motion of a rigid primary side makes by itself [length]; None stands for zero.
+        Slip of the step due to the motion of a rigid primary side [length]; None stands for zero.
     friction : ndarray (m,), optional
         Coefficient of friction of each constraint [-]; None stands for zero.
     equality : ndarray of bool (m,), optional
-        Constraints that hold as equations, with multipliers of either sign; None stands for none.
+        Constraints that are equations, with multipliers of either sign; None stands for none.
     softness : ndarray (m,), optional
         Compliance of each constraint along its normal alone, beside C [length / force]; None stands for zero.
     tangential_softness : ndarray (m,), optional
         Compliance of each constraint along its tangents [length / force]; None stands for zero.
     elastic_slip : ndarray (len(tangents), m), optional
-        What the forces at the beginning of the step take from its slip by their own compliance: only what forces have
-        changed by since then makes constraints give way [length].
+        Elastic slip of the tangential compliance under the forces at the beginning of the step, which the slip of the step
+        is reduced by: only the change of the forces since then adds elastic slip [length].
     low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
         Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
     driven : ndarray (len(tangents), m), optional
-        Slips that supports and obstacles make by themselves, over the largest of all motions [-]; None stands for none.
+        Slips imposed by supports and obstacles, over the largest imposed displacement [-]; None stands for none.
     law : OverclosureLaw, optional
-        Of which `gap0` and `softness` are a line.
+        Law whose linearisation `gap0` and `softness` are.
     branches : ndarray of int, optional
-        On which line of its law each place of a cohesive layer is.
+        Branch of its law at each point of a cohesive layer.
     wetted : Wetted, optional
-        Where fluid has come between the sides.
+        Region reached by fluid between the sides.
     areas : ndarray (m,), optional
-        Area that each constraint stands for [area]; infinite where it does nothing.
+        Area of each constraint [area]; infinite where it takes no part.
     nodes : ndarray of int (m,), optional
-        The secondary node whose displacement each constraint involves most, where there is one for each.
+        The secondary node of each constraint, where each has one.
     nodal : NodalField, optional
-        What normal forces mean at the secondary nodes.
+        Interpretation of normal forces at the secondary nodes.
     tied : Tied, optional
-        Where the constraints are the equations of a tied pair, or of a cohesive layer.
+        Given where the constraints are the equations of a tied pair, or of a cohesive layer.
     geometry : Geometry, optional
-        How rows and gaps vary with the displacements; None where they do not, or nobody knows.
+        Derivatives of rows and gaps with respect to the displacements; None where they are zero or not available.
     """
 
     B: csr_array
@@ -220,12 +221,12 @@ class Constraints:
 
     @property
     def normal_compliance(self) -> Compliance | None:
-        """All compliance along the normals: C and `softness`."""
+        """Total compliance along the normals: C and `softness`."""
         return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
 
     @property
     def coupled(self) -> bool:
-        """Whether a compliance of their own couples constraints."""
+        """Whether a compliance couples constraints."""
         return self.compliance is not None or self.low_rank_compliance is not None
 
     @property
@@ -234,7 +235,7 @@ class Constraints:
         return np.zeros(len(self)) if self.friction is None else self.friction
 
     def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
-        """Return the tangents (k, q) of constraints (q,), turned by Q, along which supports and obstacles move past."""
+        """Return for which tangents (k, q) of constraints (q,), rotated by Q, supports and obstacles impose a slip."""
         if self.driven is None:
             return np.zeros((len(self.tangents), len(rows)), bool)
         slips = np.vstack([np.zeros(len(rows)), self.driven[:, rows]])
@@ -242,11 +243,11 @@ class Constraints:
         return np.asarray(np.abs(turned[1:]) > LENGTH_ROUND_OFF)
 
     def gaps(self, displacement: Array) -> Array:
-        """Return the gaps (m,) [length] for displacements (n_points, dim) [length], compliance left out."""
+        """Return the gaps (m,) [length] for displacements (n_points, dim) [length], without the compliance."""
         return np.asarray(self.gap0 + self.B @ displacement.ravel())
 
     def without(self, open_for_now: Mask) -> Constraints:
-        """Return these constraints of which some (m,) cannot close."""
+        """Return a copy in which the constraints `open_for_now` (m,) cannot close."""
         if not open_for_now.any():
             return self
         keep = diags_array((~open_for_now).astype(float))
@@ -272,13 +273,13 @@ class Constraints:
         return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
     def contact_forces(self, multiplier: Array) -> Array:
-        """Return multipliers (m,) without those of fluid [force]."""
+        """Return the multipliers (m,) without those of the fluid [force]."""
         return multiplier if self.wetted is None else np.where(self.wetted.rows, 0.0, multiplier)
 
     def elastic_slips(self, multiplier: Array, tangential: Array) -> Array:
-        """Return the slips (m, dim) by which constraints give way to normal forces (m,) and tangential ones (m, k) [length].
+        """Return the elastic slips (m, dim) under normal forces (m,) and tangential ones (m, k) [length].
 
-        That is their own compliance times these forces, along the tangents.
+        These are the products of the constraints' compliance and the forces, along the tangents.
         """
         slips = np.zeros_like(tangential)
         if self.tangential_softness is not None:
@@ -286,8 +287,8 @@ class Constraints:
         if self.compliance is not None:
             along = self.coupled_directions or self.directions
             forces = multiplier[:, None] * normals(along) + np.einsum("mk,kmd->md", tangential, np.stack(along))
-            gives = np.column_stack([self.compliance.apply(component) for component in forces.T])
-            slips += np.einsum("md,kmd->mk", gives, np.stack(along))
+            elastic = np.column_stack([self.compliance.apply(component) for component in forces.T])
+            slips += np.einsum("md,kmd->mk", elastic, np.stack(along))
         return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
     def pressure(self, multiplier: Array) -> Array:
@@ -296,7 +297,7 @@ class Constraints:
         return self.nodal.pressure(self.normal_forces(multiplier))
 
     def initially_active(self, u: Array, pressure: Array) -> Mask | None:
-        """Return the set (m,) to start from; see `NodalField`. `u` (n_dofs,) are displacements [length]."""
+        """Return an initial active set (m,); see `NodalField`. `u` (n_dofs,) are displacements [length]."""
         assert self.nodal is not None
         if self.tied is not None and self.equality is not None:
             return self.equality | (self.gap0 + self.B @ u < 0.0)
@@ -310,55 +311,55 @@ class StackedConstraints(Constraints):
     Attributes
     ----------
     parts : dict of str to Constraints
-        Those of each pair, by its name.
+        The constraints of each pair, by its name.
     """
 
     parts: Mapping[str, Constraints] = field(default_factory=dict)
 
     def state(self, active: Mask) -> AnyArray:
-        """Return the set `active` (m,) with the `branches` of all pairs: what is smooth as long as they are the same."""
-        branches = (part.branches for part in self.parts.values() if part.branches is not None)
+        """Return the set `active` (m,) with the `branches` of all pairs: while these are equal, the problem is smooth."""
+        branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
         return np.concatenate([active.astype(np.int8), *branches])
 
     def rows(self) -> dict[str, slice]:
         """Return the rows of each pair, by its name."""
-        ends = np.cumsum([0, *(len(part) for part in self.parts.values())]).tolist()
+        ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()
         return {name: slice(first, end) for name, first, end in zip(self.parts, ends[:-1], ends[1:], strict=True)}
 
 
-def stacked(parts: Mapping[str, Constraints]) -> StackedConstraints:
+def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     """Return the constraints of pairs, by their names, as one."""
-    pairs = list(parts.values())
+    pairs = list(by_pair.values())
     if len(pairs) == 1:
         values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
-        return StackedConstraints(**values, parts=parts)
-    count = max(len(part.tangents) for part in pairs)
-    numbers, still = [np.zeros(len(part)) for part in pairs], [np.zeros((count, len(part))) for part in pairs]
+        return StackedConstraints(**values, parts=by_pair)
+    count = max(len(pair.tangents) for pair in pairs)
+    numbers, still = [np.zeros(len(pair)) for pair in pairs], [np.zeros((count, len(pair))) for pair in pairs]
     return StackedConstraints(
-        csr_array(vstack([part.B for part in pairs], format="csr")),
-        np.concatenate([part.gap0 for part in pairs]),
-        np.vstack([part.positions for part in pairs]),
-        _BlockDiagonal(pairs) if any(part.compliance is not None for part in pairs) else None,
+        csr_array(vstack([pair.B for pair in pairs], format="csr")),
+        np.concatenate([pair.gap0 for pair in pairs]),
+        np.vstack([pair.positions for pair in pairs]),
+        _BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
         tuple(
             csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in pairs], format="csr"))
             for j in range(count)
         ),
         _stacked_directions(pairs),
-        np.concatenate([part.coefficients for part in pairs]),
-        _stacked_values([part.slip0 for part in pairs], still),
-        _stacked_values([part.equality for part in pairs], [zero > 0.0 for zero in numbers]),
-        _stacked_values([part.softness for part in pairs], numbers),
+        np.concatenate([pair.coefficients for pair in pairs]),
+        _stacked_values([pair.slip0 for pair in pairs], still),
+        _stacked_values([pair.equality for pair in pairs], [zero > 0.0 for zero in numbers]),
+        _stacked_values([pair.softness for pair in pairs], numbers),
         _stacked_low_rank(pairs, count),
-        _stacked_values([part.tangential_softness for part in pairs], numbers),
-        _stacked_values([part.elastic_slip for part in pairs], still),
+        _stacked_values([pair.tangential_softness for pair in pairs], numbers),
+        _stacked_values([pair.elastic_slip for pair in pairs], still),
         nodes=_stacked_nodes(pairs),
         coupled_directions=_stacked_directions(pairs, coupled=True),
-        parts=parts,
+        parts=by_pair,
     )
 
 
 def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
-    """Return values (..., m) of all parts side by side, `zeros` where a part has none; None where no part has any."""
+    """Concatenate values (..., m) of all pairs, `zeros` where a pair has none; None where no pair has any."""
     if all(value is None for value in values):
         return None
     return np.concatenate(
@@ -366,34 +367,34 @@ def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
     )
 
 
-def _stacked_nodes(parts: list[Constraints]) -> Indices | None:
-    """Return the nodes of all parts; None where a part has none."""
-    nodes = [part.nodes for part in parts if part.nodes is not None]
-    return np.concatenate(nodes) if len(nodes) == len(parts) else None
+def _stacked_nodes(pairs: list[Constraints]) -> Indices | None:
+    """Return the nodes of all pairs; None where a pair has none."""
+    nodes = [pair.nodes for pair in pairs if pair.nodes is not None]
+    return np.concatenate(nodes) if len(nodes) == len(pairs) else None
 
 
-def _stacked_directions(parts: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
-    """Return the tangents of all parts, zero where a part has none; those of compliances where they are `coupled`."""
-    directions = [(part.coupled_directions if coupled else ()) or part.directions for part in parts]
+def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
+    """Return the tangents of all pairs, zero where a pair has none; with `coupled`, those of the compliances."""
+    directions = [(part.coupled_directions if coupled else ()) or part.directions for part in pairs]
     return tuple(
         np.vstack(
-            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, parts, strict=True)]
+            [along[j] if along else np.zeros_like(p.positions) for along, p in zip(directions, pairs, strict=True)]
         )
         for j in range(max(map(len, directions)))
     )
 
 
-def _stacked_low_rank(parts: list[Constraints], count: int) -> Array | None:
+def _stacked_low_rank(pairs: list[Constraints], count: int) -> Array | None:
     """Return the compliances beside C side by side; `count` is the number of tangents."""
-    if all(part.low_rank_compliance is None for part in parts):
+    if all(pair.low_rank_compliance is None for pair in pairs):
         return None
-    none = [np.zeros((1 + count, len(part), 0)) for part in parts]
-    factors = [z if p.low_rank_compliance is None else p.low_rank_compliance for p, z in zip(parts, none, strict=True)]
+    none = [np.zeros((1 + count, len(pair), 0)) for pair in pairs]
+    factors = [z if p.low_rank_compliance is None else p.low_rank_compliance for p, z in zip(pairs, none, strict=True)]
     return np.stack([block_diag(*component) for component in zip(*factors, strict=True)])
 
 
 class _Softened:
-    """A compliance, or none, and a diagonal one; see `Compliance`."""
+    """The sum of a compliance, or none, and a diagonal one; see `Compliance`."""
 
     def __init__(self, inner: Compliance | None, softness: Array) -> None:
         self._inner, self._softness = inner, softness
@@ -414,25 +415,27 @@ class _Softened:
 
 
 class _BlockDiagonal:
-    """The compliances of several pairs side by side; see `Compliance`."""
+    """Block-diagonal compliance of several pairs; see `Compliance`."""
 
-    def __init__(self, parts: list[Constraints]) -> None:
-        self._parts = [part.compliance for part in parts]
-        self._start = np.cumsum([0] + [len(part) for part in parts])
+    def __init__(self, pairs: list[Constraints]) -> None:
+        self._parts = [pair.compliance for pair in pairs]
+        self._start = np.cumsum([0] + [len(pair) for pair in pairs])
 
     def block(self, rows: Indices) -> Array:
         values = np.zeros((len(rows), len(rows)))
-        for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
-            mine = np.flatnonzero((rows >= first) & (rows < end))
-            if part is not None and len(mine):
-                values[np.ix_(mine, mine)] = part.block(rows[mine] - first)
+        for compliance, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
+            in_block = np.flatnonzero((rows >= first) & (rows < end))
+            if compliance is not None and len(in_block):
+                values[np.ix_(in_block, in_block)] = compliance.block(rows[in_block] - first)
         return values
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
         blocks = []
         for part, first, end in zip(self._parts, self._start[:-1], self._start[1:], strict=True):
-            mine = rows[(rows >= first) & (rows < end)] - first
-            compliance = FieldCompliance.none(len(mine)) if part is None or not len(mine) else part.among(mine)
+            in_block = rows[(rows >= first) & (rows < end)] - first
+            compliance = (
+                FieldCompliance.none(len(in_block)) if part is None or not len(in_block) else part.among(in_block)
+            )
             if not isinstance(compliance, FieldCompliance):
                 return self.block(rows)
             blocks.append(compliance)

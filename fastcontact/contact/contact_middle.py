@@ -1,15 +1,15 @@
 """Centre of a contact zone, and distances from it on the secondary surface.
 
-In axisymmetry the middle is the axis. Otherwise it is the centre of pressure, of the contact as it is completed by reflection
-at the planes of symmetry that it reaches: a half or a quarter of a model has its middle on these planes. A plane of
-symmetry is one on which supports hold the nodes at an end of the surface across the plane.
+In axisymmetry the middle is the axis. Otherwise it is the centre of pressure of the contact, completed by reflection at the
+planes of symmetry that it reaches: a half or quarter model has its middle on these planes. A plane of symmetry is one in
+which supports hold the nodes at an end of the surface normal to the plane.
 
-In the plane, places are lengths along the surface: a ring unrolls. The same holds in axisymmetry where the surface runs along
-the axis rather than across, as in a press fit of cylinders. In space places are distances from the line through the middle
-along the mean normal.
+In the plane, coordinates are arc lengths along the surface: a ring is unrolled. The same holds in axisymmetry where the
+surface runs along the axis rather than across it, as in a press fit of cylinders. In space they are distances from the line
+through the middle along the mean normal.
 
-The half-width of a contact in the plane is that of its shadow along the mean normal: half the chord of a pin in its hole, not
-the arc.
+The half-width of a contact in the plane is that of its projection along the mean normal: half the chord of a pin in its hole,
+not half the arc.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
 ACROSS = 0.5
-# A direction is held where at least this part of it, squared, is prescribed.
+# A direction is held where at least this fraction of it, squared, is prescribed.
 HELD = 0.99
-# Below this length of the mean of unit normals a surface closes on itself: it has no direction.
+# A surface whose mean of unit normals is shorter than this closes on itself: it has no mean direction.
 DIRECTED = 0.3
 
 
@@ -43,14 +43,14 @@ class ContactMiddle:
     position : ndarray (dim,)
         On the surface [length].
     line : UnrolledLine, optional
-        The surface as a line, where places are lengths along it; `start` is the length at the middle [length].
+        The surface as a line, where coordinates are arc lengths; `start` is the arc length at the middle [length].
     direction : ndarray (dim,), optional
-        Of the line from which distances are measured [-].
+        Direction of the line from which distances are measured [-].
     ignored : tuple of int
-        Coordinates along which the model stands for an endless one.
+        Coordinates along which the model represents an infinite one.
     tangent : ndarray (dim,), optional
-        Along which half-widths are measured, either way [-]; without one, as in axisymmetry, in space, and on a ring that is
-        pressed all round, places count.
+        Direction along which half-widths are measured, both ways [-]; without one (in axisymmetry, in space, and on a ring
+        in contact all round) half-widths are measured by coordinates.
     """
 
     position: Array
@@ -62,11 +62,11 @@ class ContactMiddle:
     tangent: Array | None = None
 
     def across(self, positions: Array) -> Array:
-        """Return how far reference positions (n, dim) lie from the middle (n,), seen along the normal there [length]."""
+        """Return the distances (n,) of reference positions (n, dim) from the middle, projected along its normal [length]."""
         return self.places(positions) if self.tangent is None else (positions - self.position) @ self.tangent
 
     def places(self, positions: Array) -> Array:
-        """Return how far reference positions (n, dim) lie from the middle (n,), along a line with a sign [length]."""
+        """Return the distances (n,) of reference positions (n, dim) from the middle, signed along a line [length]."""
         if self.line is not None:
             along = self.line.lengths(positions) - self.start
             if self.line.closed:
@@ -91,7 +91,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
         Their normal contact forces [force].
     closed : ndarray of bool (n_nodes,)
     gap : ndarray (n_nodes,)
-        Open contact has its middle where the gap is smallest [length].
+        Gaps; an open contact has its middle where the gap is smallest [length].
     """
     surface, points = pair.secondary, pair.points[pair.secondary.points]
     weight = _weights(force, gap)
@@ -129,9 +129,9 @@ def _meets_axis(points: Array) -> bool:
 
 
 def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
-    """Return the planes of symmetry at the ends of a surface: their axis, and which nodes of the surface lie on them.
+    """Return the planes of symmetry at the ends of a surface: their axis, and the nodes of the surface on them.
 
-    `coordinates` (n_points, dim) are those of all points; without supports there is no plane.
+    `coordinates` (n_points, dim) are those of all points; without supports there is not a plane.
     """
     if motions is None:
         return []
@@ -152,9 +152,9 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
 
 
 def _weights(force: Array, gap: Array) -> Array:
-    """Return the weights (n_nodes,) of the nodes in the centre of pressure [-], which sum up to 1."""
+    """Return the weights (n_nodes,) of the nodes in the centre of pressure [-], which sum to 1."""
     weight, total = force, float(force.sum())
-    if total <= 1e-6 * float(np.abs(force).sum()):  # nothing presses, or contact that pulls as much
+    if total <= 1e-6 * float(np.abs(force).sum()):  # no force, or tension of equal magnitude
         weight = np.abs(force)
         total = float(weight.sum())
     if total > 0:
@@ -176,7 +176,7 @@ def _reached(surface: Surface, nodes: Indices, closed: Mask) -> bool:
 def _along_line(
     surface: Surface, coordinates: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array
 ) -> ContactMiddle:
-    """Return the middle on a surface in the plane; one in several pieces is seen along its mean normal."""
+    """Return the middle on a surface in the plane; a surface in several pieces is projected along its mean normal."""
     points, length = coordinates[surface.points], float(np.linalg.norm(mean))
     centre, tangent = weight @ points, np.array([-mean[1], mean[0]]) / (length or 1.0)
     line = unrolled(surface, coordinates, centre if length > DIRECTED else None)

@@ -1,4 +1,4 @@
-"""Facets of different bodies that face each other, found by the closest facet to points on each."""
+"""Facets of different bodies that face each other, determined by the closest facet to sample points of each."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import cells_of_outer_facets, outer_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# How far inside of a facet the points beside its nodes are looked at from, relative to the way to its middle.
+# Distance of the sample points beside nodes from these nodes, relative to the distance to the middle of the facet.
 INSET = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class OuterFacets:
-    """The facets on the outside of bodies, numbered through blocks of one kind each.
+    """The outer facets of bodies, numbered consecutively through blocks of one kind each.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class OuterFacets:
     blocks : dict of str to ndarray of int (n_facets, n_nodes)
         Connectivity by element, normals outward.
     body, cell : ndarray of int (n,)
-        Of each facet: its body, and the number of the solid cell behind it.
+        Body and solid cell of each facet.
     """
 
     mesh: Mesh
@@ -54,17 +54,17 @@ class OuterFacets:
 
     @cached_property
     def first(self) -> Indices:
-        """The number of the first facet of each block, and that of all."""
+        """The number of the first facet of each block, and the total number."""
         return np.cumsum([0, *map(len, self.blocks.values())])
 
     @cached_property
     def samples(self) -> tuple[Indices, Array, Array]:
-        """Points inside the facets: the facet (m,) of each, where it is (m, dim) [length], the outward normal (m, dim)."""
+        """Sample points inside the facets: facet (m,), position (m, dim) [length] and outward normal (m, dim) of each."""
         owner, point, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
             inside = element.nodes + INSET * (element.nodes.mean(axis=0) - element.nodes)
-            xi = np.concatenate([element.quadrature[0], inside])  # nodes too: facets may face each other by a strip
+            xi = np.concatenate([element.quadrature[0], inside])  # nodes too: facets may overlap by a narrow strip
             shape, gradient = element.shape(xi), element.gradient(xi)
             corners = self.mesh.points[facets]
             point.append((shape @ corners).reshape(-1, self.mesh.dim))
@@ -101,7 +101,7 @@ class OuterFacets:
 
     @cached_property
     def smooth_face(self) -> Indices:
-        """The smooth face (n,) that each facet belongs to: facets go on in each other where they meet without a corner."""
+        """The smooth face (n,) of each facet: adjacent facets without a corner between them share one."""
         keys, facet, normal = [], [], []
         for (name, facets), first in zip(self.blocks.items(), self.first):
             element = elements.get(name)
@@ -122,7 +122,7 @@ class OuterFacets:
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 
     def facets(self, numbers: Indices) -> dict[str, Numbers]:
-        """Return the connectivity of some facets by element."""
+        """Return the connectivity of the facets `numbers` by element."""
         blocks = {}
         for (name, block), first in zip(self.blocks.items(), self.first):
             inside = numbers[(numbers >= first) & (numbers < first + len(block))] - first
@@ -138,7 +138,7 @@ class Facing:
     Attributes
     ----------
     facet, other : ndarray of int (n,)
-        The facet that a point lies in, and the closest one of all other bodies.
+        The facet of each point, and the closest facet of all other bodies.
     gap : ndarray (n,)
         Distance between them, negative where bodies overlap [length].
     """
@@ -149,34 +149,34 @@ class Facing:
 
 
 def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing:
-    """Return where facets face another body, see `find_contacts` for `distance` [length] and `angle` [degrees].
+    """Return the points at which facets face another body; see `find_contacts` for `distance` [length] and `angle` [degrees].
 
-    Between two bodies that both look at each other, a third one hides them: only the closest facet of all counts.
+    A third body between two bodies hides them from each other: only the closest facet of all counts.
     """
     everywhere = np.ones(len(outside.body), bool)
     near = _search(outside, distance, angle, everywhere)
     if distance is not None:
         return near
-    # Smooth faces that are near somewhere face each other as far as they look at each other.
+    # Smooth faces that are close somewhere face each other wherever their normals are opposite.
     face = outside.smooth_face
     key = np.sort(np.column_stack([face[near.facet], face[near.other]]), axis=1) @ [len(face), 1]
     far = _search(outside, np.inf, angle, np.isin(face, face[np.concatenate([near.facet, near.other])]))
     both = np.sort(np.column_stack([face[far.facet], face[far.other]]), axis=1) @ [len(face), 1]
     ahead, touching = np.isin(both, key) & (far.gap > 0.0), near.gap <= 0.0
-    parts = ((near.facet, far.facet), (near.other, far.other), (near.gap, far.gap))
-    return Facing(*(np.concatenate([one[touching], other[ahead]]) for one, other in parts))
+    fields = ((near.facet, far.facet), (near.other, far.other), (near.gap, far.gap))
+    return Facing(*(np.concatenate([from_near[touching], from_far[ahead]]) for from_near, from_far in fields))
 
 
 def _search(outside: OuterFacets, distance: float | None, angle: float, among: Mask) -> Facing:
-    """Return what points in the facets `among` (n,) all face."""
+    """Return the facets that the points of the facets `among` (n,) face."""
     facing_of_bodies = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
-    return Facing(*(np.concatenate(parts) for parts in zip(*facing_of_bodies, strict=True)))
+    return Facing(*(np.concatenate(of_bodies) for of_bodies in zip(*facing_of_bodies, strict=True)))
 
 
 def _faced_by(
     outside: OuterFacets, body: int, distance: float | None, angle: float, among: Mask
 ) -> tuple[Indices, Indices, Array]:
-    """Return what points in those facets of one body face that are `among` (n,): see `Facing`."""
+    """Return the arrays of `Facing` for the points in those facets of one body that are `among` (n,)."""
     owner, point, normal = outside.samples
     (low, high), size = outside.boxes, outside.size
     of_body = outside.body == body
@@ -184,20 +184,22 @@ def _faced_by(
     rest = ~of_body & ((high >= low[of_body].min(axis=0) - reach) & (low <= high[of_body].max(axis=0) + reach)).all(
         axis=1
     )
-    ours = np.flatnonzero((of_body & among)[owner])
+    candidates = np.flatnonzero((of_body & among)[owner])
     if rest.any():
-        at = point[ours]
-        ours = ours[((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)]
-    if not rest.any() or not len(ours):
+        at = point[candidates]
+        candidates = candidates[
+            ((at >= low[rest].min(axis=0) - reach) & (at <= high[rest].max(axis=0) + reach)).all(axis=1)
+        ]
+    if not rest.any() or not len(candidates):
         return np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0)
     kinds = [block[rest[first : first + len(block)]] for block, first in zip(outside.blocks.values(), outside.first)]
-    closest = closest_of_kinds(point[ours], [outside.mesh.points[block] for block in kinds if len(block)])
-    facet, other = owner[ours], np.flatnonzero(rest)[closest.facet]
-    apart = point[ours] - closest.position
-    gap = np.einsum("nd,nd->n", apart, closest.normal)
-    offset = np.linalg.norm(apart - gap[:, None] * closest.normal, axis=1)
+    closest = closest_of_kinds(point[candidates], [outside.mesh.points[block] for block in kinds if len(block)])
+    facet, other = owner[candidates], np.flatnonzero(rest)[closest.facet]
+    difference = point[candidates] - closest.position
+    gap = np.einsum("nd,nd->n", difference, closest.normal)
+    offset = np.linalg.norm(difference - gap[:, None] * closest.normal, axis=1)
     larger = np.maximum(size[facet], size[other])
-    opposed = np.einsum("nd,nd->n", normal[ours], closest.normal) <= -np.cos(np.radians(angle))
+    opposed = np.einsum("nd,nd->n", normal[candidates], closest.normal) <= -np.cos(np.radians(angle))
     near = closest.distance <= (larger if distance is None else distance) + LENGTH_ROUND_OFF * larger
     ahead = offset <= np.abs(gap) * np.tan(np.radians(angle)) + LENGTH_ROUND_OFF * larger
     kept = opposed & near & ahead

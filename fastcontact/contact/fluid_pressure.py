@@ -1,9 +1,10 @@
-"""Fluid that penetrates between the sides of a contact pair, wherever they are open and connected with its source.
+"""Pressure penetration: fluid between the sides of a contact pair, wherever they are open and connected with its source.
 
-A node is open to the fluid if what presses it together is no more than the fluid, and at first if its gap is open; such nodes
-of one facet are connected. There the fluid takes the place of contact: it presses the secondary side along its own normals,
-and the primary side along the normal of the gap, by the area that the other covers. In finite strain both are those of the
-deformed surface at which the bodies are linearised; how they turn and grow is part of the tangent.
+A node is open to the fluid if its contact pressure is at most the fluid pressure, and at first if its gap is open; such nodes
+of one facet are connected. There the fluid pressure replaces the contact pressure: it acts on the secondary side along its
+own normals, and on the primary side along the normal of the gap, over the area covered by the secondary side. In finite
+strain normals and areas are those of the deformed surface at which the bodies are linearised; their variation enters the
+tangent.
 """
 
 from __future__ import annotations
@@ -22,27 +23,26 @@ from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import Entries, rows_of
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# A force that does not depend on the gap is a line of so small a slope: it vanishes at so many lengths of the side.
+# A force independent of the gap is represented with this small slope: it vanishes at this multiple of the length of the side.
 FAR = 1e6
-# Gaps below this part of the length of the side are closed; pressures that differ by less of their size are the same.
-CLOSED, ALIKE = 1e-10, 1e-9
 # Mean gaps beside the edge of the contact, of which places between nodes are closed, may be so much below zero, in facets.
 EDGE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Wetted:
-    """Where the fluid has come.
+    """Region reached by the fluid.
 
     Attributes
     ----------
     rows : ndarray of bool (m,)
-        Constraints.
+        Constraints in the region.
     pressure : ndarray (n_nodes,)
-        At the secondary nodes [pressure].
+        Fluid pressure at the secondary nodes [pressure].
     spread : csr_array (n_points, n_nodes)
-        Forces on points, against the `areas` of the secondary nodes [force].
+        Forces on points, opposite to the `areas` of the secondary nodes [force].
     areas : AreaVectors
     """
 
@@ -64,7 +64,7 @@ class Wetted:
 
 @dataclass(frozen=True, eq=False)
 class AreaVectors:
-    """Area vectors of the deformed secondary side at its nodes, by area of the reference, outward (Nanson's formula).
+    """Outward area vectors of the deformed secondary side at its nodes, per reference area (Nanson's formula).
 
     Means over the facets around a node, with the squares of its shape function as weights, which are positive.
     """
@@ -74,9 +74,9 @@ class AreaVectors:
     axisymmetric: bool
 
     def at(self, displacement: Array) -> tuple[Array, csr_array]:
-        """Return them (n_nodes, dim) [-] at a `displacement` (n_points, dim) [length], and their derivative.
+        """Return the vectors (n_nodes, dim) [-] at a `displacement` (n_points, dim) [length], and their derivative.
 
-        The latter (n_nodes * dim, n_points * dim) [1 / length].
+        The derivative is a matrix (n_nodes * dim, n_points * dim) [1 / length].
         """
         dim, n = self.points.shape[1], len(self.side.points)
         areas, vectors, entries = np.zeros(n), np.zeros((n, dim)), Entries()
@@ -104,7 +104,7 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
     """Return constraints `constraints` under the fluid pressure of a configuration.
 
     The fluid comes from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
-    pairing; before the first one what is closed is tight.
+    pairing; before the first one, closed nodes are tight.
     """
     if not at.fluid_pressure > 0.0:
         return constraints
@@ -116,13 +116,13 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
     gaps = constraints.gaps(at.displacement)
     nodal, node = constraints.nodal.weighted_gaps(np.where(constraints.usable, gaps, np.inf))
     if at.pressure is None:
-        passable = nodal > CLOSED * size
+        passable = nodal > LENGTH_ROUND_OFF * size
     else:
-        # A node that is pressed together is tight, even if places beside it are what is closed.
-        # Pressures of contact are forces per area of the reference.
+        # A node under contact pressure is tight, even if the closed points lie beside it.
+        # Contact pressures are forces per reference area.
         nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
         facet = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
-        passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + ALIKE) * nominal)
+        passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
     far = FAR * size
@@ -146,31 +146,31 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
 
 
 def _along(B: csr_array, rows: Mask, side: Surface, vectors: Array) -> tuple[csr_array, csr_array]:
-    """Return B (m, n_dofs) along the own normals of the secondary `side` in `rows` (m,), and its weights (m, n_points).
+    """Return B (m, n_dofs) in `rows` (m,) along the normals of the secondary `side`, and its weights (m, n_points).
 
-    `vectors` (m, dim) are area vectors by area [-]; the primary side has what they cover along the normal of the gap.
+    `vectors` (m, dim) are area vectors per area [-]; on the primary side their component along the normal of the gap acts.
     """
     (m, n_dofs), dim = B.shape, vectors.shape[1]
     entries = B.tocoo()
     row, point, component = entries.row, entries.col // dim, entries.col % dim
-    ours = np.isin(point, side.points)
+    on_secondary = np.isin(point, side.points)
     normal = np.zeros((m, dim))
-    np.add.at(normal, (row[ours], component[ours]), entries.data[ours])
+    np.add.at(normal, (row[on_secondary], component[on_secondary]), entries.data[on_secondary])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal = np.divide(normal, length, out=normal, where=length > 0.0)
-    kept = ours & rows[row]
+    kept = on_secondary & rows[row]
     weights = csr_array(
         (entries.data[kept] * normal[row[kept], component[kept]], (row[kept], point[kept])), shape=(m, n_dofs // dim)
     )
     covered = np.where(rows, -np.einsum("md,md->m", vectors, normal), 1.0)
-    theirs = csr_array((entries.data * covered[row] * ~kept, (row, entries.col)), shape=B.shape)
-    along = csr_array(theirs + rows_of(weights, -vectors))
+    on_primary = csr_array((entries.data * covered[row] * ~kept, (row, entries.col)), shape=B.shape)
+    along = csr_array(on_primary + rows_of(weights, -vectors))
     along.eliminate_zeros()
     return along, weights
 
 
 def reached(side: Surface, source: Mask, passable: Mask) -> Mask:
-    """Return which of the `passable` nodes (n_nodes,) facets of a side connect with those of the source."""
+    """Return which of the `passable` nodes (n_nodes,) are connected with those of the source by facets of a side."""
     count, n = side.n_facets, len(passable)
     nodes = np.concatenate([block.local.ravel() for block in side.blocks])
     facet = np.repeat(np.arange(count), np.concatenate([np.full(len(b.local), b.local.shape[1]) for b in side.blocks]))

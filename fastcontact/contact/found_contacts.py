@@ -23,7 +23,7 @@ from fastcontact.mesh.topology import bodies
 if TYPE_CHECKING:
     import pandas
 
-# Sides whose nodes, and bodies whose moduli, differ by less are alike.
+# Relative differences of node distances and of moduli below which two sides count as equal.
 ALIKE = 0.1
 _COLUMNS = (
     "contact", "secondary", "primary", "facets secondary", "facets primary", "spacing secondary", "spacing primary",
@@ -38,17 +38,17 @@ class FoundContact:
     Attributes
     ----------
     name : str
-        Of the pair: both bodies, and a number where they have several faces.
+        Name of the pair: both bodies, and a number if they have several pairs.
     bodies : (str, str)
-        The secondary and the primary body: the cell group that is all of it, or ``"body 1"`` and so on.
+        Names of the secondary and the primary body: the cell group of the body, or ``"body 1"`` and so on.
     secondary, primary : str
         Groups of facets in `FoundContacts.mesh`.
     facets : (int, int)
         Number of facets of each side.
     spacing : (float, float)
-        Distance between nodes of each side, the geometric mean over where they face each other [length].
+        Distance between nodes of each side, the geometric mean over the facing part [length].
     gap : (float, float)
-        The least and the largest gap, negative where bodies overlap [length].
+        Smallest and largest gap, negative if bodies overlap [length].
     reason : str
         Why this side is the secondary one.
     """
@@ -129,36 +129,37 @@ def find_contacts(
     groups: Sequence[str] | None = None,
     moduli: Mapping[str, ArrayLike] | None = None,
 ) -> FoundContacts:
-    """Find the surfaces of different bodies that face each other, and which side of each pair should be the secondary one.
+    """Find the surfaces of different bodies that face each other, and choose the secondary side of each pair.
 
-    Points inside of all outer facets are projected on the closest facet of all other bodies. Two facets face each other if
-    that is near enough, along their normals, and these are opposed. A secondary body whose facing surface has corners of 45
-    degrees or more gets one pair for each smooth face, since a side of a pair has one normal at each node. Secondary is the
-    side with the finer mesh; of equally fine ones that of the softer body, else the smaller one.
+    Sample points of all outer facets are projected on the closest facet of all other bodies. Two facets face each other
+    if the distance along their normals is small enough and the normals are opposed. A surface with corners of 45
+    degrees or more is split into one pair for each smooth face, since a side of a pair has one normal at each node.
+    The secondary side is the one with the finer mesh; between equally fine sides it is that of the softer body,
+    otherwise the smaller one.
 
     Parameters
     ----------
     mesh : Mesh
     distance : float, optional
-        Largest gap or overlap [length]. By default smooth faces of two bodies are a pair that come as near to each other as
-        the size of the larger of two facets, as far as they look at each other.
+        Largest gap or overlap [length]. By default smooth faces of two bodies form a pair if their distance is somewhere
+        at most the size of the larger of two facets; the pair extends as far as their normals are opposed.
     angle : float
-        By how much normals may differ from opposite ones, more than 0 and less than 90 [degrees].
+        Largest deviation of the normals from opposite directions, more than 0 and less than 90 [degrees].
     groups : sequence of str, optional
-        Groups of solid cells that are bodies, by default all sets of cells that nodes connect. Between the cells of one body
-        there is no contact.
+        Groups of solid cells that form the bodies; by default the connected sets of cells. Self-contact of a body is
+        not searched.
     moduli : mapping of str to array_like (n_cells,), optional
-        By element, how stiff the solid cells are [pressure]; `Model.add_contacts` knows them from the materials.
+        Moduli of the solid cells, by element [pressure]; `Model.add_contacts` takes them from the materials.
 
     Returns
     -------
     FoundContacts
-        Its mesh has groups for both sides of every pair.
+        Their mesh has groups for both sides of every pair.
 
     Raises
     ------
     ContactError
-        If a number does not fit, groups share cells, or a group holds no solid cells.
+        If a number is out of range, groups share cells, or a group holds no solid cells.
 
     Examples
     --------
@@ -191,17 +192,17 @@ def find_contacts(
 
 
 def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequence[str] | None) -> str:
-    """Return why `find_contacts` finds nothing, and what to do."""
+    """Return a message with the reason why `find_contacts` finds nothing, and the remedy."""
     if groups is None and _whole_bodies(mesh).max() < 1:
         return (
             "the mesh is one body, since nodes connect all of its cells: name groups of cells as bodies, or duplicate the "
             "nodes where they touch"
         )
     size = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    apart = find_contacts(mesh, distance=size, angle=angle, groups=groups)
-    if not apart.pairs:
+    distant = find_contacts(mesh, distance=size, angle=angle, groups=groups)
+    if not distant.pairs:
         return f"no surfaces of different bodies look at each other within {angle:g} degrees: name both sides of each contact"
-    nearest = min((pair.gap for pair in apart), key=lambda gap: abs(gap[0]))[0]
+    nearest = min((pair.gap for pair in distant), key=lambda gap: abs(gap[0]))[0]
     within = "the size of their facets" if distance is None else f"{distance:.4g}"
     return (
         f"no bodies face each other within {within}: the nearest are {abs(nearest):.4g} apart; give distance = "
@@ -210,7 +211,7 @@ def nothing_found(mesh: Mesh, distance: float | None, angle: float, groups: Sequ
 
 
 def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
-    """Return the body (n_cells,) of each cell, -1 for facets, and for cells that are in none of the groups."""
+    """Return the body (n_cells,) of each cell, -1 for facets and for cells in none of the groups."""
     body_of_cell = np.full(mesh.n_cells, -1, np.intp)
     if groups is None:
         body = _whole_bodies(mesh)
@@ -219,7 +220,7 @@ def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
         return body_of_cell
     for number, group in enumerate(groups):
         if not mesh.cells_of(group, dim=mesh.dim):
-            raise ContactError(f"group '{group}' holds no solid cells, so it is no body")
+            raise ContactError(f"group '{group}' holds no solid cells, so it is not a body")
         rows = mesh.split(mesh.cell_groups[group])
         cells = np.concatenate([mesh.offsets[name] + rows[name] for name in rows if name in mesh.solids])
         if (body_of_cell[cells] >= 0).any():
@@ -267,9 +268,9 @@ def _pairs(
         ends, numbers = (ends, pair) if second == 0 else (ends[:, ::-1], pair[::-1])
         face = outside.smooth_face[ends[:, 0]]
         for number, surface in enumerate(order := np.unique(face), start=1):
-            mine = face == surface
-            gap, spacing = search.gap[rows[mine]], _spacing(outside, ends[mine])
-            sides = np.unique(ends[mine, 0]), np.unique(ends[mine, 1])
+            of_surface = face == surface
+            gap, spacing = search.gap[rows[of_surface]], _spacing(outside, ends[of_surface])
+            sides = np.unique(ends[of_surface, 0]), np.unique(ends[of_surface, 1])
             both = names[numbers[0]], names[numbers[1]]
             title = " on ".join(both) + (f" {number}" if len(order) > 1 else "")
             yield FoundContact(
@@ -284,7 +285,7 @@ def _spacing(outside: OuterFacets, ends: Indices) -> Array:
 
 
 def _secondary(outside: OuterFacets, ends: Indices, stiff: Array) -> tuple[int, str]:
-    """Return which side of facets (n, 2) should be the secondary one, and why."""
+    """Return which side of facets (n, 2) should be the secondary one, and the reason."""
     measures = (
         ("finer", _spacing(outside, ends)),
         ("softer", stiff[outside.cell[ends]].mean(axis=0)),

@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Cosine of the angle within which directions at several nodes are taken together, as those of a curved rim are.
+# Cosine of the angle within which directions at several nodes are treated as one, such as those of a curved rim.
 TOGETHER = 0.94
-# Power of the inverse distance by which directions count elsewhere.
+# Power of the inverse distance in the weights by which directions are interpolated to other nodes.
 NEAREST = 4
 
 
@@ -25,7 +25,7 @@ class HeldMotions:
     Attributes
     ----------
     nodes : ndarray of int (h,)
-        Nodes of which some motion is prescribed, ascending.
+        Nodes with a prescribed displacement in some direction, ascending.
     projectors : ndarray (h, dim, dim)
         Orthogonal projectors on the prescribed directions [-].
     """
@@ -64,12 +64,12 @@ def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Arra
         return np.empty(0, np.intp), np.empty((0, dim))
     owner = (relations.indices // dim).astype(np.intp)
     first = relations.indptr[rows]
-    alone = np.minimum.reduceat(owner, first) == np.maximum.reduceat(owner, first)
+    single_node = np.minimum.reduceat(owner, first) == np.maximum.reduceat(owner, first)
     normals = np.zeros((relations.shape[0], dim))
     np.add.at(normals, (np.repeat(np.arange(len(counts)), counts), relations.indices % dim), relations.data)
     length = np.linalg.norm(normals[rows], axis=1)
-    alone &= length > 0.0
-    return owner[first[alone]], normals[rows[alone]] / length[alone, None]
+    single_node &= length > 0.0
+    return owner[first[single_node]], normals[rows[single_node]] / length[single_node, None]
 
 
 def spanned(tensors: Array, least: float) -> Array:
@@ -80,7 +80,7 @@ def spanned(tensors: Array, least: float) -> Array:
 
 
 def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
-    """Return projectors (n, dim, dim) less the parts of `vectors` (n, dim) inside them, where longer than `least`."""
+    """Return projectors (n, dim, dim) without the components of `vectors` (n, dim) in their range longer than `least`."""
     inside = np.einsum("nde,ne->nd", projectors, vectors)
     length = np.linalg.norm(inside, axis=1, keepdims=True)
     inside = np.where(length > least, inside / np.where(length > 0.0, length, 1.0), 0.0)
@@ -88,20 +88,21 @@ def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
 
 
 def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
-    """Return directions (n, dim) that several nodes are held in, as round a curved rim, and which nodes those are (n,).
+    """Return fields of directions (n, dim) in which nodes are held, e.g. around a curved rim, and their nodes (n,).
 
-    Nodes held in a single direction come first, together where directions are nearly the same or others lie in between; nodes
-    held in more join them. Other nodes have the mean of the directions nearest to their `places` (n, dim) [length].
+    Nodes held in a single direction come first, together if directions are nearly equal or others lie in between; nodes
+    held in several directions join them. Other nodes get the mean of the directions nearest to their `places` (n, dim)
+    [length].
     """
     rest, directions = projectors.copy(), []
     while len(seeds := np.flatnonzero(rank := np.trace(rest, axis1=1, axis2=2).round())):
         least = rank[seeds].min()
         seeds = seeds[rank[seeds] == least]
-        seeds = seeds if least == 1 else seeds[:1]  # of several directions any are taken
+        seeds = seeds if least == 1 else seeds[:1]  # several directions: an arbitrary choice
         axis = np.linalg.eigh(rest[seeds])[1][:, :, -1]
         away = np.where(np.abs(axis @ axis.T) >= TOGETHER, _distances(places[seeds], places[seeds]), 0.0)
         order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
-        for child in order[1:]:  # one sign for all, passed on from the nearest
+        for child in order[1:]:  # one sign for all, taken from the nearest
             axis[child] *= np.sign(axis[child] @ axis[before[child]])
         along = _from_nearest(axis[order], places[seeds[order]], places)
         along[seeds[order]] = axis[order]

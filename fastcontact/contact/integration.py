@@ -43,12 +43,12 @@ def gauss_rule(element: str, n: int) -> quadrature.Rule:
 
 
 def fine_rule(element: str) -> quadrature.Rule:
-    """Return a rule that integrates products of two shape functions over facets that are not much curved."""
+    """Return a rule that integrates products of two shape functions over slightly curved facets."""
     return gauss_rule(element, elements.get(element).order + 2)
 
 
 def all_nodes_carry(element: str) -> bool:
-    """Return whether all nodes of a facet push under a uniform pressure; corners of quad8 and tri6 do not."""
+    """Return whether all nodal forces under a uniform pressure are compressive; at corners of quad8 and tri6 they are not."""
     xi, weights = fine_rule(element)
     areas = weights @ elements.get(element).shape(xi)
     return bool(areas.min() >= 1e-6 * areas.max())
@@ -73,8 +73,8 @@ def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:
 def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
     """Return the share of each node (m,) of a surface in the area of its facets, positive for all elements [length^2].
 
-    By the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4,
-    1976). `points` (n_points, dim) [length].
+    Shares are proportional to the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq.
+    Eng. Struct. Dyn. 4, 1976). `points` (n_points, dim) [length].
     """
     areas = np.zeros(len(side.points))
     for block in side.blocks:

@@ -33,7 +33,7 @@ def along_line_normals(
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:
-    """Return which ends (n_facets, 2) of lines another line goes on from without a corner.
+    """Return the ends (n_facets, 2) of lines at which another line continues without a corner.
 
     `normals` (n_facets, k, 2) are those of the facets at their nodes, see `projection.smooth_normals`: the same for both
     facets at such an end.

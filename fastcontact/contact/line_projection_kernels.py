@@ -2,11 +2,12 @@
 """Projection of points on a curve in the plane along normals interpolated between its nodes."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
+from fastcontact.contact.projection_kernels import BEYOND
 from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP
 
 MOST_FACETS = 8
-# A projection that ends farther beyond its facet than this, in reference coordinates, is not trusted.
-FAR = 3.0
+# Reference coordinate of a projection that ends too far beyond its facet.
+FAR = 1.0 + 2.0 * BEYOND
 
 
 @kernel
@@ -36,7 +37,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
             mx += slopes[k] * normals[f, k, 0]
             my += slopes[k] * normals[f, k, 1]
         slope = (px * my - py * mx) - (tx * ny - ty * nx)
-        # Beyond a centre of curvature, or where facets fold too sharply, nothing tells which way to go.
+        # Beyond a centre of curvature, or where facets fold too sharply, Newton's method has no descent direction.
         if not abs(slope) > 1e-8 * abs(tx * ny - ty * nx):
             return s, False
         step = -(px * ny - py * nx) / slope
@@ -61,7 +62,7 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
     counts : ndarray of int (n_facets,)
         Nodes of each facet, 2 or 3.
     neighbour : ndarray of int (n_facets, 2)
-        The facet beyond each end, -1 for none; its own end that is shared is the other one.
+        The facet beyond each end, -1 for none; the shared end is its opposite one.
     facet, xi, overhang : ndarray (n,)
         Closest points, changed in place where the projection succeeds.
     values, slopes : ndarray (3,)

@@ -1,8 +1,8 @@
-r"""Linearised contact geometry: how contact forces and gaps vary as the points that constraints stand for move.
+r"""Linearised contact geometry: variation of contact forces and gaps with the displacements.
 
-The rows of constraints depend on the displacements: points slide over the facets they face, and normals turn. A point
+The rows of constraints depend on the displacements: points slide over the facets they face, and normals rotate. A point
 :math:`x` with contact force :math:`p = \lambda n` faces :math:`y(\xi) = \sum_k N_k(\xi) x_k`, with the normal n.
-Along a variation of the displacements its nodal forces and its gap vary, beside what the rows themselves give, by
+For a variation of the displacements its nodal forces and its gap vary, in addition to the rows themselves, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
           \delta p = \lambda \, \delta n, \qquad
@@ -36,9 +36,7 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
-
-# Part of the size of the model by which points move for differences of an obstacle's normals, which are then off by 1e-10.
-MOVED = 1e-6
+from fastcontact.round_off import DIFFERENCES
 
 
 class Linearised(Protocol):
@@ -49,12 +47,12 @@ class Linearised(Protocol):
         ...
 
 
-# Of multipliers (m,) [force].
+# A function of the multipliers (m,) [force].
 Geometry = Callable[[Array], Linearised]
 
 
 class NodalNormals:
-    """Variation of the `nodal_normals` of a side at `coordinates` (n_points, dim) [length]; angles of facets are held."""
+    """Variation of the `nodal_normals` of a side at `coordinates` (n_points, dim) [length], with fixed facet angles."""
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
         self._side, self._parts = side, []
@@ -82,12 +80,12 @@ class NodalNormals:
 
 
 def across(normal: Array, vector: Array) -> Array:
-    """Return the part of vectors (n, dim) at right angles to unit vectors (n, dim)."""
+    """Return the components of vectors (n, dim) perpendicular to unit vectors (n, dim)."""
     return np.asarray(vector - np.einsum("nd,nd->n", normal, vector)[:, None] * normal)
 
 
 class Variation(NamedTuple):
-    """Variation of projections: reference coordinates (n, dim - 1), the place faced as its facet stands, normals (n, dim)."""
+    """Variation of projections: reference coordinates (n, dim - 1), the point faced at fixed facet, normals (n, dim)."""
 
     xi: Array
     foot: Array
@@ -95,21 +93,21 @@ class Variation(NamedTuple):
 
 
 class _SurfacePoints:
-    """Points that face a meshed side, and how their projections and normals vary.
+    """Points that face a meshed side, and the variation of their projections and normals.
 
     Parameters
     ----------
     candidates : Candidates
     pairing : Pairing
     rows : ndarray of int (n,)
-        Which of them.
+        Rows of the points in `candidates`.
     primary : Surface
     coordinates : ndarray (n_points, dim)
         [length]
     normals : str or tuple of float
-        Those of the primary side: ``"facet"``, ``"averaged"``, or one that does not vary.
+        Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
     along : ndarray (n, dim), optional
-        Directions of the projection, which do not vary; None for the normals themselves, closest points for those of facets.
+        Fixed directions of the projection; None for the normals themselves, and closest points for facet normals.
     """
 
     def __init__(
@@ -118,7 +116,7 @@ class _SurfacePoints:
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
-        self._motion = shapes_at(shape, nodes, n_points)  # of points relative to what they face
+        self._motion = shapes_at(shape, nodes, n_points)  # motion of points relative to the facing points
         self._slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
         self._spreading = [csr_array(matrix.T) for matrix in (self._motion, *self._slopes)]
         self.axes = np.stack([slope @ coordinates for slope in self._slopes], axis=1)
@@ -132,7 +130,7 @@ class _SurfacePoints:
         else:
             self._bend = np.zeros_like(self.axes)
         self._varies = isinstance(normals, str)
-        # What is along the direction d of the projection is left out of ``a_i dxi_i + g dn = dv``.
+        # The component along the direction d of the projection is left out of ``a_i dxi_i + g dn = dv``.
         frame = np.stack(tangents(self.normal if along is None else along), axis=1)
         self._gap = (
             np.einsum("nd,nd->n", self.apart, self.normal)[:, None] if along is None else np.zeros((len(rows), 1))
@@ -141,7 +139,7 @@ class _SurfacePoints:
         self._inverse = inverse @ frame
 
     def _facet_normals(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
-        """Prepare the variation of facets' own normals; return their derivatives (n, dim - 1, dim) along the facet."""
+        """Prepare the variation of facet normals; return their derivatives (n, dim - 1, dim) along the facet."""
         self._up = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
         second = _second_derivatives(primary, facet, xi)
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
@@ -158,7 +156,7 @@ class _SurfacePoints:
         return np.asarray(bend - np.einsum("nid,nd->ni", bend, self.normal)[:, :, None] * self.normal[:, None])
 
     def _turned_in_place(self, du: Array) -> Array:
-        """Return how normals (n, dim) vary where projections stay at their reference coordinates."""
+        """Return the variation of normals (n, dim) at fixed reference coordinates of the projections."""
         if not self._varies:
             return np.zeros_like(self.normal)
         if self._nodal is not None:
@@ -195,7 +193,7 @@ def _second_derivatives(primary: Surface, facet: Indices, xi: Array) -> Array:
 
 
 class _ObstaclePoints:
-    """Points that face a rigid obstacle: its normals vary with their positions, it has no nodes.
+    """Points that face a rigid obstacle, whose normals vary with their positions and which has no nodes.
 
     Parameters
     ----------
@@ -212,7 +210,7 @@ class _ObstaclePoints:
         gap, self.normal, paired, _ = obstacle.facing(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]
         self.apart = self._gap * self.normal
-        step = MOVED * float(np.ptp(coordinates, axis=0).max())
+        step = DIFFERENCES * float(np.ptp(coordinates, axis=0).max())
         sides = [[obstacle.facing(x + sign * step * axis, pose)[1] for sign in (1, -1)] for axis in np.eye(x.shape[1])]
         self._gradient = np.stack([ahead - behind for ahead, behind in sides], axis=2) / (2.0 * step)
         self._gradient[~np.isfinite(self._gradient)] = 0.0
@@ -257,12 +255,12 @@ class WeightedForces:
     ----------
     points : Points
     functions, tests : csr_array (m, n)
-        What the gaps are weighted with, over the weight of each constraint, and what their normals are means with.
+        Weights of the points in the gaps, divided by the weight of each constraint, and in the mean normals.
     normal : ndarray (m, dim)
         Normals of the constraints.
     multiplier : ndarray (m,)
     nodal : NodalNormals or Points, optional
-        Of which the normals of the constraints are, where they are no means over the points.
+        Source of the normals of the constraints, where they are no means over the points.
     """
 
     points: Points
@@ -305,10 +303,10 @@ def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
     normals: object, pose: Pose, along: Array | None = None,
 ) -> Points:  # fmt: skip
-    """Return the points `rows` (n,) of a `pairing` that was made at `coordinates` (n_points, dim) [length].
+    """Return the points `rows` (n,) of a `pairing` computed at `coordinates` (n_points, dim) [length].
 
-    Against an obstacle in its `pose`, or along normals of the primary side; see `pairing.pair`. Directions (n, dim) `along`
-    take the place of these where points are projected along others, which do not vary.
+    The primary side is an obstacle in its `pose`, or has `normals` as in `pairing.pair`. Where points are projected along
+    other, fixed directions, these are `along` (n, dim).
     """
     if not isinstance(primary, RigidSide):
         return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, along)

@@ -13,10 +13,8 @@ from scipy.sparse.linalg import SuperLU
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError
+from fastcontact.linear.delassus import MOST_ROWS
 from fastcontact.linear.field_compliance import FieldCompliance
-
-# Closed integration points up to which the dense equations of the continuous formulation are solved, in about a minute.
-MOST_POINTS = 10_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,13 +26,13 @@ class Projection:
     P : csr_array (m, k)
         Functions of the multiplier field at the integration points.
     areas : ndarray (m,)
-        W; a point without area, at the axis, is rigid: C vanishes there. It may carry a force of its own.
+        W; a point without area, at the axis, has no compliance: C vanishes there. It may carry a force of its own.
     rho : float
         Augmentation [pressure / length].
     mass : SuperLU, optional
         Factors of ``P.T W P``; None where no point takes part.
     eliminable : bool
-        Whether linear solvers may take the values of the field in place of the forces.
+        Whether linear solvers may use the values of the field as unknowns in place of the forces.
     quadratic : bool
         Whether facets are.
     """
@@ -48,7 +46,7 @@ class Projection:
 
     def block(self, rows: Indices) -> Array:
         """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
-        if len(rows) > MOST_POINTS:
+        if len(rows) > MOST_ROWS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
                 f"dense matrix of {8e-9 * len(rows) ** 2:.1f} GB: use formulation='mortar' with "
@@ -85,10 +83,10 @@ class Projection:
     def compliant(self, columns: Indices) -> Array:
         r"""Return a factor Z (m, h) of the compliance added by dropping `columns` of the multiplier field.
 
-        At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value less than its
-        multiplier field: a field that alternates from node to node and dies out along the surface does no work on any slip,
-        and nothing would determine it. Such fields are made compliant, as those are that the multiplier field cannot
-        represent: the shear at the supported node then vanishes, as symmetry requires.
+        At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value fewer than its
+        multiplier field: a field that alternates from node to node and decays along the surface does no work on any slip, and
+        is undetermined. Such fields are made compliant, like the fields that the multiplier field cannot represent: the shear
+        at the supported node then vanishes, as symmetry requires.
 
         With E the unit vectors of the columns and :math:`M = P^T W P` that is
         :math:`Z Z^T = P M^{-1} E (E^T M^{-1} E)^{-1} E^T M^{-1} P^T / \rho`.

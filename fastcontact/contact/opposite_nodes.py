@@ -6,12 +6,12 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.contact.projection import places
-from fastcontact.contact.search.closest import closest_of_kinds
+from fastcontact.contact.search.closest import BESIDE, closest_of_kinds
 from fastcontact.contact.surface import Surface
 
-# In facet lengths: how far from a node a projection may lie and still be opposite to it; how much farther apart than
-# the closest points others may be and still tell whether the sides match; and how far beyond an edge they may lie.
-OPPOSITE, NEAR, BESIDE = 0.2, 0.5, 0.05
+# Tolerances in facet lengths: the distance from a node within which a projection is opposite to it, and the distance beyond
+# that of the closest points within which points decide whether the sides match.
+OPPOSITE, NEAR = 0.2, 0.5
 
 
 def opposite(secondary: Surface, primary: Surface, points: Array) -> bool:

@@ -11,17 +11,17 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.errors import ContactError
 
-# Of an exponential law: the part of the pressure at a gap of zero that is left at its clearance; the overclosure, in units of
-# the clearance, from which on it is a line.
+# Exponential law: pressure at the clearance over the pressure at a gap of zero; overclosure, in units of the clearance,
+# beyond which the law is linear.
 LEFT, FARTHEST = 0.01, 3.0
 
 
 class OverclosureLaw(ABC):
-    """How the pressure of a contact grows with its overclosure, negative ones being gaps."""
+    """Contact pressure as a function of the overclosure, negative for gaps."""
 
     @abstractmethod
     def line(self, overclosure: Array) -> tuple[Array, Array]:
-        """Return slopes (m,) [pressure / length] at overclosures (m,) [length], and where their lines have no pressure."""
+        """Return the tangents at overclosures (m,) [length]: slopes (m,) [pressure / length] and zeros (m,) [length]."""
 
     @abstractmethod
     def energy(self, pressure: Array) -> Array:
@@ -29,14 +29,14 @@ class OverclosureLaw(ABC):
 
 
 class TabularLaw(OverclosureLaw):
-    """A piecewise linear pressure, zero up to the first overclosure, and going on beyond the last with its slope.
+    """A piecewise linear pressure, zero up to the first overclosure, and extrapolated linearly beyond the last.
 
-    ContactError if it is not such a table.
+    Raises ContactError for a table that does not ascend.
 
     Parameters
     ----------
     name : str
-        Of the contact pair, for messages.
+        Name of the contact pair, for messages.
     table : array_like (n, 2)
         Overclosures, ascending, negative ones being gaps [length], and pressures, ascending from zero [pressure].
     """
@@ -71,7 +71,7 @@ class TabularLaw(OverclosureLaw):
 
 
 class ExponentialLaw(OverclosureLaw):
-    """The pressure ``p0 exp(h ln(100) / c0)``, as in CalculiX; it goes straight on below the overclosure -c0 and beyond 3 c0.
+    """The pressure ``p0 exp(h ln(100) / c0)``, as in CalculiX; linear below the overclosure -c0 and beyond 3 c0.
 
     Parameters
     ----------

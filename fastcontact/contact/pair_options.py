@@ -30,38 +30,38 @@ class PairOptions:
     Attributes
     ----------
     clearance, clearance_primary : callable, optional
-        What is added to the gap: functions from reference positions (n, dim) on the secondary and on the primary side
-        to lengths (n,), positive where the gap opens, negative for an interference [length].
+        Additions to the gap: functions from reference positions (n, dim) on the secondary and on the primary side to lengths
+        (n,), positive where the gap opens, negative for an interference [length].
     excluded, frictionless : ndarray of bool (n_points,), optional
         Nodes without contact, and without friction.
     frictionless_along : ndarray (dim,), optional
-        What has no friction, all without `frictionless`, has none along this vector alone [-].
+        Direction along which friction is absent, at the `frictionless` nodes or, without these, everywhere [-].
     kind : str
         One of `KINDS`.
     penalty : float or OverclosureLaw, optional
         Pressure by penetration [pressure / length], or its law; None: no penetration.
     tangential_penalty : callable, optional
-        Shear by slip of what sticks, a function from reference positions (n, dim) on the secondary side to positive numbers
-        (n,) [pressure / length]; None: none slips.
+        Shear stress per elastic slip in stick, a function from reference positions (n, dim) on the secondary side to positive
+        numbers (n,) [pressure / length]; None: no elastic slip.
     wear : float, optional
-        Archard's coefficient by hardness, of what sliding takes off the secondary side [1 / pressure]; None: nothing.
+        Archard's wear coefficient over the hardness, for wear of the secondary side [1 / pressure]; None: no wear.
     search_distance : float, optional
-        What is farther off, or deeper inside, now and as the load step begins, is not faced [length]; None: at any
-        distance.
+        Largest gap or penetration, now and at the beginning of the load step, at which points face the other side [length];
+        None: any.
     conductance : Conductance, optional
-        Of heat that crosses the contact; None: none does.
+        Thermal contact conductance; None: no heat flow.
     friction_heat : float
-        What part of the work of friction becomes heat [-].
+        Fraction of the frictional work that becomes heat [-].
     obstacle_temperature : float, optional
-        Of the rigid obstacle, where heat crosses to it [temperature].
+        Temperature of the rigid obstacle, where heat flows to it [temperature].
     cohesion : CohesiveLaw, optional
-        Of tension between the sides; None without.
+        Traction-separation law; None: no tension.
     source : ndarray of bool (n_points,), optional
-        Nodes that fluid comes from; None without.
+        Nodes from which fluid penetrates; None without fluid.
     same_place : ndarray of int (n_points,), optional
-        For each node, the one whose multiplier it has, too, where the model repeats itself; None where it does not.
+        For each node, the node whose multiplier it shares in a periodic model; None where the model is not periodic.
     turning : Rotation, optional
-        About the axis of a sector, where tractions turn from one end of the pair to the other: a field of them has
+        Rotation about the axis of a sector, where tractions rotate from one end of the pair to the other: their fields have
         cylindrical components.
     """
 
@@ -85,7 +85,7 @@ class PairOptions:
 
     @property
     def gap_only(self) -> bool:
-        """Whether the pair is only watched: it has gaps, and no forces."""
+        """Whether the pair only measures gaps, without forces."""
         return self.kind == "gap_only"
 
     @property
@@ -95,17 +95,17 @@ class PairOptions:
 
     @property
     def always_closed(self) -> bool:
-        """Whether everything that faces the other side is closed from the beginning."""
+        """Whether all paired points are closed from the beginning."""
         return self.kind in ("tied", "bilateral")
 
     def out(self, candidates: Candidates) -> Mask:
-        """Return which candidates (n,) carry no contact: those nearer to an excluded node than to any other."""
+        """Return the candidates (n,) without contact: those nearer to an excluded node than to any other."""
         return (
             np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
         )
 
     def borders(self, side: Surface) -> tuple[Indices, Array]:
-        """Return (facet, xi) of the points on lines that bound the share of excluded nodes."""
+        """Return (facet, xi) of the points on lines that bound the part nearest to excluded nodes."""
         mask = self.excluded
         if mask is None:
             return np.empty(0, np.intp), np.empty(0)
@@ -133,7 +133,7 @@ class PairOptions:
     def rubbing(
         self, directions: Sequence[Array], candidates: Candidates
     ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """Return tangents (n, dim), turned so that friction acts along all of one or not at all; zero where it does not."""
+        """Return rotated tangents (n, dim), each either with or without friction, and those with friction, else zero."""
         along = self.frictionless_along
         if along is None:
             return tuple(directions), tuple(directions)
@@ -163,15 +163,14 @@ class PairOptions:
 
 
 def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
-    """Return the nodal field (m, m) of a multiplier of which excluded nodes have no value of their own.
+    """Return the nodal field (m, m) of a multiplier without independent values at excluded nodes.
 
-    They take the mean of their neighbours among the nodes `givers`, so that a uniform field remains one; zero where
-    there are none.
+    These take the mean of their neighbours among the nodes `givers`, so that a uniform field stays uniform; zero without any.
     """
     m = len(side.points)
     if not excluded.any():
         return csr_array(eye_array(m, format="csr"))
-    gives = np.isin(np.arange(m), givers) & ~excluded
-    beside = diags_array(excluded.astype(float)) @ side.beside @ diags_array(gives.astype(float))
+    is_giver = np.isin(np.arange(m), givers) & ~excluded
+    beside = diags_array(excluded.astype(float)) @ side.beside @ diags_array(is_giver.astype(float))
     count = np.maximum(np.asarray(beside.sum(axis=1)).ravel(), 1.0)
     return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ beside)

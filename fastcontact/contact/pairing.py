@@ -23,15 +23,14 @@ from fastcontact.contact.projection import (
     places,
     smooth_normals,
 )
-from fastcontact.contact.projection_kernels import INSIDE
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# How far beyond both facets at a node a point may lie and still face it, in facet lengths.
+# Largest distance beyond both facets at a node at which a point still faces it, in facet lengths.
 FOLDED = 0.5
-# Part of either facet at an edge over which rounded edges turn.
+# Fraction of either facet at an edge over which the normals of rounded edges vary.
 ROUNDED = 0.1
 
 
@@ -106,10 +105,10 @@ class Pairing:
     paired : ndarray of bool (n,)
         False where a candidate stands out beyond the end of the primary surface.
     offset : ndarray (n,), optional
-        What the gap is besides ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
+        Gap minus ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
     beyond : ndarray (n, dim - 1), optional
-        How far beyond the end of the primary surface candidates stand, in reference coordinates of the facet, which goes
-        on straight there; None where none does.
+        Distance of candidates beyond the end of the primary surface, in reference coordinates of the facet, which is extended
+        straight there; None if all are within.
     """
 
     facet: Indices
@@ -120,7 +119,7 @@ class Pairing:
     beyond: Array | None = None
 
     def places(self, primary: Surface, rows: Indices) -> Places:
-        """Return the points of `primary` that candidates `rows` (n,) face, facets going on straight beyond their ends."""
+        """Return the points of `primary` that candidates `rows` (n,) face, on facets extended straight beyond their ends."""
         points = places(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
             return points
@@ -139,11 +138,11 @@ def pair(
     """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
 
     A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
-    (TOLE_PROJ_EXT of code_aster). One that is paired there faces the facet gone on straight, so that the forces on both
-    sides have one line of action; they balance in moment. Unless `normals` is ``"facet"``, the normal is interpolated
-    between nodal means of the facets' normals, so that it does not jump where facets meet but for corners, and the
-    candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle stands
-    as `obstacle` says. Edges between facets are `rounded` or not.
+    (TOLE_PROJ_EXT of code_aster). A candidate paired there faces the straight extension of the facet, so that the forces
+    on both sides have one line of action and balance in moment. Unless `normals` is ``"facet"``, the normal is
+    interpolated between nodal means of the facets' normals, so that it is continuous across facets except at corners,
+    and the candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle has the
+    pose `obstacle`. With `rounded`, facet normals vary continuously across edges.
 
     Raises
     ------
@@ -159,7 +158,7 @@ def pair(
     if normals == "facet" and not rounded:
         inner = _at_smooth_ends(primary, coordinates, closest)
         paired = closest.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
-        outside = paired & ~inner & (closest.overhang > INSIDE)
+        outside = paired & ~inner & (closest.overhang > LENGTH_ROUND_OFF)
         return _straight_on(
             Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside
         )
@@ -175,16 +174,16 @@ def pair(
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance
     return _straight_on(
-        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > INSIDE)
+        Pairing(facet, xi, normal, paired), candidates, primary, coordinates, paired & (overhang > LENGTH_ROUND_OFF)
     )
 
 
 def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
-    """Return the normals (n, dim) of facets that turn to the `mean` (n, dim) at their edges over `ROUNDED` of each.
+    """Return facet normals (n, dim) that pass to the `mean` (n, dim) at their edges, over `ROUNDED` of each facet.
 
-    Where facets meet in an edge, contact forces of a node may have any direction between their normals, and the edge is where
-    equilibrium puts the node: with the normal of one or the other it flips between them. Here the direction follows from
-    where it stands on the rounded edge.
+    Where facets meet in an edge, the contact force of a node may have any direction between their normals, and
+    equilibrium may place the node at the edge: with the normal of either facet the pairing alternates between them. Here
+    the direction follows from the position on the rounded edge.
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
     normals = interpolated(normals, places(primary, facet, xi))
@@ -202,10 +201,10 @@ def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordina
         return pairing
     at = places(primary, pairing.facet[rows], pairing.xi[rows])
     corners = coordinates[at.nodes]
-    apart = candidates[rows] - np.einsum("nk,nkd->nd", at.shape, corners)
+    offset = candidates[rows] - np.einsum("nk,nkd->nd", at.shape, corners)
     axes = np.concatenate([np.einsum("nkj,nkd->ndj", at.gradient, corners), pairing.normal[rows][:, :, None]], axis=2)
     beyond = np.zeros_like(pairing.xi)
-    beyond[rows] = np.linalg.solve(axes, apart[:, :, None])[:, :-1, 0]
+    beyond[rows] = np.linalg.solve(axes, offset[:, :, None])[:, :-1, 0]
     return replace(pairing, beyond=beyond)
 
 
@@ -222,13 +221,16 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
     return np.asarray(out & smooth[closest.facet, (closest.xi[:, 0] > 0.0).astype(np.intp)])
 
 
-def filled_up(parts: Sequence[AnyArray]) -> AnyArray:
+def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
     """Return arrays (n_i, k_i) as one, as wide as the widest: integers are repeated, floating-point numbers zero."""
-    width = max(part.shape[1] for part in parts)
-    missing = [((0, 0), (0, width - part.shape[1])) for part in parts]
-    integer = np.issubdtype(parts[0].dtype, np.integer)
+    width = max(values.shape[1] for values in arrays)
+    missing = [((0, 0), (0, width - values.shape[1])) for values in arrays]
+    integer = np.issubdtype(arrays[0].dtype, np.integer)
     return np.concatenate(
-        [np.pad(part, pad, mode="edge" if integer else "constant") for part, pad in zip(parts, missing, strict=True)]
+        [
+            np.pad(values, pad, mode="edge" if integer else "constant")
+            for values, pad in zip(arrays, missing, strict=True)
+        ]
     )
 
 
@@ -250,10 +252,10 @@ def gap_rows(
 def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D.
 
-    In 3D one pair of axes at right angles to the mean normal is turned to every point by the smallest rotation. Tangents
-    then change no faster than normals, so that components of tractions along them can be taken for fields, and the choice
-    of the first axis makes no difference. Where motions are held, by projectors `held` (n, 3, 3), they are turned so that one
-    of them is held as far as any tangent is.
+    In 3D one pair of axes perpendicular to the mean normal is rotated to every point by the smallest rotation. Tangents then
+    vary no faster than normals, so that components of tractions along them can be interpolated as fields, and the choice
+    of the first axis does not matter. Where displacements are held, by projectors `held` (n, 3, 3), the tangents are
+    rotated so that one of them is held as far as any tangent is.
     """
     if normal.shape[1] == 2:
         return [np.column_stack([normal[:, 1], -normal[:, 0]])]
@@ -262,7 +264,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
-    # What a rotation of the mean normal to the normal does to the axis; where they are opposite, a half turn about it.
+    # Rotation of the axis by the rotation of the mean normal to the normal; a half turn about it where they are opposite.
     both = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)

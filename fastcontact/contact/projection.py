@@ -1,8 +1,8 @@
 """Projection along averaged normals: continuous across facets, unlike closest-point projection.
 
-On a surface of facets the closest point jumps where an edge folds inward, by a distance in proportion to the gap; a
-pairing that is renewed in a loop may then flip for ever. Along normals interpolated between nodal means the projection
-moves on smoothly (Puso and Laursen, 2004, section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2).
+On a faceted surface the closest point jumps at concave edges, by a distance proportional to the gap; iterated pairings may
+then not converge. Along normals interpolated between nodal means the projection varies continuously (Puso and Laursen, 2004,
+section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 
-# What the projection of a point takes, in nodes of a cell: see `portions`.
+# Cost of the projection of a point relative to a node of a cell, see `portions`.
 EFFORT = 16
 # Facets that meet at a smaller angle than this approximate a smooth surface; others form a corner [degrees].
 CORNER = 45.0
@@ -36,7 +36,7 @@ class Places:
     nodes, local : ndarray of int (n, k)
         Point numbers, and positions in the points of the surface; of facets with fewer nodes some are repeated.
     shape : ndarray (n, k)
-        Shape functions; zero for what is repeated.
+        Shape functions; zero for repeated nodes.
     gradient : ndarray (n, k, dim - 1)
         Their derivatives.
     """
@@ -61,11 +61,11 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
     )
     first = 0
     for block in side.blocks:
-        mine = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
-        shape, k = _of_block(block, facet[mine] - first, xi[mine]), block.facets.shape[1]
+        in_block = np.flatnonzero((facet >= first) & (facet < first + len(block.facets)))
+        shape, k = _of_block(block, facet[in_block] - first, xi[in_block]), block.facets.shape[1]
         columns = np.minimum(np.arange(width), k - 1)
-        projected.nodes[mine], projected.local[mine] = shape.nodes[:, columns], shape.local[:, columns]
-        projected.shape[mine, :k], projected.gradient[mine, :k] = shape.shape, shape.gradient
+        projected.nodes[in_block], projected.local[in_block] = shape.nodes[:, columns], shape.local[:, columns]
+        projected.shape[in_block, :k], projected.gradient[in_block, :k] = shape.shape, shape.gradient
         first += len(block.facets)
     return projected
 
@@ -78,7 +78,7 @@ def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
 def nodal_normals(side: Surface, coordinates: Array) -> Array:
     """Return the mean of the facets' unit normals at each node (m, dim), weighted by their angles there, normalised.
 
-    The angles make it depend on the surface alone, not on how it is cut into facets (Thuermer and Wuethrich, 1998).
+    With these weights it depends on the surface alone, not on its division into facets (Thuermer and Wuethrich, 1998).
     """
     normals = [facet_normals(block, coordinates) for block in side.blocks]
     return _nodal_means(
@@ -91,22 +91,22 @@ def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]
     n, dim = len(side.points), values[0].shape[2]
     at = np.concatenate([block.local.ravel() for block in side.blocks])
     weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
-    total: Array = np.column_stack([np.bincount(at, part, n) for part in np.concatenate(weighted).T])
+    total: Array = np.column_stack([np.bincount(at, component, n) for component in np.concatenate(weighted).T])
     side.add_across_ends(total)
     return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 
 def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
-    """Return by block the unit normals (n_facets, n_nodes, dim) that facets have at their nodes as parts of a smooth surface.
+    """Return, for each block, unit normals (n_facets, n_nodes, dim) at the nodes of facets as parts of a smooth surface.
 
-    The nodal means of `nodal_normals`; at corners the mean of those facets alone that meet the facet smoothly, so that a
-    punch is flat up to its corner, also where its flanks belong to the surface.
+    These are the nodal means of `nodal_normals`; at corners only the facets that meet the facet smoothly enter the mean, so
+    that a punch is flat up to its corner, also where its flanks belong to the surface.
     """
     facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
     angles = [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
     means = _nodal_means(side, facet_normals_of_blocks, angles)
     smooth = [means[block.local] for block in side.blocks]
-    # A node is at a corner where a facet leans from the mean by more than half the angle between two that form one.
+    # A node is at a corner where a facet deviates from the mean by more than half the angle between two that form one.
     flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
     for block, normals, mean in zip(side.blocks, facet_normals_of_blocks, smooth, strict=True):
         corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
@@ -124,17 +124,17 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
         joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
     ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
     return [
-        part.reshape(like.shape) for part, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
+        means.reshape(like.shape) for means, like in zip(np.split(joined, ends), facet_normals_of_blocks, strict=True)
     ]
 
 
-def at_nodes_of_facets(parts: Sequence[Array]) -> Array:
+def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
     """Return values at the nodes of facets (n_facets, k, ...) of all blocks as one array, as wide as the widest block.
 
     The last entry of facets with fewer nodes is repeated, as in `places`.
     """
-    width = max(part.shape[1] for part in parts)
-    return np.concatenate([part[:, np.minimum(np.arange(width), part.shape[1] - 1)] for part in parts])
+    width = max(values.shape[1] for values in of_blocks)
+    return np.concatenate([values[:, np.minimum(np.arange(width), values.shape[1] - 1)] for values in of_blocks])
 
 
 def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
@@ -143,7 +143,7 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     slopes = element.gradient(element.nodes)
     if element.dim == 2:
         out = np.empty(nodes.shape)
-        shared(lambda part: projection_kernels.normals(nodes, slopes, *part, out), portions(*block.facets.shape))
+        shared(lambda portion: projection_kernels.normals(nodes, slopes, *portion, out), portions(*block.facets.shape))
         return out
     normal = area_vectors(nodes, slopes)
     return normal / np.linalg.norm(normal, axis=2, keepdims=True)
@@ -156,7 +156,9 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)  # edges run from each corner to the next
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
-    shared(lambda part: projection_kernels.angles(nodes, beside, *part, angle), portions(len(nodes), nodes.shape[1]))
+    shared(
+        lambda portion: projection_kernels.angles(nodes, beside, *portion, angle), portions(len(nodes), nodes.shape[1])
+    )
     return angle
 
 
@@ -189,12 +191,12 @@ def along_normals(
     xi : ndarray (n, 2)
         Inside the facet.
     overhang : ndarray (n,)
-        How far the projection lies beyond the end of its facet, in facet lengths.
+        Distance of the projection beyond the end of its facet, in facet lengths.
     normal : ndarray (n, 3)
         Interpolated unit normals there.
     """
     facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
-    # Seen from the midst of the surface: far from the origin, rounding would be coarser than a converged step.
+    # Relative to the middle of the surface: far from the origin, round-off would exceed a converged step.
     x = coordinates[side.points]
     midst = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
@@ -206,8 +208,8 @@ def along_normals(
     ]
     terms, directions = _polynomials(kinds), _polynomials(at_nodes)
     shared(
-        lambda part: projection_kernels.along_normals(
-            *part, seen, heights, terms, directions, side.triangular, side.neighbours, facet
+        lambda portion: projection_kernels.along_normals(
+            *portion, seen, heights, terms, directions, side.triangular, side.neighbours, facet
         ),
         portions(len(points), EFFORT),
     )

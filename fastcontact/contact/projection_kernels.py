@@ -10,14 +10,12 @@ import numpy as np
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.projection_3d_kernels import STEP, component, vector
 from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 MAX_ITERATIONS = 15
-# A point that lies beyond its facet by less than this, in facet lengths, counts as inside.
-INSIDE = 1e-10
 # A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
 BEYOND = 1.0
-# Columns of a Jacobian that span less than this part of the volume of a box are dependent.
+# Columns of a Jacobian are dependent if they span less than this fraction of the volume of a box.
 FLAT = 1e-8
 
 
@@ -94,7 +92,7 @@ def _newton(point, terms, directions, f, s, t, height):
             return s, t, False
         ds, dt = dot(residual, across) / volume, dot(residual, cross(normal, p)) / volume
         dh, size = dot(residual, cross(p, q)) / volume, max(abs(ds), abs(dt))
-        # Far off, a full step may leave the region where the interpolated normals mean anything.
+        # Far off, a full step may leave the region where the interpolated normals are meaningful.
         share = 1.0 if size <= 1.0 else 1.0 / size
         s, t, height = s + share * ds, t + share * dt, height + share * dh
         if share * size <= STEP * (1.0 + max(abs(s), abs(t))):
@@ -121,7 +119,7 @@ def inside(triangle, s, t):
 
 @innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height):
-    """Return which facet next to `f` the projection leaves least, where on it, and by how much; infinite if on none."""
+    """Return the facet next to `f` with the smallest overhang of the projection, (s, t), and the overhang or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
@@ -129,7 +127,8 @@ def _beside(point, terms, directions, triangular, neighbours, f, height):
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
         out = beyond(triangular[g], s, t) if converged else np.inf
-        if converged and max(out, INSIDE) < max(least, INSIDE) - ROUND_OFF:  # of several left alike, the first one
+        # Of several equivalent facets, the first one is taken.
+        if converged and max(out, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, out
     return best, best_s, best_t, least
 
@@ -161,10 +160,10 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
         out = beyond(triangular[f], a, b)
         if good and out <= BEYOND:
             s, t, over = a, b, out
-            if out > INSIDE:
+            if out > LENGTH_ROUND_OFF:
                 other, a, b, out = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
                 if out < over:
                     f, s, t, over = other, a, b, out
         s, t = inside(triangular[f], s, t)
-        facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > INSIDE else 0.0
+        facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0
         normal[i, 0], normal[i, 1], normal[i, 2] = unit(_place(directions, f, s, t)[0])

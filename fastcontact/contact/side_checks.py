@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Facets of each kind that are looked at.
+# Number of sampled facets of each kind.
 SAMPLE = 200
 
 
@@ -37,14 +37,14 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
         )
     for side in (secondary, primary):
         _check_normals(mesh, name, side)
-    ours, theirs = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
-    apart = theirs[0][None] - ours[0][:, None]
-    facing = np.einsum("id,jd->ij", ours[1], theirs[1]) < 0
-    ahead = (np.einsum("ijd,id->ij", apart, ours[1]) > -0.1 * np.linalg.norm(apart, axis=2)) | (
-        np.linalg.norm(apart, axis=2) < np.minimum.outer(ours[2], theirs[2])
+    frames, opposite = _facet_frames(mesh, secondary), _facet_frames(mesh, primary)
+    difference = opposite[0][None] - frames[0][:, None]
+    facing = np.einsum("id,jd->ij", frames[1], opposite[1]) < 0
+    ahead = (np.einsum("ijd,id->ij", difference, frames[1]) > -0.1 * np.linalg.norm(difference, axis=2)) | (
+        np.linalg.norm(difference, axis=2) < np.minimum.outer(frames[2], opposite[2])
     )
     if not (facing & ahead).any():
-        behind = -np.einsum("ijd,id->ij", apart, ours[1])[facing]
+        behind = -np.einsum("ijd,id->ij", difference, frames[1])[facing]
         inside = f", or do the bodies lie inside each other, by {behind.min():.4g} or more" if len(behind) else ""
         raise ContactError(
             f"no facet of '{secondary.group}' faces '{primary.group}': the outer sides of the two groups look away from "
@@ -78,12 +78,12 @@ def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
 
 
 def shared_facets(mesh: Mesh, group: str, other: str) -> Numbers:
-    """Return the nodes of the facets that two groups share, ascending; a facet may be in the mesh more than once."""
-    ours, theirs = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
+    """Return the nodes of the facets that two groups share, ascending; a mesh may contain a facet more than once."""
+    facets_of_group, facets_of_other = mesh.cells_of(group, dim=mesh.dim - 1), mesh.cells_of(other, dim=mesh.dim - 1)
     nodes = [np.empty(0, np.int32)]
-    for name in ours.keys() & theirs.keys():
+    for name in facets_of_group.keys() & facets_of_other.keys():
         facets, count = np.unique(
-            np.concatenate([np.unique(np.sort(side[name], axis=1), axis=0) for side in (ours, theirs)]),
+            np.concatenate([np.unique(np.sort(side[name], axis=1), axis=0) for side in (facets_of_group, facets_of_other)]),
             axis=0, return_counts=True,
         )  # fmt: skip
         nodes.append(facets[count > 1].ravel())

@@ -50,8 +50,8 @@ class Surface:
     abscissa : ndarray (m,)
         Length along the surface to each node [length]; zero where there is no such order.
     periodic_ends : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim) or (k, dim, dim))
-        Positions in `points` at both ends of a part that repeats itself, and the turn [-] from the first to the second: there
-        the surface goes on. In a plane of symmetry both ends are the same nodes, and the turn is a reflection.
+        Positions in `points` at both ends of a periodic part, and the rotation [-] from the first to the second: there the
+        surface continues. In a plane of symmetry both ends are the same nodes, and the rotation is a reflection.
     """
 
     group: str
@@ -61,7 +61,7 @@ class Surface:
     periodic_ends: tuple[tuple[Indices, Indices, Array], ...] = ()
 
     def with_periodic_ends(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
-        """Return the surface that goes on at ends (k,) and (k,), by number of points, as far as it reaches them."""
+        """Return the surface, continued at ends (k,) and (k,) given by point numbers, as far as it contains them."""
         order, on_surface = np.argsort(self.points), []
         for first, second, turn in ends:
             both = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
@@ -70,7 +70,7 @@ class Surface:
         return replace(self, periodic_ends=tuple(on_surface))
 
     def add_across_ends(self, vectors: Array) -> None:
-        """Add up vectors (m, dim), sums over the facets at each end of an interface, over the facets of both ends."""
+        """Add the vectors (m, dim), sums over facets, of both ends of each periodic interface, in place."""
         for first, second, turn in self.periodic_ends:
             vectors[first] += (vectors[second][:, None] @ turn)[:, 0]
             vectors[second] = (vectors[first][:, None] @ np.swapaxes(turn, -1, -2))[:, 0]
@@ -138,7 +138,7 @@ class Surface:
 
     @cached_property
     def neighbours(self) -> tuple[Indices, Indices]:
-        """Where the neighbours of each facet begin (n_facets + 1,), and which they are, ascending: they share a node."""
+        """Facets that share a node with each facet, ascending, in compressed rows: offsets (n_facets + 1,) and facets."""
         nodes = np.concatenate([block.local.ravel() for block in self.blocks])
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
         start = np.concatenate([[0], np.cumsum(sizes)])
@@ -155,7 +155,7 @@ class Surface:
 
 
 def line_neighbours(local: Indices) -> Indices:
-    """Return the lines (n, 2) before and behind each one, of nodes (n, k), -1 for none: lines are oriented alike."""
+    """Return the lines (n, 2) before and after each line of nodes (n, k), -1 for none: all have the same orientation."""
     begins, ends = np.full((2, int(local.max()) + 1), -1, np.intp)
     begins[local[:, 0]] = ends[local[:, 1]] = np.arange(len(local))
     return np.column_stack([ends[local[:, 0]], begins[local[:, 1]]])

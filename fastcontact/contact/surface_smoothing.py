@@ -1,12 +1,12 @@
-r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets stand for.
+r"""Geometric correction of contact surfaces: gaps between the smooth surfaces that straight facets approximate.
 
-Facets of curved sides that do not match leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors
+Non-matching facets of curved sides leave gaps and overlaps of the size of their sag :math:`h`, and thus pressure errors
 of the order of :math:`E h / L` for facets of length L, whatever the interference. A surface of constant curvature and a
 polynomial of twice the order of the facet are fitted to the nodes of the facet and of those around it (local surface fitting:
-Jiao and Zha, 2008). The height of this smooth surface P above the facet is what interpolation between the nodes of the facet
-leaves of it, :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
+Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
+:math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
 
-Only the curvature that both sides share is corrected for: facets of a ball on a flat lie flat in the contact, as it does.
+Only the curvature that both sides share is corrected for: facets of a ball on a flat are flat in the contact, as the ball is.
 With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are multiplied by
 :math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, K its own. Fits do not reach across corners, and where the curvature changes
 from one facet to the next, heights are multiplied by the limiter of van Albada, van Leer and Roberts (1982),
@@ -28,9 +28,8 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Heights below this part of the size of a facet, and curvatures below this part of its inverse, are rounding errors.
-FLAT = 1e-10
 # Columns of a fit are scaled by this with each degree, and its squares damped by this part of the least column: where nodes
 # leave terms undetermined, as on a strip one facet wide, those of low degree take all.
 LOWER, DAMPING = 0.1, 1e-5
@@ -74,51 +73,56 @@ class Smoothing:
     @classmethod
     def of(cls, secondary: Surface, primary: Surface, points: Array) -> Smoothing | None:
         """Return the smooth surfaces of two sides at reference `points` (n_points, dim); None if no curvature is shared."""
-        theirs = smooth_side(primary, points)
-        ours = None if theirs is None else smooth_side(secondary, points)
-        if ours is None or theirs is None:
+        smooth_primary = smooth_side(primary, points)
+        smooth_secondary = None if smooth_primary is None else smooth_side(secondary, points)
+        if smooth_secondary is None or smooth_primary is None:
             return None
-        made, axes = cls(ours, theirs), [frames(side, points, points) for side in (secondary, primary)]
+        made, axes = (
+            cls(smooth_secondary, smooth_primary),
+            [frames(side, points, points) for side in (secondary, primary)],
+        )
         middles = [points[b.facets[:, : elements.get(b.element).n_corners]].mean(axis=1) for b in secondary.blocks]
         opposite = closest_of_kinds(np.concatenate(middles), primary.corners(points)).facet
         factor = made.shared(np.arange(len(opposite)), opposite, axes)
-        counts = factor[:, 0] * np.abs(ours.heights).max(axis=(1, 2)) > 0.0
-        counts |= factor[:, 1] * np.abs(theirs.heights[opposite]).max(axis=(1, 2)) > 0.0
+        counts = factor[:, 0] * np.abs(smooth_secondary.heights).max(axis=(1, 2)) > 0.0
+        counts |= factor[:, 1] * np.abs(smooth_primary.heights[opposite]).max(axis=(1, 2)) > 0.0
         return made if counts.any() else None
 
-    def shared(self, ours: Indices, theirs: Indices, frames: Sequence[Array]) -> Array:
+    def shared(self, secondary: Indices, primary: Indices, frames: Sequence[Array]) -> Array:
         """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
 
         `frames` are those of all facets where they are now.
         """
-        a = self.secondary.curvature[ours]
-        b = _in_plane_of(frames[0][ours], frames[1][theirs], self.primary.curvature[theirs])
+        a = self.secondary.curvature[secondary]
+        b = _in_plane_of(frames[0][secondary], frames[1][primary], self.primary.curvature[primary])
         common = -np.einsum("nij,nij->n", a, b)
         squares = np.stack([np.einsum("nij,nij->n", tensor, tensor) for tensor in (a, b)], axis=1)
         return np.clip(np.divide(common[:, None], squares, out=np.zeros_like(squares), where=squares > 0.0), 0.0, 1.0)
 
-    def overlap(self, ours: tuple[Indices, Array], theirs: tuple[Indices, Array], frames: Sequence[Array]) -> Array:
-        """Return by how much (n,) the smooth surfaces are closer to each other than the facets, where these face [length].
+    def overlap(
+        self, secondary: tuple[Indices, Array], primary: tuple[Indices, Array], frames: Sequence[Array]
+    ) -> Array:
+        """Return the distances (n,) by which the smooth surfaces are closer to each other than the facing facets [length].
 
-        `ours` and `theirs` are facets (n,) and reference coordinates (n, dim - 1) in them.
+        `secondary` and `primary` are facets (n,) and reference coordinates (n, dim - 1) in them.
         """
-        factor = self.shared(ours[0], theirs[0], frames)
-        return factor[:, 0] * self.secondary.at(*ours) + factor[:, 1] * self.primary.at(*theirs)
+        factor = self.shared(secondary[0], primary[0], frames)
+        return factor[:, 0] * self.secondary.at(*secondary) + factor[:, 1] * self.primary.at(*primary)
 
 
 def frames(side: Surface, points: Array, coordinates: Array) -> Array:
-    """Return tangents (n_facets, dim - 1, dim) in the middles of facets as bodies carry them along, of unit length at rest.
+    """Return convected tangents (n_facets, dim - 1, dim) in the middle of facets, of unit length in the reference.
 
-    At rest, at `points` (n_points, dim), the first one goes towards the first corner; they take part in the mean deformation
-    of a facet to `coordinates` (n_points, dim), so that no corner matters more than others.
+    In the reference, at `points` (n_points, dim), the first one points to the first corner; they follow the mean
+    deformation of a facet to `coordinates` (n_points, dim), so that no corner has more influence than others.
     """
     frames_of_blocks = []
     for block in side.blocks:
         rest, now = (x[block.facets[:, : elements.get(block.element).n_corners]] for x in (points, coordinates))
         axes = _axes(block, points, _normals(block, points))[:, :-1]
         local = (rest - rest.mean(axis=1, keepdims=True)) @ axes.transpose(0, 2, 1)
-        apart = now - now.mean(axis=1, keepdims=True)
-        frames_of_blocks.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ apart))
+        centred = now - now.mean(axis=1, keepdims=True)
+        frames_of_blocks.append(np.linalg.solve(local.transpose(0, 2, 1) @ local, local.transpose(0, 2, 1) @ centred))
     return np.concatenate(frames_of_blocks)
 
 
@@ -142,56 +146,56 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     """Return the smooth surface of a side at `points` (n_points, dim); None where its facets have no sag."""
     if _in_one_plane(points[side.points]):
         return None
-    near, nodes, taken = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
+    near, nodes, valid = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
     around, first, fits = points[side.points[nodes]], 0, []
-    if _flat(around, taken):
+    if _flat(around, valid):
         return None
     for block in side.blocks:
         rows = slice(first, first + len(block.facets))
-        fit = _fit(block, points, around[rows], taken[rows], 2 * side.order)
-        reaching = fit.reaching(around[rows], taken[rows])
+        fit = _fit(block, points, around[rows], valid[rows], 2 * side.order)
+        reaching = fit.reaching(around[rows], valid[rows])
         heights, curvature, axes = _heights(block, points, fit)
         fits.append((heights * reaching[:, None, None], curvature * reaching[:, None, None], axes))
         first += len(block.facets)
-    heights, curvature, axes = (np.concatenate(parts) for parts in zip(*fits, strict=True))
+    heights, curvature, axes = (np.concatenate(of_blocks) for of_blocks in zip(*fits, strict=True))
     if not heights.any():
         return None
     return SmoothSide(heights * _limiter(near, curvature, axes)[:, None, None], curvature)
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
-    """Return which facets share a node and meet at no corner, and the nodes of all these for each facet.
+    """Return which facets share a node without a corner between them, and the nodes of all these for each facet.
 
-    A matrix (n_facets, n_facets), each facet with itself, positions (n_facets, most) in the points of the side, and which of
-    them are taken.
+    A matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the side, and which of
+    these entries are filled.
     """
     size = [block.local.shape[1] for block in side.blocks for _ in block.local]
     nodes = np.concatenate([block.local.ravel() for block in side.blocks])
     at = np.repeat(np.arange(side.n_facets), size), nodes
     incidence = csr_array((np.ones(len(nodes)), at), shape=(side.n_facets, len(side.points)))
     i, j = (incidence @ incidence.T).tocoo().coords
-    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER)) - FLAT
+    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER)) - LENGTH_ROUND_OFF
     near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
     around = csr_array(near @ incidence)
-    taken = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
-    padded = np.zeros(taken.shape, np.intp)
-    padded[taken] = around.indices
-    return near, padded, taken
+    valid = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]
+    padded = np.zeros(valid.shape, np.intp)
+    padded[valid] = around.indices
+    return near, padded, valid
 
 
 def _in_one_plane(points: Array) -> bool:
     """Return whether points (n, dim) lie in one plane."""
     away = points - points.mean(axis=0)
-    return bool(np.linalg.svd(away, compute_uv=False)[-1] <= FLAT * np.linalg.norm(away))
+    return bool(np.linalg.svd(away, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(away))
 
 
-def _flat(around: Array, taken: Mask) -> bool:
-    """Return whether the points `around` (n, m, dim) every facet lie in a plane of their own."""
-    count = taken.sum(axis=1)[:, None]
-    away = np.where(taken[:, :, None], around, 0.0)
-    away = np.where(taken[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
+def _flat(around: Array, valid: Mask) -> bool:
+    """Return whether the points `around` (n, m, dim) each facet are coplanar."""
+    count = valid.sum(axis=1)[:, None]
+    away = np.where(valid[:, :, None], around, 0.0)
+    away = np.where(valid[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
     least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
-    return bool((least <= (FLAT * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
+    return bool((least <= (LENGTH_ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,16 +218,16 @@ class _Fit:
         local = np.einsum("nkd,ned->nke", points - self.origin[:, None], self.axes) / self.size[:, None, None]
         return local[..., :-1], local[..., -1]
 
-    def fitted(self, points: Array, taken: Mask) -> _Fit:
-        """Return this one with polynomials fitted to those `points` (n, m, dim) that are `taken` (n, m)."""
+    def fitted(self, points: Array, valid: Mask) -> _Fit:
+        """Return this one with polynomials fitted to those `points` (n, m, dim) that are `valid` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
         powers = [math.comb(*pair) for pair in zip(i + j, i)]
         lower = LOWER ** (i + j) * np.sqrt(powers)  # no direction counts more than others (Bombieri's norm)
-        columns = np.where(taken[..., None], lower * _terms(plane, i, j), 0.0)
-        rest = np.where(taken, height - _conic(self.curvature, plane), 0.0)
+        columns = np.where(valid[..., None], lower * _terms(plane, i, j), 0.0)
+        rest = np.where(valid, height - _conic(self.curvature, plane), 0.0)
         size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
         damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
-        # By orthogonal factors: in normal equations what the damping determines would be known to 1e-3 only.
+        # By QR: from normal equations the terms that the damping determines would be accurate to 1e-3 only.
         rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
         return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
@@ -232,13 +236,13 @@ class _Fit:
         """Return the heights (n, m) over points (n, m, d) of the planes."""
         return _conic(self.curvature, plane) + np.einsum("nqt,nt->nq", _terms(plane, *self.powers), self.polynomial)
 
-    def reaching(self, points: Array, taken: Mask) -> Mask:
-        """Return which surfaces (n,) of constant curvature reach all of those `points` (n, m, dim) that are `taken` (n, m).
+    def reaching(self, points: Array, valid: Mask) -> Mask:
+        """Return which surfaces (n,) of constant curvature extend to all `points` (n, m, dim) that are `valid` (n, m).
 
-        Others fit nodes that do not determine them, as of three coarse facets in a row, and amplify round-off.
+        The others are not determined by their nodes, e.g. of three coarse facets in a row, and amplify round-off.
         """
         bent = np.einsum("nqd,nde->nqe", self.in_planes(points)[0], self.curvature)
-        return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~taken).all(axis=1))
+        return np.asarray((((bent**2).sum(axis=2) < 1.0) | ~valid).all(axis=1))
 
     def in_the_middle(self) -> tuple[Array, Array]:
         """Return slopes (n, d) and curvatures (n, d, d) in the middle of the facets."""
@@ -250,25 +254,25 @@ class _Fit:
         return self.polynomial[:, slope], self.curvature - self.polynomial[:, second] * (1.0 + np.eye(len(second)))
 
 
-def _fit(block: FacetBlock, points: Array, around: Array, taken: Mask, degree: int) -> _Fit:
-    """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `taken` (n, m).
+def _fit(block: FacetBlock, points: Array, around: Array, valid: Mask, degree: int) -> _Fit:
+    """Fit surfaces to those of the points `around` (n, m, dim) the facets of a block that are `valid` (n, m).
 
-    From pass to pass, planes turn to be tangent, and what is of constant curvature is taken out of the polynomials.
+    In each pass, planes are rotated towards the tangent, and constant curvature is moved from the polynomials to `curvature`.
     """
     corners = points[block.facets[:, : elements.get(block.element).n_corners]]
     origin, normal = corners.mean(axis=1), _normals(block, points)
     size = np.linalg.norm(corners - origin[:, None], axis=2).max(axis=1)
     powers = _powers(points.shape[1] - 1, degree)
     curvature = np.zeros((len(corners), *2 * (points.shape[1] - 1,)))
-    fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(around, taken)
+    fit = _Fit(_axes(block, points, normal), origin, size, curvature, powers, np.empty(0)).fitted(around, valid)
     for _ in range(1, PASSES):
         slope, curvature = fit.in_the_middle()
-        fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(around, taken)
+        fit = replace(fit, axes=_tilted(fit.axes, slope), curvature=curvature).fitted(around, valid)
     return fit
 
 
 def _tilted(axes: Array, slope: Array) -> Array:
-    """Return axes (n, dim, dim) after the smallest rotation to normals of surfaces with a `slope` (n, dim - 1) over them."""
+    """Return axes (n, dim, dim) after the smallest rotation to the normals of surfaces of `slope` (n, dim - 1) over them."""
     normal = axes[:, -1] - np.einsum("nj,njd->nd", slope, axes[:, :-1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     both = axes[:, -1] + normal
@@ -282,11 +286,11 @@ def _heights(block: FacetBlock, points: Array, smooth: _Fit) -> tuple[Array, Arr
     (xi, powers), (corners, _) = _lattice(element, k), smooth.in_planes(points[block.facets])
     shape = element.shape(xi)
     height = smooth.at(np.einsum("qk,nke->nqe", shape, corners)) - smooth.at(corners) @ shape.T
-    height = smooth.size[:, None] * np.where(np.abs(height) > FLAT, height, 0.0)
+    height = smooth.size[:, None] * np.where(np.abs(height) > LENGTH_ROUND_OFF, height, 0.0)
     heights = np.zeros((len(corners), k, k if element.dim == 2 else 1))
     heights[:, powers[0], powers[1]] = np.linalg.solve(_terms(xi, *powers), height.T).T
     curvature = smooth.in_the_middle()[1]
-    curvature = np.where(np.abs(curvature) > FLAT, curvature, 0.0) / smooth.size[:, None, None]
+    curvature = np.where(np.abs(curvature) > LENGTH_ROUND_OFF, curvature, 0.0) / smooth.size[:, None, None]
     return heights, curvature, smooth.axes[:, :-1]
 
 

@@ -1,9 +1,9 @@
 """Tied contact: no opening and no slip, as linear equations that hold from the beginning.
 
-The sides are paired once, as they lie before any load; the relative displacement of what faces each other there stays
-zero in every direction. What the equations are tested with are the formulation's own multipliers: one set of equations
-a node where forces are nodal; moments with the functions of the multiplier field where they act at integration points,
-which is the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters play no part.
+The sides are paired once, in the undeformed configuration; the relative displacement of points that face each other stays
+zero in every direction. The test functions are the formulation's multipliers: one set of equations per node where forces
+are nodal; moments with the functions of the multiplier field where forces act at integration points, which is the mortar
+method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ class TiedPair:
     Attributes
     ----------
     moments : csr_array (q, m)
-        From the gaps at the m places of the formulation to the q gaps that vanish.
+        From the gaps at the m constraint points of the formulation to the q gaps that vanish.
     rows : tuple of csr_array (q, n_dofs)
         Relative displacement along the normal and each tangent.
     directions : tuple of ndarray (m, dim)
         The tangents.
     positions : ndarray (q, dim)
-        Where the equations hold, about, on the reference surface [length].
+        Approximate positions of the equations on the reference surface [length].
     nodal : NodalField
-        What forces at the places of the formulation mean at its nodes.
+        Nodal interpretation of the forces at the constraint points.
     nodes : ndarray of int (q,), optional
         The secondary nodes that the gaps belong to, see `Constraints`.
     areas : ndarray (q,), optional
@@ -63,14 +63,14 @@ class TiedPair:
         )
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
-        """Return normal (m,) and tangential (m, k) forces at the places of the formulation."""
+        """Return normal (m,) and tangential (m, k) forces at the constraint points of the formulation."""
         multiplier = multiplier if self.reduction is None else self.reduction @ multiplier
-        parts = [self.moments.T @ part for part in multiplier.reshape(len(self.rows), -1)]
-        return parts[0], np.column_stack(parts[1:])
+        components = [self.moments.T @ component for component in multiplier.reshape(len(self.rows), -1)]
+        return components[0], np.column_stack(components[1:])
 
 
 def tied(constraints: Constraints, moments: csr_array, areas: Array | None, reduction: csr_array | None) -> TiedPair:
-    """Return the tying equations of the constraints `constraints`, which have tangents; see `moments_of`, `TiedPair`."""
+    """Return the tying equations of `constraints`, which have tangents; see `moments_of` and `TiedPair`."""
     size = np.maximum(np.asarray(abs(moments).sum(axis=1)).ravel(), TINY)
     positions = abs(moments) @ constraints.positions / size[:, None]
     rows = [csr_array(moments @ along) for along in (constraints.B, *constraints.tangents)]
@@ -85,19 +85,19 @@ def tied(constraints: Constraints, moments: csr_array, areas: Array | None, redu
 
 
 def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
-    """Return the matrix (q, m) whose rows are the functions that the multipliers are combinations of.
+    """Return the matrix (q, m) whose rows are the basis functions of the multipliers.
 
-    Beside it the integrals (q,) of these functions, if known [area].
+    The second result are the integrals (q,) of these functions, if known [area].
     """
     if not isinstance(constraints.compliance, Projection):
         return csr_array(eye_array(len(constraints.gap0), format="csr")), constraints.areas
     P, areas = constraints.compliance.P, constraints.compliance.areas
     weighted = csr_array(P.T @ diags_array(areas))
     scale = np.asarray(abs(weighted).sum(axis=1)).ravel()
-    alone = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
-    single = csr_array((np.ones(len(alone)), (np.arange(len(alone)), alone)), shape=(len(alone), len(areas)))
-    whole = np.concatenate([scale, np.zeros(len(alone))])
-    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), whole
+    on_axis = np.flatnonzero((areas == 0.0) & constraints.usable)  # at the axis
+    single = csr_array((np.ones(len(on_axis)), (np.arange(len(on_axis)), on_axis)), shape=(len(on_axis), len(areas)))
+    scales = np.concatenate([scale, np.zeros(len(on_axis))])
+    return csr_array(vstack([diags_array(1.0 / np.maximum(scale, TINY)) @ weighted, single])), scales
 
 
 def _cleaned(rows: csr_array) -> csr_array:

@@ -1,8 +1,9 @@
 """Tied sides with an offset: a rigid arm across the gap rotates with the primary facet.
 
-Equal displacements across a gap would stop no rotation: the forces of both sides would have lines of action a gap apart, and
-shear would lose its moment. With the arm, the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt``,
-the gap g, the normal n and the derivative along t on the primary facet; it is zero in any small rotation of both sides.
+Equal displacements across a gap would resist rigid rotations: the forces of both sides would have different lines of action,
+and the moment of the shear would be lost. With the arm, the relative displacement along a tangent t is
+``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the derivative along t on the primary facet; it vanishes
+in any small rotation of both sides.
 """
 
 from __future__ import annotations
@@ -26,9 +27,9 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     Parameters
     ----------
     constraints : Constraints
-        Of m places, with tangents.
+        Constraints (m) with tangents.
     pairing : Pairing
-        What the places face.
+        Pairing of the constraint points.
     primary : Surface
     points : ndarray (n_points, dim)
         Reference coordinates [length].
@@ -43,7 +44,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
     left = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
     moved = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
-    # A tensor, for one length a tangent would depend on which tangents are taken where sides do not lie along the normal.
+    # A tensor, because one length per tangent would depend on the choice of tangents where the gap is not along the normal.
     lengths = left @ np.linalg.pinv(arms)
     lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
     tangents = [

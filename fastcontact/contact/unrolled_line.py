@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.contact.surface import Surface
 
@@ -18,7 +19,7 @@ class UnrolledLine:
     Attributes
     ----------
     nodes : ndarray (k, 2)
-        In order; the first stands also at the end of a closed line [length].
+        In order; the first is repeated at the end of a closed line [length].
     abscissa : ndarray (k,)
         Length along the line to each of them [length].
     closed : bool
@@ -44,12 +45,10 @@ class UnrolledLine:
 
     def lengths(self, positions: Array) -> Array:
         """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
-        from scipy.spatial import cKDTree
-
         last = len(self.nodes) - 1
-        nearest = cKDTree(self.nodes).query(positions)[1]
+        node = nearest(self.nodes, positions)[1]
         best, arc_length = np.full(len(positions), np.inf), np.zeros(len(positions))
-        for piece in (np.clip(nearest - 1, 0, last - 1), np.clip(nearest, 0, last - 1)):
+        for piece in (np.clip(node - 1, 0, last - 1), np.clip(node, 0, last - 1)):
             begin, along = self.nodes[piece], self.nodes[piece + 1] - self.nodes[piece]
             size = np.einsum("nd,nd->n", along, along)
             fraction = np.clip(np.einsum("nd,nd->n", positions - begin, along) / size, 0.0, 1.0)
@@ -63,7 +62,7 @@ class UnrolledLine:
 def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
     """Return a surface in the plane as one line; None where it is in several pieces or branches.
 
-    A closed line is cut open opposite to `middle` (2,) [length], without one at its lowest place.
+    A closed line is cut open opposite to `middle` (2,) [length], or at its lowest point without one.
     """
     if surface.abscissa.any():
         return UnrolledLine(coordinates[surface.points], surface.abscissa)

@@ -27,40 +27,40 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
 NAMES = ("12", "13", "23")
-# Of the stiffness to be symmetric, relative to its largest entry.
+# Tolerance of the symmetry of the stiffness, relative to its largest entry.
 SYMMETRIC = 1e-9
 
 
 @dataclass(frozen=True)
 class Orthotropic(Material):
-    """Orthotropic linear elasticity: wood, rolled sheet, a laminate, a composite.
+    """Orthotropic linear elasticity, for wood, rolled sheet, laminates and composites.
 
-    ModelError, with the condition that is broken, unless the elastic energy is positive for any strain.
+    ModelError, with the violated condition, unless the elastic energy is positive for every strain.
 
     Parameters
     ----------
     E : (float, float, float)
-        Young's moduli E1, E2, E3 along the material's axes [pressure]. Each of these, of nu and of G may also be a function
-        or an array where it varies, as E of `LinearElastic`.
+        Young's moduli E1, E2, E3 along the material axes [pressure]. Like E of `LinearElastic`, each of these, of nu
+        and of G may be a function or an array.
     nu : (float, float, float)
-        Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 over that along 1, for a stress along 1.
-        The others follow: nu21 = nu12 E2 / E1.
+        Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 divided by that along 1 under a
+        uniaxial stress along 1; nu21 = nu12 E2 / E1.
     G : (float, float, float)
         Shear moduli G12, G13, G23 [pressure].
     axes : sequence or callable, optional
-        The material's axes, by default those of the mesh (in axisymmetry: radius, axis, circumference). Two or three vectors
-        (x, y, z) at right angles, of any length; in the plane also the first one, (x, y), alone. Or a function from
-        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, taken at the quadrature
-        points of each cell. Or an array (n_cells, 3, 3) of such vectors for each cell of the material or of the mesh.
+        Material axes, by default those of the mesh (in axisymmetry: radius, axis, circumference): two or three
+        orthogonal vectors (x, y, z) of any length, in the plane also the first one, (x, y), alone; a function from
+        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, evaluated at the
+        quadrature points; or an array (n_cells, 3, 3) for the cells of the material or of the mesh.
     density : float, callable or ndarray (n,), optional
         Mass per volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
-        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; functions or arrays where
-        they vary.
+        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; numbers, functions or
+        arrays.
     incompatible_modes : bool
-        As of `LinearElastic`; by default cells have them.
+        As of `LinearElastic`, but by default True.
     conductivity : float, callable, ndarray (n,) or three of them, optional
-        Of heat, one for all or one along each axis [power / (length temperature)].
+        Thermal conductivity, one for all or one along each axis [power / (length temperature)].
 
     Notes
     -----
@@ -92,7 +92,7 @@ class Orthotropic(Material):
             _check_modulus(f"Young's modulus E{number}", value)
         for value, number in zip(self.G, NAMES, strict=True):
             _check_modulus(f"the shear modulus G{number}", value)
-        if not self.graded:  # else where the cells are known
+        if not self.graded:  # otherwise checked once the cells are known
             _check_ratios(self.E, self.nu)
         _take_rest(self)
 
@@ -109,14 +109,14 @@ class Orthotropic(Material):
         density: Constant | None = None,
         expansion: Constant | Sequence[Constant] | None = None,
     ) -> Orthotropic:
-        """Return a material that is isotropic across its first axis, such as one with fibres along it.
+        """Return a transversely isotropic material, such as one with fibres along its first axis.
 
         Parameters
         ----------
         E_along, E_across : float
             Young's moduli along the first axis and across it [pressure].
         nu_along : float
-            Minus the strain across over that along the first axis, for a stress along it [-].
+            Minus the strain across divided by that along the first axis, under a uniaxial stress along it [-].
         nu_across : float
             Poisson's ratio in the plane of isotropy [-]; its shear modulus is E_across / (2 (1 + nu_across)).
         G_along : float
@@ -145,8 +145,8 @@ class Orthotropic(Material):
 
     def compliances(self, constants: Any) -> Array:
         """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
-        given = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
-        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = given
+        values = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
+        E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = values
         S = np.zeros((len(E1), 6, 6))
         for row, modulus in enumerate((E1, E2, E3, G12, G23, G13)):
             S[:, row, row] = 1 / modulus
@@ -156,12 +156,12 @@ class Orthotropic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return where (n,) moduli are positive, and Poisson's ratios leave the energy of any strain positive."""
+        """Return where (n,) moduli are positive and Poisson's ratios make the strain energy positive definite."""
         E, nu, G = (
             np.broadcast_arrays(*map(np.atleast_1d, values)) for values in (constants.E, constants.nu, constants.G)
         )
         fit = np.all([(v >= 1.0 / LARGEST) & (v <= LARGEST) for v in np.broadcast_arrays(*E, *G)], axis=0)
-        with np.errstate(all="ignore"):  # what is no modulus is found above
+        with np.errstate(all="ignore"):  # inadmissible moduli are detected above
             nu21, nu31, nu32 = nu[0] * E[1] / E[0], nu[1] * E[2] / E[0], nu[2] * E[2] / E[1]
             single = (nu[0] * nu21 < 1.0) & (nu[1] * nu31 < 1.0) & (nu[2] * nu32 < 1.0)
             return fit & single & (_determinant(nu, (nu21, nu31, nu32)) > ROUND_OFF)
@@ -169,14 +169,15 @@ class Orthotropic(Material):
 
 @dataclass(frozen=True)
 class Anisotropic(Material):
-    """Linear elasticity with any moduli.
+    """Anisotropic linear elasticity.
 
     ModelError unless the matrix is symmetric and positive definite.
 
     Parameters
     ----------
     D : array_like (6, 6)
-        Stresses 11, 22, 33, 12, 23, 13 of strains 11, 22, 33, 2*12, 2*23, 2*13 in the material's axes [pressure].
+        Stiffness matrix from strains 11, 22, 33, 2*12, 2*23, 2*13 to stresses 11, 22, 33, 12, 23, 13 in the material
+        axes [pressure].
     axes : sequence or callable, optional
         As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
     density : float, callable or ndarray (n,), optional
@@ -235,16 +236,16 @@ class Anisotropic(Material):
         return f"D with the diagonal ({', '.join(f'{self.D[i][i]:g}' for i in range(6))})"
 
     def compliances(self, constants: Any) -> Array:
-        """Return the compliance (1, 6, 6) [1 / pressure], which does not vary."""
+        """Return the constant compliance (1, 6, 6) [1 / pressure]."""
         return np.asarray(np.linalg.inv(np.array(self.D)[None]))
 
     def admissible(self, constants: Any) -> Any:
-        """Return True: the moduli, which do not vary, are checked already."""
+        """Return True: the constant moduli are already checked."""
         return True
 
 
 def _take_rest(material: Orthotropic | Anisotropic) -> None:
-    """Check axes, density, expansion and conductivity of a material, and put them into their form."""
+    """Check axes, density, expansion and conductivity of a material, and normalise them."""
     object.__setattr__(material, "density", wrapped(material.density))
     for name in ("expansion", "conductivity"):
         value = getattr(material, name)
@@ -262,7 +263,7 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
 
 
 def _axes(axes: Any) -> Any:
-    """Return the axes of a material in their form; ModelError if those of cells are not at right angles."""
+    """Return the normalised axes of a material; ModelError if those of cells are not orthogonal."""
     if isinstance(axes, CellAxes):
         return axes
     if not isinstance(axes, np.ndarray) or axes.ndim != 3:
@@ -285,20 +286,20 @@ def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
 
 
 def _real(value: Any) -> float:
-    """Return a real number as it is; TypeError of anything else, such as text and complex numbers."""
+    """Return a real number unchanged; TypeError for anything else, such as text and complex numbers."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(value)
     return float(value)
 
 
 def _determinant(nu: Sequence[Any], back: Sequence[Any]) -> Any:
-    """Return 1 - nu12 nu21 - ..., positive where the energy is, from nu12, nu13, nu23 and nu21, nu31, nu32 [-]."""
+    """Return 1 - nu12 nu21 - ..., which must be positive, from nu12, nu13, nu23 and nu21, nu31, nu32 [-]."""
     (nu12, nu13, nu23), (nu21, nu31, nu32) = nu, back
     return 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
 
 
 def _check_ratios(E: Sequence[float], nu: Sequence[float]) -> None:
-    """Raise ModelError unless Poisson's ratios leave the energy of any strain positive."""
+    """Raise ModelError unless Poisson's ratios make the strain energy positive definite."""
     for value, number, (i, j) in zip(nu, NAMES, ((0, 1), (0, 2), (1, 2)), strict=True):
         limit = math.sqrt(E[i] / E[j])
         if not abs(value) < limit:

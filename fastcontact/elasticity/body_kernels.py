@@ -1,10 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Element loop of bodies with nonlinear laws: tangent stiffness, internal forces, stress, energy, history.
 
-In the reference configuration (total Lagrangian): nodal forces are integrals of P : dN/dX, the tangent is those of
-dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). For small strains the same loop takes P as the Cauchy stress and J as
-one plus the trace of the strain. Bodies that expand by a temperature are measured from where they would then be without
-stress (an intermediate configuration: Lu and Pister, 1975): F is the elastic part of the deformation gradient.
+In the reference configuration (total Lagrangian), nodal forces are integrals of P : dN/dX, and the tangent consists of
+integrals of dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). For small strains P is the Cauchy stress and J one plus the
+trace of the strain. With thermal expansion F is the elastic part of the deformation gradient, relative to the stress-free
+intermediate configuration (Lu and Pister, 1975).
 """
 
 import numpy as np
@@ -15,9 +15,9 @@ from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
-# Newton iterations for the strain across plane stress, and when they end, relative to the modulus.
+# Newton iterations for the out-of-plane strain in plane stress, and their tolerance relative to the modulus.
 THROUGH, ENOUGH = 50, 1e-13
-# What `linearise` returns beside the number of a cell.
+# Status codes of `linearise`, in addition to the number of a cell.
 INVERTED, NO_PLANE_STRESS = 1, 2
 
 
@@ -53,10 +53,10 @@ def _deformation(u, gradient, hoop, F):
 
 @kernel
 def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
-    """Take the expansion by a `rise` (n_points,) out of F, shape derivatives (dim, n_nodes) and `hoop` (n_nodes,), in place.
+    """Remove the expansion by a `rise` (n_points,) from F, shape derivatives (dim, n_nodes) and `hoop` (n_nodes,), in place.
 
-    `strain` (6,) is that of a degree, with engineering shears. Return the ratio of the volumes, and how much longer fibres
-    along z are.
+    `strain` (6,) is the thermal strain of one degree, with engineering shears. Return the volume ratio, and the thermal
+    stretch along z.
     """
     degrees = 0.0
     for a in range(len(cell)):
@@ -82,7 +82,7 @@ def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
 
 @kernel
 def _dilatation(F, finite, G):
-    """Return J and fill G (3, 3) with its derivative; for small strains one plus the trace of the strain."""
+    """Return J and fill G (3, 3) with its derivative; for small strains J is one plus the trace of the strain."""
     if finite:
         cofactor(F, G)
         return determinant(F)
@@ -93,7 +93,7 @@ def _dilatation(F, finite, G):
 
 @kernel
 def _add_volumetric(F, G, pressure, turning, bulk, P, A):
-    """Add the part of the dilatation: `pressure` times dJ/dF to P; to A its change by `bulk` with J, `turning` with dJ/dF."""
+    """Add the volumetric part: `pressure` dJ/dF to P, and `bulk` dJ/dF dJ/dF plus `turning` d2J/dF2 to A."""
     along = G.reshape(9)
     for row in range(9):
         P[row // 3, row % 3] += pressure * along[row]
@@ -105,9 +105,9 @@ def _add_volumetric(F, G, pressure, turning, bulk, P, A):
 
 @kernel
 def _leave_out_initial_stress(G, J, P, turning, A):
-    """Take delta_ik S_JL out of A, S being the second Piola-Kirchhoff stress of P and `turning` times G = dJ/dF.
+    """Subtract delta_ik S_JL from A, S the second Piola-Kirchhoff stress of P plus `turning` times G = dJ/dF.
 
-    And what pressure, `turning` < 0, does as the dilatation varies inside of a cell.
+    For a pressure, `turning` < 0, also subtract the effect of the variation of the dilatation inside a cell.
     """
     for row in range(9):
         for column in range(9):
@@ -123,9 +123,9 @@ def _leave_out_initial_stress(G, J, P, turning, A):
 
 @kernel
 def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
-    """Respond with the F_zz at which P_zz vanishes, eliminated from A; return the energy, and whether it was found.
+    """Solve for the F_zz at which P_zz vanishes, and eliminate it from A; return the energy, and whether it converged.
 
-    Without stress the body is `thicker` by this ratio.
+    `thicker` is the out-of-plane stretch without stress.
     """
     F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
     for _ in range(THROUGH):
@@ -147,9 +147,9 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 
 @kernel
 def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, F, old, new, P, A, G):
-    """Fill the history `new` (9,), P and A of a point; return its energy density, and whether it found plane stress.
+    """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
-    `pressure` is that of the projected dilatation, `bulk` the modulus of the rest; see `linearise` and `_through`.
+    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder; see `linearise` and `_through`.
     """
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
@@ -222,9 +222,9 @@ def _add_projected_tangent(bulk, projected, local):
 
 @kernel
 def _add_tangent(gradient, hoop, weight, A, product, local):
-    """Add a point's tangent to `local` (n_nodes b, dim k, dim i, n_nodes a), for a <= b; `product` (9,) is room.
+    """Add a point's tangent to `local` (n_nodes b, dim k, dim i, n_nodes a), for a <= b; `product` (9,) is work space.
 
-    What a node's displacement k changes is a column of A times its shape derivatives, of which the third are along z or hoop.
+    The stress change due to component k of a node is a column of A times its shape derivatives, the third along z or hoop.
     """
     dim, n_nodes = gradient.shape
     in_space, third = dim == 3, gradient[2] if dim == 3 else hoop
@@ -268,10 +268,10 @@ def _cauchy(F, P, finite, out):
 
 
 @kernel
-def _assemble(local, slots, mine, data):
-    """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `mine`.
+def _assemble(local, slots, inside, data):
+    """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `inside`.
 
-    That of a pair of nodes is the transpose of the other's, and a diagonal block is symmetric, but for round-off.
+    The block of a node pair is the transpose of the opposite one, and a diagonal block is symmetric, up to round-off.
     """
     n_nodes, dim = local.shape[0], local.shape[1]
     for b in range(n_nodes):
@@ -280,9 +280,9 @@ def _assemble(local, slots, mine, data):
             for i in range(dim):
                 for k in range(dim):
                     value = local[b, k, i, a] if a != b or i <= k else local[b, i, k, a]
-                    if mine[a]:
+                    if inside[a]:
                         data[upper, i, k] += value
-                    if a != b and mine[b]:
+                    if a != b and inside[b]:
                         data[lower, k, i] += value
 
 
@@ -294,13 +294,13 @@ def linearise(
 ):  # fmt: skip
     """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in rows of nodes of a `part`.
 
-    Of its cells, those whose first node it has, it fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
-    (n_cells, n_q, n_components) and `energy` (n_cells, 2): elastic, plastic work. With `bulk` (n_materials, 2): bulk
-    modulus of the dilatation projected on `polynomials` (n_q, m), and of the rest. Returns a status and the number of a
-    cell, zero and -1 where all went well. A `rise` (n_points,) of the temperature, which may be empty, brings strains of
-    `expansion` (n_materials, 6) a degree. With `geometric` 2 the tangent is whole; 1 leaves out how dJ/dF turns by pressure,
-    0 the initial-stress stiffness and how dJ/dF turns under tension, so that it is positive semidefinite. Where `data` is
-    empty, there is no tangent.
+    For the cells of the part, those whose first node it owns, it fills the history `new` (n_cells, n_q, 9), the Cauchy
+    `stress` (n_cells, n_q, n_components) and `energy` (n_cells, 2): elastic, plastic work. `bulk` (n_materials, 2) are
+    the bulk modulus of the dilatation projected on `polynomials` (n_q, m), and that of the remainder. Returns a status
+    and the number of a cell, zero and -1 on success. A temperature `rise` (n_points,), possibly empty, causes strains of
+    `expansion` (n_materials, 6) per degree. `geometric` 2 selects the full tangent; 1 leaves out the second derivative
+    of J under pressure; 0 also leaves out the initial-stress stiffness and the second derivative of J under tension, so
+    that the tangent is positive semidefinite. If `data` is empty, no tangent is computed.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
@@ -310,9 +310,9 @@ def linearise(
     F, G, thicker, pressure = np.empty((n_q, 3, 3)), np.empty((3, 3)), np.ones(n_q), np.empty(n_q)
     P, A, product, history = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(9)
     local, forces = np.empty((n_nodes, dim, dim, n_nodes)), np.empty((dim, n_nodes))
-    mass, projected, mine = np.empty((m, m)), np.empty((m, n_nodes * dim + 1)), np.empty(n_nodes, np.bool_)
+    mass, projected, inside = np.empty((m, m)), np.empty((m, n_nodes * dim + 1)), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
@@ -345,15 +345,15 @@ def linearise(
             _forces(gradient[q], hoop[q], volume[q], P, forces)
             if tangent:
                 _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
-            if mine[0]:
+            if inside[0]:
                 new[c, q] = history
                 _cauchy(F[q], P, finite, stress[c, q])
-        if mine[0]:
+        if inside[0]:
             energy[c, 0], energy[c, 1] = stored, dissipated
         for b in range(n_nodes):
-            if mine[b]:
+            if inside[b]:
                 for i in range(dim):
                     force[cells[c, b], i] += forces[i, b]
         if tangent:
-            _assemble(local, slots[c], mine, data)
+            _assemble(local, slots[c], inside, data)
     return 0, -1

@@ -18,12 +18,12 @@ from fastcontact.elasticity.stiffness import of_cells
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Cells at a time where moduli vary inside them.
+# Number of cells processed at a time if moduli vary inside them.
 VARYING = 2_000
 
 
 def beside(name: str, xi: Array) -> Array:
-    """Return the weights (n, n_q) [-] of values at the quadrature points for those at points `xi` (n, dim) [-]."""
+    """Return the interpolation weights (n, n_q) [-] from the quadrature points to points `xi` (n, dim) [-]."""
     element = elements.get(name)
     if xi is element.quadrature[0]:
         return np.eye(len(xi))
@@ -41,12 +41,12 @@ class CellStress:
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     displacement : ndarray (n_points, dim)
-        Of all points [length].
+        Displacements of all points [length].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
+        Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
         default.
     offset : StressOffset, optional
-        What stresses have by temperature and initial states.
+        Stresses due to temperature and initial states.
     """
 
     def __init__(
@@ -62,21 +62,18 @@ class CellStress:
         self._displacement, self._averaged = np.ascontiguousarray(displacement), averaged
         self._offset = offset
 
-    def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices | None = None) -> Array:
+    def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices) -> Array:
         """Return the stresses (n_cells, n, n_components) [pressure] at points `xi` (n, dim) [-] of cells of an element.
 
-        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) of int, the material number of each, or (n_cells, n_q), that
-        of each quadrature point; `rows` (n_cells,) of int, the numbers of the cells, which only initial states need.
+        `cells` (n_cells, n_nodes) of int; `material` (n_cells,) or (n_cells, n_q) of int, the material number of each cell or
+        of each quadrature point; `rows` (n_cells,) of int, the numbers of the cells.
         """
         out = np.empty((len(cells), len(xi), self._moduli.shape[1]))
         self.fill(name, xi, cells, material, out, rows)
         return out
 
-    def fill(
-        self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array,
-        rows: Indices | None = None,
-    ) -> None:  # fmt: skip
-        """Fill `out` (n_cells, n, n_components) [pressure] in place, shared by threads.
+    def fill(self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array, rows: Indices) -> None:
+        """Fill `out` (n_cells, n, n_components) [pressure] in place, in parallel.
 
         At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element; `material` (n_cells,) or
         (n_cells, n_q) and `rows` (n_cells,) of int, as for `at`.
@@ -104,23 +101,20 @@ class CellStress:
                     points, cells[own], *element.tables, polynomials, split.bulk, *shared, dilatation.basis(name, xi),
                     out[own],
                 )  # fmt: skip
-            self._add_modes((name, xi, dN), cells[own], material[own], out[own], None if rows is None else rows[own])
+            self._add_modes((name, xi, dN), cells[own], material[own], out[own], rows[own])
 
         parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
-            self._subtract_thermal(self._offset, name, xi, cells, material, out)
-            if self._offset.states:
-                assert rows is not None
-                self._add_initial(self._offset, (name, xi, rows), cells, material, out)
+            self._add_offset(self._offset, (name, xi, rows), cells, material, out)
 
     def _fill_varying(
         self, at: tuple[str, Array, Array, Array], cells: Numbers, material: Numbers, moduli: Array,
         out: Array,
     ) -> None:  # fmt: skip
-        """Fill `out` where moduli differ from point to point.
+        """Fill `out` if moduli vary from point to point.
 
-        At the quadrature points one point of all cells after the other. Elsewhere the strains come first, as stresses of
-        moduli that are one; moduli are those of the polynomial through the quadrature points.
+        At the quadrature points, the points of all cells are processed one after the other. Elsewhere strains are computed
+        first, as stresses of unit moduli; moduli are interpolated from the quadrature points.
         """
         name, xi, N, dN = at
         loops, shared = element_kernels.loops(self._mesh.dim), (self._axisymmetric, self._displacement)
@@ -138,14 +132,13 @@ class CellStress:
         loops.stress(self._mesh.points, cells, N, dN, unit, first, *shared, strain)
         weights = beside(name, xi)
         for rows in range(0, len(cells), VARYING):
-            part = slice(rows, rows + VARYING)
-            local = np.einsum("nq,cqij->cnij", weights, moduli[material[part]], optimize=True)
-            out[part] = np.einsum("cnij,cnj->cni", local, strain[part])
+            portion = slice(rows, rows + VARYING)
+            local = np.einsum("nq,cqij->cnij", weights, moduli[material[portion]], optimize=True)
+            out[portion] = np.einsum("cnij,cnj->cni", local, strain[portion])
 
     def _add_modes(
-        self, at: tuple[str, Array, Array], cells: Numbers, material: Numbers, out: Array,
-        rows: Indices | None,
-    ) -> None:  # fmt: skip
+        self, at: tuple[str, Array, Array], cells: Numbers, material: Numbers, out: Array, rows: Indices
+    ) -> None:
         """Add the stresses of incompatible modes."""
         name, xi, dN = at
         bends = incompatible_modes.asked(name, self._averaged)
@@ -154,38 +147,42 @@ class CellStress:
         numbers = material.reshape(len(cells), -1)
         lost = np.empty((0, 0, 0))
         if self._offset is not None:
-            N = elements.get(name).tables[0]
-            lost = (self._offset.rise[cells] @ N.T)[:, :, None] * self._offset.per_degree[numbers]
-            if rows is not None:
-                lost += self._lost_by_initial(self._offset, name, rows, N, self._moduli[numbers])
+            here = name, elements.get(name).quadrature[0], rows
+            strain = self._stress_free(self._offset, here, cells, material)
+            lost = (self._moduli[numbers] @ strain[..., None])[..., 0]
+            stress = self._offset.initial("stress", name, rows, elements.get(name).tables[0])
+            lost = lost if stress is None else lost - stress
         incompatible_modes_kernels.add_stress(
             self._mesh.points, cells, *incompatible_modes.tables(name), self._moduli, bends, numbers, self._displacement,
             lost, xi, dN, beside(name, xi), out,
         )  # fmt: skip
 
     @staticmethod
-    def _lost_by_initial(offset: StressOffset, name: str, rows: Indices, N: Array, moduli: Array) -> Array | float:
-        """Return what stresses (n_cells, n, n_components) [pressure] lose by initial strains, less initial stresses."""
-        strain, stress = (offset.initial(kind, name, rows, N) for kind in ("strain", "stress"))
-        lost = 0.0 if strain is None else (moduli @ strain[..., None])[..., 0]
-        return lost if stress is None else lost - stress
-
-    def _add_initial(
-        self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers,
-        out: Array,
-    ) -> None:  # fmt: skip
-        """Add initial stresses, subtract those of initial strains, whose dilatation is projected where that of others is."""
+    def _stress_free(offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers) -> Array:
+        """Return thermal and initial strains (n_cells, n, n_components) [-]."""
         name, xi, rows = at
         N = elements.get(name).shape(xi)
-        stress, strain = (offset.initial(kind, name, rows, N) for kind in ("stress", "strain"))
+        if material.ndim == 1:
+            expansion = offset.expansion[material][:, None, :]
+        else:
+            expansion = np.einsum("nq,cqi->cni", beside(name, xi), offset.expansion[material])
+        strain = (offset.rise[cells] @ N.T)[:, :, None] * expansion
+        initial = offset.initial("strain", name, rows, N)
+        return strain if initial is None else strain + initial
+
+    def _add_offset(
+        self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
+    ) -> None:
+        """Add initial stresses and subtract those of stress-free strains, whose dilatation is projected like others."""
+        name, xi, rows = at
+        stress = offset.initial("stress", name, rows, elements.get(name).shape(xi))
         if stress is not None:
             out += stress
-        if strain is None:
-            return
+        strain = self._stress_free(offset, at, cells, material)
         split = dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if material.ndim == 1:
-            out -= np.einsum("cij,cnj->cni", moduli[material], strain)
+            out -= strain @ moduli[material]  # which are symmetric
         else:
             local = np.einsum("nq,cqij->cnij", beside(name, xi), moduli[material], optimize=True)
             out -= np.einsum("cnij,cnj->cni", local, strain)
@@ -193,34 +190,7 @@ class CellStress:
             return
         bulk = split.bulk[of_cells(material)]
         of_bulk = bulk[:, 0] != 0.0
-        at_points = offset.initial("strain", name, rows[of_bulk], elements.get(name).tables[0])
-        assert at_points is not None
-        dilatations = at_points[:, :, :3].sum(axis=2)
+        at_points = name, elements.get(name).quadrature[0], rows[of_bulk]
+        dilatations = self._stress_free(offset, at_points, cells[of_bulk], material[of_bulk])[:, :, :3].sum(axis=2)
         parts = dilatation.projected(name, self._mesh.points[cells[of_bulk]], dilatations, xi, self._axisymmetric)
         out[of_bulk, :, :3] -= (bulk[of_bulk][:, :, None] * parts).sum(axis=1)[:, :, None]
-
-    def _subtract_thermal(
-        self,
-        thermal: StressOffset,
-        name: str,
-        xi: Array,
-        cells: Numbers,
-        material: Numbers,
-        out: Array,
-    ) -> None:
-        """Subtract the thermal stresses; the dilatation of the temperature is projected where that of the strain is."""
-        element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
-        rise = thermal.rise[cells] @ element.shape(xi).T
-        if material.ndim == 1:
-            per_degree = thermal.per_degree[material][:, None, :]
-        else:
-            per_degree = np.einsum("nq,cqi->cni", beside(name, xi), thermal.per_degree[material])
-            material = of_cells(material)
-        projected = np.zeros(len(cells), bool) if split is None else split.bulk[material, 0] != 0.0
-        out -= np.where(projected[:, None], 0.0, rise)[:, :, None] * per_degree
-        if split is not None and projected.any():
-            members, numbers = cells[projected], material[projected]
-            heat = thermal.rise[members] @ element.tables[0].T
-            parts = dilatation.projected(name, self._mesh.points[members], heat, xi, self._axisymmetric)
-            pressure = (split.bulk[numbers] * 3.0 * thermal.expansion[numbers, None])[:, :, None] * parts
-            out[projected, :, :3] -= pressure.sum(axis=1)[:, :, None]

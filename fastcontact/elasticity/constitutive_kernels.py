@@ -14,9 +14,9 @@ import numpy as np
 from fastcontact._jit.decorators import kernel
 
 LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN = range(5)
-# A trial stress this much above the yield stress is at it, but for round-off.
+# Relative excess of the trial stress over the yield stress that counts as round-off.
 YIELDING = 1e-12
-# Relative distance of squared stretches below which the tangent takes them as equal.
+# Relative difference of squared stretches below which the tangent treats them as equal.
 EQUAL = 1e-7
 
 
@@ -100,7 +100,7 @@ def _linear(D, F, P, A):
 
 @kernel
 def _yield_stress(constants, p):
-    """Return the yield stress and its slope at the equivalent plastic strain p, and where the slope ends."""
+    """Return the yield stress and its slope at the equivalent plastic strain p, and the end of this segment."""
     n = int(constants[4])
     for k in range(n - 1):
         p0, s0, p1, s1 = constants[5 + 2 * k], constants[6 + 2 * k], constants[7 + 2 * k], constants[8 + 2 * k]
@@ -114,7 +114,7 @@ def _yield_stress(constants, p):
 def _plastic(constants, F, old, new, P, A):
     """Von Mises plasticity with the radial return (Simo and Hughes, 1998, boxes 3.1 and 3.2); return the elastic energy.
 
-    The deviatoric part: isotropic hardening by a table, linear kinematic hardening (Prager).
+    Deviatoric part with tabulated isotropic hardening and linear kinematic hardening (Prager).
     """
     mu, kinematic, xi = constants[1], constants[3], np.empty(9)
     third, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
@@ -164,7 +164,7 @@ def _plastic(constants, F, old, new, P, A):
 
 @kernel
 def _pushed(F, S, C, P, A):
-    """Fill P and A from the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) for Green-Lagrange strains."""
+    """Fill P and A from the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) w.r.t. Green-Lagrange strains."""
     half = np.empty((9, 9))
     for i in range(3):
         for j in range(3):
@@ -204,10 +204,10 @@ def _saint_venant(D, F, P, A):
 
 @kernel
 def _add_isochoric(value, first, power, F, J, G, slope, bend, P, A):
-    """Add to P and A what an energy with the invariant ``J**-power`` times `value` brings, but for the value's curvature.
+    """Add to P and A the terms of an energy of the invariant ``J**-power`` times `value`, except for the value's curvature.
 
-    `first` (3, 3) is the derivative of the value; `slope` and `bend` are derivatives of the energy in the invariant. Return
-    `slope` times ``J**-power``, which the second derivative of the value has as factor.
+    `first` (3, 3) is the derivative of the value; `slope` and `bend` are derivatives of the energy with respect to the
+    invariant. Return `slope` times ``J**-power``, the factor of the second derivative of the value.
     """
     scale, along, across = J**-power, first.reshape(9), G.reshape(9)
     ratio, factor = power * value / J, slope * scale
@@ -227,7 +227,8 @@ def _add_isochoric(value, first, power, F, J, G, slope, bend, P, A):
 def _invariants(constants, F, J, G, P, A):
     """C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3) of isochoric invariants; return the energy density.
 
-    (Rivlin and Saunders, 1951; Yeoh, 1993.) The kernel above takes halves of the invariants: F is then a derivative.
+    See Rivlin and Saunders (1951) and Yeoh (1993). `_add_isochoric` is called with half the invariants, whose derivative
+    is F.
     """
     C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
     P[:], A[:], I1 = 0.0, 0.0, 0.0
@@ -294,9 +295,9 @@ def _ogden(constants, F, P, A):
             normal = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
             shear = 0.0
             if a != b:
-                apart = squared[b] - squared[a]
-                if abs(apart) > EQUAL * squared[b]:
-                    shear = (beta[b] / squared[b] - beta[a] / squared[a]) / apart
+                difference = squared[b] - squared[a]
+                if abs(difference) > EQUAL * squared[b]:
+                    shear = (beta[b] / squared[b] - beta[a] / squared[a]) / difference
                 else:
                     shear = 0.5 * (gamma[b, b] - 2.0 * beta[b] - gamma[a, b]) / (squared[b] * squared[b])
             for row in range(9):
@@ -318,8 +319,8 @@ def _ogden(constants, F, P, A):
 def respond(constants, D, F, J, G, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
-    All of the law but its volumetric part, `constants[2]` being its bulk modulus. D (6, 6) are the moduli of Hooke's laws, J
-    and G (3, 3) the determinant of F and its derivative.
+    The volumetric part of the law, with the bulk modulus ``constants[2]``, is not included. D (6, 6) are the moduli of
+    Hooke's laws, J and G (3, 3) the determinant of F and its derivative.
     """
     law = int(constants[0])
     new[:] = old

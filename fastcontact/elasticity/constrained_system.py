@@ -1,8 +1,8 @@
 """Linear system with supports and multi-point constraints eliminated: ``u = T v + t``.
 
-``u = T v + t``: T is the identity except for the displacements that relations express by others, t holds the prescribed
-displacements. The matrix for the solver is ``T.T K T``. It keeps the size and blocks of K: in the rows and columns of
-everything that is no unknown only the diagonal is left.
+T is the identity except for the displacements that multi-point constraints express by others, t are the prescribed
+displacements. The matrix of the solver is ``T.T K T``. It has the size and blocks of K: in the rows and columns of eliminated
+components only the diagonal remains.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.multigrid.matrix import block_matrix
 from fastcontact.round_off import ROUND_OFF
 
-# Supports and right-hand sides that miss a condition by less than this fraction meet it.
+# Relative tolerance of the conditions on supports and right-hand sides.
 CONFLICT = 1e-9
 
 
@@ -32,20 +32,20 @@ CONFLICT = 1e-9
 class Stiffness:
     """A stiffness matrix as the sum of `parts` (n, n) [force / length].
 
-    Without relations: the matrix of the linear solver, and the rows and columns of supports that were taken out of it.
+    Without multi-point constraints: the matrix of the linear solver, and the rows and columns of supports removed from it.
     """
 
     parts: tuple[Any, ...]
 
     def __matmul__(self, u: Array) -> Array:
         total = np.asarray(self.parts[0] @ u)
-        for part in self.parts[1:]:
-            total += part @ u
+        for matrix in self.parts[1:]:
+            total += matrix @ u
         return total
 
     def row_sums(self, u: Array) -> Array:
-        """Return ``|K| |u|``, shape (n,), added up over the parts: what cancels in ``K u`` [force]."""
-        return np.sum([_row_sums(part, u) for part in self.parts], axis=0)
+        """Return ``|K| |u|``, shape (n,), summed over the parts, which bounds the round-off of ``K u`` [force]."""
+        return np.sum([_row_sums(matrix, u) for matrix in self.parts], axis=0)
 
 
 def _row_sums(K: Any, u: Array) -> Array:
@@ -55,12 +55,12 @@ def _row_sums(K: Any, u: Array) -> Array:
 
 
 class System:
-    """Stiffness, supports and relations of a model.
+    """Stiffness, supports and multi-point constraints of a model.
 
     Parameters
     ----------
     K : bsr_array (n, n)
-        Stiffness [force / length]; what supports take out of it is taken out of this array.
+        Stiffness [force / length]; rows and columns of supports are removed from this array.
     supported : ndarray of bool (n,)
         Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
@@ -70,17 +70,17 @@ class System:
     Attributes
     ----------
     K : Stiffness
-        With the rows and columns of supports.
-    matrix : bsr_array (n, n), or what the linear solver made of it
-        For the linear solver [force / length].
+        Stiffness including the rows and columns of supports.
+    matrix : bsr_array (n, n), or its replacement by the linear solver
+        Matrix of the linear solver [force / length].
     fixed : ndarray of bool (n,)
-        Supported components, and those of points without stiffness or relation, which stay at zero.
+        Supported components, and those of points without stiffness or constraint, which stay at zero.
     free : ndarray of bool (n,)
         The unknowns.
     weightless : ndarray of bool (n,)
-        Unknowns without stiffness of their own: components of rigid obstacles, motions of bodies that relations make rigid.
+        Unknowns without stiffness: components of rigid obstacles, motions of bodies that constraints make rigid.
     T : csr_array (n, n) or None
-        See the module; None without relations.
+        See the module; None without multi-point constraints.
     """
 
     def __init__(
@@ -95,22 +95,22 @@ class System:
         related[R.indices] = True
         if without_stiffness is None:
             without_stiffness = np.zeros(K.shape[0], bool)
-        given = diagonal_of(K)
-        self.fixed: Mask = supported | ((given == 0.0) & ~related & ~without_stiffness)
-        self._reacting: Mask = self.fixed | related  # supports and relations may exert forces here
+        diagonal = diagonal_of(K)
+        self.fixed: Mask = supported | ((diagonal == 0.0) & ~related & ~without_stiffness)
+        self._reacting: Mask = self.fixed | related  # supports and constraints may exert forces here
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
         self._without_stiffness = without_stiffness
-        self._take(K, given)
+        self._take(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
-        """Return the system with another stiffness K (n, n), which is changed as the first one."""
+        """Return the system with another stiffness K (n, n), which is modified in the same way."""
         system = copy.copy(self)
         system._take(K, diagonal_of(K))
         return system
 
     def _take(self, K: bsr_array, given: Array) -> None:
-        """Take a stiffness with the diagonal `given` (n,)."""
+        """Set a stiffness with the diagonal `given` (n,)."""
         self.free: Mask = self._constraints.free.copy()
         if self.T is None:
             self.K = Stiffness(supports_apart(K, self.fixed, given))
@@ -122,35 +122,36 @@ class System:
             transformed.sort_indices()
             diagonal = diagonal_of(transformed)
             cancelling = self.T.multiply(self.T).T @ given
-            # Not points that relations couple to nothing but each other.
+            # Excludes points that constraints only couple with each other.
             self.free &= (cancelling > 0.0) | self._without_stiffness
             self.weightless = self.free & (diagonal <= ROUND_OFF * cancelling)
             self.matrix = supports_apart(transformed, ~self.free, diagonal)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
     def keep(self, matrix: Any) -> None:
-        """Replace `matrix` by what the linear solver returned for it, see `LinearSolver.prepare`."""
+        """Replace `matrix` by the return value of `LinearSolver.prepare`."""
         if self.K.parts[0] is self.matrix:
             self.K = Stiffness((matrix, *self.K.parts[1:]))
         self.matrix = matrix
 
     def lift(self, prescribed: Array, values: Array) -> Array:
-        """Return t (n,) for prescribed displacements (n,) and right-hand sides (m,) of the relations [length].
+        """Return t (n,) for prescribed displacements (n,) and right-hand sides (m,) of the constraints [length].
 
         Raises
         ------
         ModelError
-            If relations and supports contradict each other.
+            If constraints and supports contradict each other.
         """
         return self._constraints.lift(prescribed, values)
 
     def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) of the relations, given the multiplier of each."""
+        """Return the right-hand sides (m,) of the constraints, given the multiplier of each."""
         return self._constraints.values(multiplier)
 
     def right(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
-        # Without relations t moves supports alone, and those act on unknowns through what was taken out of the matrix.
+        # Without constraints t only moves supports, which act on unknowns through the rows and columns removed from the
+        # matrix.
         return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
@@ -158,7 +159,7 @@ class System:
         return self._of_unknowns(force.copy() if self.T is None else self.T.T @ force)
 
     def _of_unknowns(self, values: Array) -> Array:
-        """Clear, in place, the values (n,) of everything that is no unknown."""
+        """Set to zero, in place, the values (n,) of components that are not unknowns."""
         values[self._no_unknowns] = 0.0
         return values
 
@@ -175,23 +176,23 @@ class System:
         return (v if self.T is None else self.T @ v) + t
 
     def unknowns(self, u: Array, t: Array | float = 0.0) -> Array:
-        """Return v (n,) of displacements u (n,) that obey the relations."""
+        """Return v (n,) of displacements u (n,) that satisfy the constraints."""
         return self._of_unknowns(u - t)
 
     def unknowns_of(self, motions: Array) -> Array:
-        """Return the unknowns (n, k) of motions (n, k) that obey supports and relations."""
+        """Return the unknowns (n, k) of motions (n, k) that satisfy supports and constraints."""
         return np.where(self.free[:, None], motions, 0.0)
 
     def involved(self, dofs: Indices) -> Indices:
-        """Return the unknowns that the displacements `dofs` depend on, ascending."""
+        """Return the unknowns on which the displacements `dofs` depend, ascending."""
         if self.T is not None:
             dofs = np.unique(self.T[dofs].indices)
         return dofs[self.free[dofs]].astype(np.intp)
 
     def balance(self, out: Array, round_off: Array | None = None) -> tuple[Array, float]:
-        """Return the forces (n,) of supports and relations, and the largest force on an unknown, the residual.
+        """Return the forces (n,) of supports and constraints, and the residual, the largest force on an unknown.
 
-        `out` (n,) is the internal minus all other forces [force]. Of its `round_off` (n,) nothing counts as residual.
+        `out` (n,) are the internal minus all other forces [force]. Its `round_off` (n,) is not part of the residual.
         """
         residual = self.reduced(out)
         if round_off is not None:
@@ -200,7 +201,7 @@ class System:
 
 
 class ConstrainedMotion:
-    """The displacements that supports and relations allow, ``u = T v + t``.
+    """The displacements that supports and constraints allow, ``u = T v + t``.
 
     Parameters
     ----------
@@ -219,7 +220,7 @@ class ConstrainedMotion:
         self.T.eliminate_zeros()
 
     def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) for the multiplier of each relation."""
+        """Return the right-hand sides (m,) for the multiplier of each constraint."""
         blocks = [
             np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
             for relation, factor in zip(self.relations, multiplier, strict=True)
@@ -231,9 +232,9 @@ class ConstrainedMotion:
         known: Array = np.where(self.fixed, prescribed, 0.0)
         if not self.relations:
             return known
-        given = np.concatenate([known, values])
-        off = np.abs(self._elimination.conditions @ given)
-        scale = np.abs(self._elimination.conditions) @ np.abs(given)
+        values_of_dofs = np.concatenate([known, values])
+        off = np.abs(self._elimination.conditions @ values_of_dofs)
+        scale = np.abs(self._elimination.conditions) @ np.abs(values_of_dofs)
         wrong = np.flatnonzero(off > CONFLICT * scale)
         if len(wrong):
             raise ModelError(
@@ -249,31 +250,31 @@ class ConstrainedMotion:
 
 
 def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> tuple[bsr_array, csr_array]:
-    """Take the rows and columns of supported degrees of freedom out of K (n, n), which is changed in place.
+    """Remove the rows and columns of supported degrees of freedom from K (n, n), in place.
 
-    The `diagonal` (n,) of K may be given where it is known.
+    The `diagonal` (n,) of K may be given if it is known.
 
     Returns
     -------
     matrix : bsr_array (n, n)
-        K without them, their diagonal kept.
+        K without these rows and columns, except for the diagonal.
     taken : csr_array (n, n)
-        What K was, minus `matrix`: few numbers.
+        The removed entries: the original K minus `matrix`.
     """
     K = _with_diagonal(K)
     if diagonal is None:
         diagonal = diagonal_of(K)
-    kept = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
+    pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
     supported = fixed.reshape(-1, K.blocksize[0])
-    given = K.indptr, K.indices, K.data, supported, supported.any(axis=1), kept
+    arguments = K.indptr, K.indices, K.data, supported, supported.any(axis=1), pivots
     parts, start = parallel.portions(len(supported)), np.zeros(K.shape[0] + 1, np.int32)
-    columns, taken = np.empty(0, np.int32), np.empty(0)
-    parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken, False), parts)
+    columns, removed = np.empty(0, np.int32), np.empty(0)
+    parallel.shared(lambda part: system_kernels.take_out(*arguments, *part, start, columns, removed, False), parts)
     np.cumsum(start, out=start)
-    columns, taken = np.empty(start[-1], np.int32), np.empty(start[-1])
-    if len(taken):
-        parallel.shared(lambda part: system_kernels.take_out(*given, *part, start, columns, taken, True), parts)
-    return K, csr_array((taken, columns, start), shape=K.shape)
+    columns, removed = np.empty(start[-1], np.int32), np.empty(start[-1])
+    if len(removed):
+        parallel.shared(lambda part: system_kernels.take_out(*arguments, *part, start, columns, removed, True), parts)
+    return K, csr_array((removed, columns, start), shape=K.shape)
 
 
 def diagonal_of(K: bsr_array) -> Array:
@@ -284,7 +285,7 @@ def diagonal_of(K: bsr_array) -> Array:
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:
-    """Return K with a block on the diagonal of every block row, zero where there was none."""
+    """Return K with a diagonal block in every block row, zero where there was none."""
     present = np.zeros(len(K.indptr) - 1, bool)
     block_row = np.repeat(np.arange(len(present)), np.diff(K.indptr))
     present[block_row[block_row == K.indices]] = True

@@ -1,12 +1,12 @@
 """Mean dilatation (B-bar): elements free of volumetric locking.
 
 The dilatation, the trace of the strain, is projected on polynomials of low degree in each cell: its mean in linear elements
-(the B-bar method: Hughes, Int. J. Numer. Meth. Engng 15, 1980), a linear function in quadratic ones. What remains of the
-strain is left as it is. In quadratic triangles, tetrahedra, wedges and pyramids, where a linear dilatation is still one
-condition too many, only its mean has the whole bulk modulus; the remainder has that of a material with nu = 0.3 and the same
-shear modulus, without which single cells could move freely (by conformal maps, whose deviatoric strain is zero).
+(the B-bar method: Hughes, Int. J. Numer. Meth. Engng 15, 1980), a linear function in quadratic ones. The rest of the
+strain is unchanged. Quadratic triangles, tetrahedra, wedges and pyramids would still be over-constrained by a linear
+dilatation: only its mean has the full bulk modulus; the remainder has that of a material with nu = 0.3 and the same
+shear modulus, without which single cells would have mechanisms (conformal maps, whose deviatoric strain is zero).
 
-The element loops are given the moduli without the bulk modulus, and the loops of `dilatation_kernels` add the part of the
+The element loops use moduli without the bulk modulus, and the loops of `dilatation_kernels` add the contribution of the
 projected dilatation.
 """
 
@@ -22,21 +22,21 @@ from fastcontact.elasticity.energy import cell_volumes
 from fastcontact.elasticity.incompatible_modes import BENDING, MODES
 from fastcontact.mesh import elements
 
-# Which moduli have a mean dilatation: True or 1, see `MaterialField.treatment`.
+# Type of the flags of moduli with a mean dilatation: True or 1, see `MaterialField.treatment`.
 Mask = NDArray[np.bool_] | NDArray[np.uint8]
 # Bulk over shear modulus at nu = 0.3: 2 (1 + nu) / (3 (1 - 2 nu)).
 REMAINDER = 2.6 / 1.2
 
 
 class Split(NamedTuple):
-    """Moduli without and beside the part of the dilatation.
+    """Moduli without the volumetric part, and bulk moduli.
 
     Attributes
     ----------
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
-        For the element loops [pressure].
+        Moduli for the element loops [pressure].
     bulk : ndarray (n_materials, 2)
-        Bulk moduli of the mean dilatation of a cell and of the remainder, zero where the element loops have them [pressure].
+        Bulk moduli of the mean dilatation of a cell and of the remainder, zero if included in `moduli` [pressure].
     """
 
     moduli: Array
@@ -44,7 +44,7 @@ class Split(NamedTuple):
 
 
 def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
-    """Return the moduli of an element without and with the part of the dilatation; None where nothing is projected.
+    """Return the split moduli of an element; None where no dilatation is projected.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, those with a 1, outside `BENDING` with a 3
-        (`MaterialField.treatment`); none by default.
+        Materials with a mean dilatation: flag 1, and flag 3 for elements outside `BENDING` (`MaterialField.treatment`);
+        none by default.
     """
     if averaged is not None:
         treatment = np.asarray(averaged).astype(np.uint8)
@@ -64,8 +64,8 @@ def split(name: str, moduli: Array, averaged: Mask | None) -> Split | None:
     bulk = np.where(averaged, moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0, 0.0)
     deviatoric = moduli.copy()
     deviatoric[:, :3, :3] -= bulk[:, None, None]
-    whole = elements.get(name).dilatation == elements.get(name).order - 1
-    rest = bulk if whole else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
+    complete = elements.get(name).dilatation == elements.get(name).order - 1
+    rest = bulk if complete else np.minimum(bulk, REMAINDER * moduli[:, 3, 3])
     return Split(deviatoric, np.column_stack([bulk, rest]))
 
 
@@ -81,7 +81,7 @@ def projected(name: str, corners: Array, values: Array, xi: Array, axisymmetric:
     values : ndarray (n_cells, n_q)
         The field at the quadrature points [unit of the field].
     xi : ndarray (n, dim)
-        Points of the reference cell where it is wanted [-].
+        Points of the reference cell at which to evaluate it [-].
     axisymmetric : bool
     """
     N, dN, weights = elements.get(name).tables

@@ -4,7 +4,7 @@
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, dim), ``weights`` (n_q,) of the reference element; ``basis`` (n_q, m), the polynomials at the same points, the
 constant first; ``bulk`` (n_materials, 2) [pressure], the moduli of the mean dilatation and of the other polynomials, zero
-where a material takes the dilatation as it is; ``material`` (n_cells,). dim is 2 or 3.
+for materials without projection; ``material`` (n_cells,). dim is 2 or 3.
 
 With the dilatation t = d.u, the weights w of the quadrature and the polynomials p, M = sum w p p^T = L L^T is their mass
 matrix and g = sum w p d^T. L^-1 p are orthonormal polynomials, the projection is p^T M^-1 g u, and its stiffness
@@ -79,41 +79,50 @@ def back_substitute(L, y):
 
 
 @kernel
+def add_products(factors, g, slots, c, inside, row, data):
+    """Add ``g^T diag(factors) g`` of a cell, `g` (m, n_nodes * dim), to the rows of the nodes that are `inside` in `data`.
+
+    `row` (n_nodes * dim,) is overwritten.
+    """
+    n_nodes, dim = len(inside), data.shape[1]
+    for a in range(n_nodes):
+        if not inside[a]:
+            continue
+        for i in range(dim):
+            row[:] = 0.0
+            for m in range(len(factors)):
+                for k in range(n_nodes * dim):
+                    row[k] += factors[m] * (g[m, dim * a + i] * g[m, k])
+            for b in range(n_nodes):
+                for j in range(dim):
+                    data[slots[c, a, b], i, j] += row[dim * b + j]
+
+
+@kernel
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
     """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    Arguments as for the element loops of the whole stiffness; Jacobians have been found positive.
+    Arguments as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
     x, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
-    mass, g = np.empty((size, size)), np.empty((size, n_nodes * dim))
-    row, mine = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
+    mass, g, factors = np.empty((size, size)), np.empty((size, n_nodes * dim)), np.empty(size)
+    row, inside = np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        mean, rest = bulk[material[c], 0], bulk[material[c], 1]
-        if mean == 0.0 or not owned(cells, c, owner, part, mine):
+        factors[:], factors[0] = bulk[material[c], 1], bulk[material[c], 0]
+        if factors[0] == 0.0 or not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
         _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mass, g)
         reduce(mass, g)
-        for a in range(n_nodes):
-            if not mine[a]:
-                continue
-            for i in range(dim):
-                for k in range(n_nodes * dim):
-                    row[k] = mean * (g[0, dim * a + i] * g[0, k])
-                for m in range(1, size):
-                    for k in range(n_nodes * dim):
-                        row[k] += rest * (g[m, dim * a + i] * g[m, k])
-                for b in range(n_nodes):
-                    for j in range(dim):
-                        data[slots[c, a, b], i, j] += row[dim * b + j]
+        add_products(factors, g, slots, c, inside, row, data)
 
 
 @kernel
 def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, at, out):
-    """Add the moduli times the projected dilatation to the normal stresses of `out` (n_cells, n_out, n_components), in place.
+    """Add the moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
 
     `displacement` (n_points, dim); `at` (n_out, m): the polynomials at the points of `out`.
     """

@@ -9,6 +9,7 @@ strains (xx, yy, zz, 2xy); ``material`` (n_cells,). Axisymmetric integrals run o
 import numpy as np
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
+from fastcontact.mesh.jacobian_kernels import jacobian_2d, transposed
 
 TWO_PI = 2.0 * np.pi
 
@@ -33,12 +34,12 @@ def _map(points, cell, N, dN, q, gradient):
 
 
 @kernel
-def owned(cells, c, owner, part, mine):
-    """Fill `mine` (n_nodes,) with which nodes of a cell have the owner `part`; return whether any has."""
+def owned(cells, c, owner, part, inside):
+    """Fill `inside` (n_nodes,) with whether the nodes of a cell have the owner `part`; return whether any has."""
     is_owned = False
     for a in range(cells.shape[1]):
-        mine[a] = owner[cells[c, a]] == part
-        is_owned = is_owned or mine[a]
+        inside[a] = owner[cells[c, a]] == part
+        is_owned = is_owned or inside[a]
     return is_owned
 
 
@@ -81,22 +82,22 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
     local = np.empty((n_nodes, n_nodes, 2, 2))
-    mine = np.empty(n_nodes, np.bool_)
+    inside = np.empty(n_nodes, np.bool_)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, inside):
             continue
         local[:] = 0.0
         if not _cell(points, cells[c], N, dN, weights, moduli[material[c]], axisymmetric, gradient, local):
             return c
         for b in range(n_nodes):
-            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal but for round-off; K is symmetric to the last bit
+            local[b, b, 1, 0] = local[b, b, 0, 1]  # equal up to round-off; keeps K bitwise symmetric
             for a in range(b + 1):
                 upper, lower = slots[c, a, b], slots[c, b, a]
-                if mine[a]:
+                if inside[a]:
                     for i in range(2):
                         for j in range(2):
                             data[upper, i, j] += local[a, b, i, j]
-                if a != b and mine[b]:
+                if a != b and inside[b]:
                     for i in range(2):
                         for j in range(2):
                             data[lower, j, i] += local[a, b, i, j]
@@ -107,29 +108,20 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
 
-    Positions and displacements are differentiated along the cell, and their derivatives divided: no shape function's
-    gradient is formed.
+    Positions and displacements are differentiated in reference coordinates, and the derivatives divided: gradients of shape
+    functions are not computed.
     """
     n_cells, n_nodes = cells.shape
-    local = np.empty((n_nodes, 4))
+    slopes, x, u = transposed(dN), np.empty((2, n_nodes)), np.empty((2, n_nodes))
     for c in range(n_cells):
         D = moduli[material[c]]
         for a in range(n_nodes):
             p = cells[c, a]
-            local[a, 0], local[a, 1] = points[p, 0], points[p, 1]
-            local[a, 2], local[a, 3] = displacement[p, 0], displacement[p, 1]
+            x[0, a], x[1, a] = points[p, 0], points[p, 1]
+            u[0, a], u[1, a] = displacement[p, 0], displacement[p, 1]
         for q in range(N.shape[0]):
-            x_r = y_r = x_s = y_s = ux_r = uy_r = ux_s = uy_s = 0.0
-            for a in range(n_nodes):
-                along_r, along_s = dN[q, a, 0], dN[q, a, 1]
-                x_r += along_r * local[a, 0]
-                y_r += along_r * local[a, 1]
-                ux_r += along_r * local[a, 2]
-                uy_r += along_r * local[a, 3]
-                x_s += along_s * local[a, 0]
-                y_s += along_s * local[a, 1]
-                ux_s += along_s * local[a, 2]
-                uy_s += along_s * local[a, 3]
+            x_r, y_r, x_s, y_s = jacobian_2d(x, slopes, q)
+            ux_r, uy_r, ux_s, uy_s = jacobian_2d(u, slopes, q)
             inverse = 1.0 / (x_r * y_s - y_r * x_s)
             exx = (ux_r * y_s - ux_s * y_r) * inverse
             eyy = (uy_s * x_r - uy_r * x_s) * inverse
@@ -138,8 +130,8 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
             if axisymmetric:
                 radius = ux = 0.0
                 for a in range(n_nodes):
-                    radius += N[q, a] * local[a, 0]
-                    ux += N[q, a] * local[a, 2]
+                    radius += N[q, a] * x[0, a]
+                    ux += N[q, a] * u[0, a]
                 ezz = ux / radius
             for i in range(4):
                 out[c, q, i] = D[i, 0] * exx + D[i, 1] * eyy + D[i, 2] * ezz + D[i, 3] * gxy
@@ -153,7 +145,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
-    largest, number, first = 0.0, -1, np.int64(0)  # of a literal, the map would be compiled once more
+    largest, number, first = 0.0, -1, np.int64(0)  # a literal would compile the map once more
     for c in range(n_cells):
         _map(points, cells[c], N, dN, first, gradient)
         curl = 0.0
@@ -168,7 +160,7 @@ def largest_rotation(points, cells, N, dN, displacement):
 
 @interpretable_kernel
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
-    """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and add them up per node, in place.
+    """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and sum them per node, in place.
 
     `extrapolation` (n_nodes, n_q), `at_points` (n_cells, n_q, n_components); `total` (n_points, n_components) and
     `count` (n_points,) are added to.

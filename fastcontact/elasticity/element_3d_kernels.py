@@ -54,7 +54,7 @@ def _tensor(D, tensor):
 def _integrate_products(x, slopes, weights, gradient, g):
     """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
 
-    Returns whether the Jacobian is positive everywhere. One short loop for each ij: the compiler makes vectors of it.
+    Returns whether the Jacobian is positive everywhere. One short loop for each ij, which the compiler vectorises.
     """
     n_nodes = x.shape[1]
     g[:] = 0.0
@@ -75,29 +75,15 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 
 @kernel
-def _add_block(flat, at_upper, at_lower, upper, lower, k00, k01, k02, k10, k11, k12, k20, k21, k22):
-    """Add the block of a node pair if `at_upper`, and its transpose on the other side of the diagonal if `at_lower`."""
+def _add_block(flat, at_upper, at_lower, upper, lower, block):
+    """Add the `block` (9,) of a node pair if `at_upper`, and its transpose beyond the diagonal if `at_lower`."""
     u, v = 9 * upper, 9 * lower
     if at_upper:
-        flat[u] += k00
-        flat[u + 1] += k01
-        flat[u + 2] += k02
-        flat[u + 3] += k10
-        flat[u + 4] += k11
-        flat[u + 5] += k12
-        flat[u + 6] += k20
-        flat[u + 7] += k21
-        flat[u + 8] += k22
+        for k in range(9):
+            flat[u + k] += block[k]
     if u != v and at_lower:
-        flat[v] += k00
-        flat[v + 1] += k10
-        flat[v + 2] += k20
-        flat[v + 3] += k01
-        flat[v + 4] += k11
-        flat[v + 5] += k21
-        flat[v + 6] += k02
-        flat[v + 7] += k12
-        flat[v + 8] += k22
+        for k in range(9):
+            flat[v + k] += block[3 * (k % 3) + k // 3]
 
 
 @inlined_kernel
@@ -110,16 +96,14 @@ def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling,
     trace, both = shear * (xx + yy + zz), coupling + shear
     k01, k02, k12 = coupling * xy + shear * yx, coupling * xz + shear * zx, coupling * yz + shear * zy
     k10, k20, k21 = coupling * yx + shear * xy, coupling * zx + shear * xz, coupling * zy + shear * yz
-    if not pair:  # equal but for round-off; K is symmetric to the last bit
+    if not pair:  # equal up to round-off; keeps K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
-    _add_block(
-        flat, at_upper, at_lower, upper, lower,
-        both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace,
-    )  # fmt: skip
+    block = both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace
+    _add_block(flat, at_upper, at_lower, upper, lower, block)
 
 
 @kernel
-def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
+def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
     """Add the blocks of a cell for Lame's constants, given the integrals of `_integrate_products`."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -127,12 +111,12 @@ def _add_isotropic(g, coupling, shear, slots, c, mine, flat):
                 g[0, a, b], g[3, a, b], g[5, a, b], g[1, a, b], g[2, a, b], g[4, a, b], g[1, b, a], g[2, b, a], g[4, b, a],
             )  # fmt: skip
             _add_isotropic_block(
-                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
             )
 
 
 @kernel
-def _add_general(g, tensor, products, block, slots, c, mine, flat):
+def _add_general(g, tensor, products, block, slots, c, inside, flat):
     """Add the blocks of a cell for any moduli: K_ij = D_ikjl g_kl; `products` and `block` (9,) are overwritten."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
@@ -144,16 +128,13 @@ def _add_general(g, tensor, products, block, slots, c, mine, flat):
                 for column in range(9):
                     total += tensor[row, column] * products[column]
                 block[row] = total
-            if a == b:  # equal but for round-off; K is symmetric to the last bit
+            if a == b:  # equal up to round-off; keeps K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
-            _add_block(
-                flat, mine[a], mine[b], slots[c, a, b], slots[c, b, a],
-                block[0], block[1], block[2], block[3], block[4], block[5], block[6], block[7], block[8],
-            )  # fmt: skip
+            _add_block(flat, inside[a], inside[b], slots[c, a, b], slots[c, b, a], block)
 
 
 @kernel
-def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gradient, flat):
+def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
     """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
 
     `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
@@ -180,7 +161,7 @@ def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, gra
             x, y, z = gradient[a, 0], gradient[a, 1], gradient[a, 2]
             products = x * gx, y * gy, z * gz, x * gy, x * gz, y * gz, y * gx, z * gx, z * gy
             _add_isotropic_block(
-                flat, a != b, mine[a], mine[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
+                flat, a != b, inside[a], inside[b], slots[c, a, b], slots[c, b, a], coupling, shear, products
             )
     return True
 
@@ -191,33 +172,33 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
-    integrated first; the moduli of the cell come in once at the end. Where ``isotropic`` (n_materials,) holds, these are
-    Lame's constants, ``D[0, 1]`` and ``D[3, 3]``.
+    integrated first, and multiplied with the moduli of the cell at the end. Where ``isotropic`` (n_materials,) holds, these
+    are Lame's constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    g, mine, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
+    g, inside, corners = np.empty((6, n_nodes, n_nodes)), np.empty(n_nodes, np.bool_), np.empty((4, 3))
     tensor, products, block = np.empty((9, 9)), np.empty(9), np.empty(9)
     volume = 0.0
     for weight in weights:
         volume += weight
     flat = data.reshape(-1)
     for c in range(n_cells):
-        if not owned(cells, c, owner, part, mine):
+        if not owned(cells, c, owner, part, inside):
             continue
         coupling, shear = moduli[material[c], 0, 1], moduli[material[c], 3, 3]
         if n_nodes == 4 and isotropic[material[c]]:
-            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, mine, corners, flat):
+            if not _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, corners, flat):
                 return c
             continue
         _gather(points, cells, c, x)
         if not _integrate_products(x, slopes, weights, gradient, g):
             return c
         if isotropic[material[c]]:
-            _add_isotropic(g, coupling, shear, slots, c, mine, flat)
+            _add_isotropic(g, coupling, shear, slots, c, inside, flat)
         else:
             _tensor(moduli[material[c]], tensor)
-            _add_general(g, tensor, products, block, slots, c, mine, flat)
+            _add_general(g, tensor, products, block, slots, c, inside, flat)
     return -1
 
 
@@ -225,41 +206,18 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
 
-    Position and displacement are differentiated along the cell together, and no gradients of shape functions are formed.
+    Positions and displacements are differentiated together in reference coordinates: gradients of shape functions are not
+    computed.
     """
     n_cells, n_nodes = cells.shape
-    slopes, local = transposed(dN), np.empty((n_nodes, 6))
+    slopes, x, u = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
     for c in range(n_cells):
-        for a in range(n_nodes):
-            p = cells[c, a]
-            for i in range(3):
-                local[a, i], local[a, 3 + i] = points[p, i], displacement[p, i]
+        _gather(points, cells, c, x)
+        _gather(displacement, cells, c, u)
         D = moduli[material[c]]
         for q in range(dN.shape[0]):
-            xr = yr = zr = ur = vr = wr = 0.0
-            xs = ys = zs = us = vs = ws = 0.0
-            xt = yt = zt = ut = vt = wt = 0.0
-            for a in range(n_nodes):
-                r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
-                xr += r * local[a, 0]
-                yr += r * local[a, 1]
-                zr += r * local[a, 2]
-                ur += r * local[a, 3]
-                vr += r * local[a, 4]
-                wr += r * local[a, 5]
-                xs += s * local[a, 0]
-                ys += s * local[a, 1]
-                zs += s * local[a, 2]
-                us += s * local[a, 3]
-                vs += s * local[a, 4]
-                ws += s * local[a, 5]
-                xt += t * local[a, 0]
-                yt += t * local[a, 1]
-                zt += t * local[a, 2]
-                ut += t * local[a, 3]
-                vt += t * local[a, 4]
-                wt += t * local[a, 5]
-            # Cofactors of the Jacobian: the derivatives of r, s and t in x, y and z, times its determinant.
+            xr, yr, zr, xs, ys, zs, xt, yt, zt = jacobian_3d(x, slopes, q)
+            ur, vr, wr, us, vs, ws, ut, vt, wt = jacobian_3d(u, slopes, q)
             rx, ry, rz = ys * zt - zs * yt, zs * xt - xs * zt, xs * yt - ys * xt
             sx, sy, sz = zr * yt - yr * zt, xr * zt - zr * xt, yr * xt - xr * yt
             tx, ty, tz = yr * zs - zr * ys, zr * xs - xr * zs, xr * ys - yr * xs
@@ -283,7 +241,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    largest, number, first = 0.0, -1, np.int64(0)  # of a literal, the map would be compiled once more
+    largest, number, first = 0.0, -1, np.int64(0)  # a literal would compile the map once more
     for c in range(n_cells):
         _gather(points, cells, c, x)
         map_3d(x, slopes, first, gradient)

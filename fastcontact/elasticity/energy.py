@@ -17,7 +17,7 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
     stress : ndarray (n_cells, n, n_components)
         [pressure].
     compliance : ndarray (n_cells, m, n_components, n_components)
-        That of whole cells, m = 1, or of their points, m = n, see `Material.compliance_at` [1 / pressure].
+        Compliance of whole cells, m = 1, or of their points, m = n, see `Material.compliance_at` [1 / pressure].
     """
     return np.asarray((stress * (compliance @ stress[..., None])[..., 0]).sum(axis=-1))
 

@@ -12,7 +12,7 @@ from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.mesh.mesh import Mesh
 
-# Points of the quadrature along each direction of a facet: exact on quadratic facets of a ring.
+# Number of quadrature points in each direction of a facet: exact on quadratic facets of a ring.
 POINTS = 4
 
 
@@ -39,10 +39,10 @@ class FollowingPressure:
         return facets, N, element.gradient(xi), evaluated(load.value, places, load.name) * weights
 
     def at(self, displacement: Array) -> tuple[Array, csr_array]:
-        """Return nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length], and their derivative.
+        """Return nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length], and the load stiffness.
 
-        Of that minus the symmetric part (n_dofs, n_dofs) [force / length], which is all of it where the facets close a
-        volume, or end at supports.
+        The latter is minus the symmetric part (n_dofs, n_dofs) of their derivative [force / length], which is the full
+        derivative where the facets enclose a volume or end at supports.
         """
         moved = self._mesh.points + displacement
         forces, entries, dim = np.zeros_like(moved), Entries(), moved.shape[1]

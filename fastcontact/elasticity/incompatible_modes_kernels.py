@@ -8,13 +8,14 @@ cell; ``pairs`` (dim, dim), the component of stress of two directions; ``moduli`
 or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
 
 With the strains M of unit modes and B of unit displacements of the nodes, own = sum w M^T D M = L L^T and mixed = sum w M^T D
-B: static condensation eliminates the modes by a = -own^-1 mixed u, and take (L^-1 mixed)^T (L^-1 mixed) from the stiffness.
+B: static condensation eliminates the modes by a = -own^-1 mixed u, and subtracts (L^-1 mixed)^T (L^-1 mixed) from the
+stiffness.
 """
 
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
+from fastcontact.elasticity.dilatation_kernels import add_products, back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
@@ -38,18 +39,18 @@ def _modes(xi, q, inverse, ratio, pairs, M):
 
 
 @kernel
-def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
-    """Fill `own` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim)."""
-    dim, n_modes = x.shape[1], own.shape[0]
+def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, modal, mixed):
+    """Fill `modal` (n_modes, n_modes) and `mixed` (n_modes, n_nodes * dim) of the cell with the nodes `x` (n_nodes, dim)."""
+    dim, n_modes = x.shape[1], modal.shape[0]
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, S = np.empty((moduli.shape[1], n_modes)), np.empty((moduli.shape[1], n_modes))
     gradient = np.empty(x.shape)
-    whole = inverse_jacobian(x, middle, 0, J, at_middle)
-    own[:] = 0.0
+    middle_det = inverse_jacobian(x, middle, 0, J, at_middle)
+    modal[:] = 0.0
     mixed[:] = 0.0
     for q in range(weights.shape[0]):
         det = inverse_jacobian(x, dN, q, J, inverse)
-        _modes(xi, q, at_middle, whole / det, pairs, M)
+        _modes(xi, q, at_middle, middle_det / det, pairs, M)
         D = moduli[numbers[q % numbers.shape[0]]]
         for c in range(M.shape[0]):
             for m in range(n_modes):
@@ -63,7 +64,7 @@ def _integrate(x, dN, xi, weights, middle, pairs, moduli, numbers, own, mixed):
             for m in range(n_modes):
                 if M[c, m] != 0.0:
                     for n in range(m + 1):
-                        own[m, n] += M[c, m] * S[c, n]
+                        modal[m, n] += M[c, m] * S[c, n]
         gradients(dN, q, inverse, gradient)
         for a in range(x.shape[0]):
             for i in range(dim):
@@ -78,30 +79,20 @@ def subtract_stiffness(
 ):
     """Subtract the condensed modes from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    `slots`, `owner` and `part` as for the element loops of the whole stiffness; Jacobians have been found positive.
+    `slots`, `owner` and `part` as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
     n_modes = 4 if dim == 2 else 13
-    x, row, mine = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
-    own, mixed = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim))
+    x, row, inside = np.empty((n_nodes, dim)), np.empty(n_nodes * dim), np.empty(n_nodes, np.bool_)
+    modal, mixed, factors = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.full(n_modes, -1.0)
     for c in range(n_cells):
-        if not bends[material[c, 0]] or not owned(cells, c, owner, part, mine):
+        if not bends[material[c, 0]] or not owned(cells, c, owner, part, inside):
             continue
         at_nodes(points, cells, c, x)
-        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
-        reduce(own, mixed)
-        for a in range(n_nodes):
-            if not mine[a]:
-                continue
-            for i in range(dim):
-                row[:] = 0.0
-                for m in range(n_modes):
-                    for k in range(n_nodes * dim):
-                        row[k] += mixed[m, dim * a + i] * mixed[m, k]
-                for b in range(n_nodes):
-                    for j in range(dim):
-                        data[slots[c, a, b], i, j] -= row[dim * b + j]
+        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
+        reduce(modal, mixed)
+        add_products(factors, mixed, slots, c, inside, row, data)
 
 
 @kernel
@@ -110,15 +101,15 @@ def add_stress(
 ):
     """Add the stresses of modes to `out` (n_cells, n_out, n_components), in place.
 
-    `displacement` (n_points, dim); `lost` (n_cells or 0, n_q, n_components), the stresses that the cells lose by temperature
-    and initial states; `at` (n_out, dim) and `slopes` (n_out, n_nodes, dim): the points of `out` and shape derivatives
-    there; `beside` (n_out, n_q): weights of values at the quadrature points for those at the points of `out`.
+    `displacement` (n_points, dim); `lost` (n_cells or 0, n_q, n_components), the stresses subtracted for temperature and
+    initial states; `at` (n_out, dim) and `slopes` (n_out, n_nodes, dim): the points of `out` and shape derivatives there;
+    `beside` (n_out, n_q): interpolation weights from the quadrature points to the points of `out`.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], moduli.shape[1]
     n_modes = 4 if dim == 2 else 13
     x, u = np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
-    own, mixed, force = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.empty((n_modes, 1))
+    modal, mixed, force = np.empty((n_modes, n_modes)), np.empty((n_modes, n_nodes * dim)), np.empty((n_modes, 1))
     J, inverse, at_middle = np.empty((dim, dim)), np.empty((dim, dim)), np.empty((dim, dim))
     M, strain = np.empty((size, n_modes)), np.empty(size)
     for c in range(n_cells):
@@ -126,8 +117,8 @@ def add_stress(
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
-        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], own, mixed)
-        whole = inverse_jacobian(x, middle, 0, J, at_middle)
+        _integrate(x, dN, xi, weights, middle, pairs, moduli, material[c], modal, mixed)
+        middle_det = inverse_jacobian(x, middle, 0, J, at_middle)
         for m in range(n_modes):
             force[m, 0] = 0.0
             for k in range(n_nodes * dim):
@@ -135,15 +126,15 @@ def add_stress(
         if lost.shape[0]:
             for q in range(weights.shape[0]):
                 det = inverse_jacobian(x, dN, q, J, inverse)
-                _modes(xi, q, at_middle, whole / det, pairs, M)
+                _modes(xi, q, at_middle, middle_det / det, pairs, M)
                 for e in range(size):
                     for m in range(n_modes):
                         force[m, 0] += det * weights[q] * M[e, m] * lost[c, q, e]
-        reduce(own, force)
-        back_substitute(own, force[:, 0])
+        reduce(modal, force)
+        back_substitute(modal, force[:, 0])
         for k in range(at.shape[0]):
             det = inverse_jacobian(x, slopes, k, J, inverse)
-            _modes(at, k, at_middle, whole / det, pairs, M)
+            _modes(at, k, at_middle, middle_det / det, pairs, M)
             for e in range(size):
                 strain[e] = 0.0
                 for m in range(n_modes):

@@ -1,4 +1,4 @@
-"""Loads by mass: gravity and centrifugal forces, from the densities of the materials."""
+"""Inertia loads: gravity and centrifugal forces, from the densities of the materials."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class InertiaLoad(VolumeLoad):
         mesh : Mesh
         kinematics : str
         density : DensityField, optional
-            Only `inertia_loads` need them.
+            Densities, needed only by `inertia_loads`.
         """
         forces, missing = np.zeros((mesh.n_points, mesh.dim)), 0
         for element, rows in solid_rows(mesh, self.groups).items():
@@ -81,7 +81,7 @@ class InertiaLoad(VolumeLoad):
 
 @dataclass(frozen=True)
 class Gravity(InertiaLoad):
-    """Components of an acceleration [length / time^2] of groups of solid cells, or of all."""
+    """Gravity on groups of solid cells, or on all, given by the components of the acceleration [length / time^2]."""
 
     KIND = "gravity"
     groups: tuple[str, ...] | None
@@ -126,7 +126,7 @@ class Centrifugal(InertiaLoad):
 
     @property
     def values(self) -> list[float]:  # type: ignore[override]
-        """The speed and what describes the axis."""
+        """The speed and the parameters of the axis."""
         return [self.speed, *self.origin, *self.direction]
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:

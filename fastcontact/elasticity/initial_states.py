@@ -16,7 +16,7 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-# The history of what is there from the first step on.
+# History of states that are present from the first step on.
 ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
 
 
@@ -33,9 +33,9 @@ class InitialState:
     cells : Cells
         The same cells.
     components : mapping of int to float or Varying
-        By the number of the component in `COMPONENTS`: stresses [pressure], or strains, shears twice those of the tensor [-].
+        By the number of the component in `COMPONENTS`: stresses [pressure], or strains with engineering shears [-].
     axes : Axes
-        Which the components are along, as of materials.
+        Axes of the components, as for materials.
     kinematics : str
     ramp : tuple
         History.
@@ -51,7 +51,7 @@ class InitialState:
 
     @property
     def name(self) -> str:
-        """What it is and where, for messages."""
+        """Kind and groups, for messages."""
         return f"the initial {self.kind} of {listed(self.groups)}"
 
     def values(self, name: str, rows: Indices, N: Array) -> Array:
@@ -68,7 +68,7 @@ class InitialState:
         if self.axes is not None:
             places = positions(self.cells.mesh, self.cells.mesh.cells[name][members], N)
             turn = rotations(frames(self.axes, places, self.kinematics))
-            if self.kind == "strain":  # the work of a stress is that of its turned one
+            if self.kind == "strain":  # engineering strains transform by the inverse transpose
                 turn = np.asarray(np.linalg.inv(turn).transpose(0, 2, 1))
             local = np.einsum("nij,nj->ni", turn, local)
         out = np.abs(local[:, size:]).max(initial=0.0)
@@ -85,7 +85,7 @@ class InitialState:
         return bool(plane and np.abs(values[:, 2]).max(initial=0.0) > ROUND_OFF * largest)
 
     def check(self) -> None:
-        """Raise ModelError if a component cannot be."""
+        """Raise ModelError if a component is not admissible."""
         for element, rows, N in self.cells.samples():
             self.values(element, rows, N)
 
@@ -94,7 +94,7 @@ def initial_state(
     kind: str, groups: tuple[str, ...] | None, cells: Cells, given: Mapping[str, Any], axes: Axes, kinematics: str,
     ramp: Table | None,
 ) -> InitialState:  # fmt: skip
-    """Return the initial state of `kind` that is given by the names of its components; ModelError if it cannot be."""
+    """Return the initial state of `kind` given by the names of its components; ModelError if it is not admissible."""
     label = f"the initial {kind} of {listed(groups)}"
     components: dict[int, Any] = {}
     for number, component in enumerate(COMPONENTS):
@@ -117,22 +117,19 @@ def initial_state(
 
 @dataclass(frozen=True, eq=False)
 class StressOffset:
-    """What the stress in cells has beside that of the displacements: by temperature, initial strains and initial stresses.
+    """Stress in cells in addition to that of the displacements: due to temperature, initial strains and initial stresses.
 
     Attributes
     ----------
     rise : ndarray (n_points,)
         Rise of the temperature [temperature].
-    per_degree : ndarray (n_moduli, n_components)
-        Moduli times the coefficients of expansion, which stresses lose [pressure / temperature].
-    expansion : ndarray (n_moduli,)
-        Coefficients of expansion of the materials with a mean dilatation, zero of others [1 / temperature].
+    expansion : ndarray (n_moduli, n_components)
+        Thermal strains of a degree [1 / temperature].
     states : sequence of (float, InitialState)
-        Initial stresses and strains, and what they are multiplied with.
+        Factors, and initial stresses and strains.
     """
 
     rise: Array
-    per_degree: Array
     expansion: Array
     states: Sequence[tuple[float, InitialState]] = ()
 

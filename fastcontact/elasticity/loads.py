@@ -21,7 +21,7 @@ import numpy as np
 from fastcontact._tools.argument_types import values_at
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.symmetry_axis import axis_nodes
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.mesh.mesh import Mesh
@@ -29,14 +29,14 @@ from fastcontact.mesh.topology import outer_facets, same_facets
 
 Table = tuple[tuple[float, float], ...]
 Value = float | Callable[[Array], Array]
-# What messages and results call a place where no group is named.
+# Name of the place of a load without groups, in messages and results.
 EVERYWHERE = "all solid cells"
-# Size of any number of a model: squares of products of two of them are still finite.
+# Largest admissible number in a model: squares of products of two are still finite.
 LARGEST = 1e60
 Components = Mapping[int, Value]
 
-# Points of the product rule along each direction, and along those of squares, cubes and prisms: exact to degree 7 at least,
-# enough for a constant load on curved quadratic cells of a ring, and for one that varies quadratically over straight facets.
+# Number of points of the product rule in each direction, and for squares, cubes and prisms: exact to degree 7 at least,
+# sufficient for a constant load on curved quadratic cells of a ring, and for a quadratic one over straight facets.
 _POINTS, _STRAIGHT = 5, 4
 
 
@@ -51,13 +51,13 @@ class DensityField(Protocol):
 
 
 class Load:
-    """A load of a model; its `ramp`, points (instant, multiplier), is its own history, None that of the analysis."""
+    """A load of a model; `ramp`, points (instant, multiplier), is its history, None for that of the analysis."""
 
     KIND: ClassVar[str]
     CONSTANT: ClassVar[bool] = False  # values are numbers, not functions of position
     group: str
     components: Components
-    value: Value  # of loads that have no components
+    value: Value  # value of a load without components
     ramp: Table | None
 
     @property
@@ -243,12 +243,12 @@ class TotalForce(Load):
 
 
 def listed(groups: Sequence[str] | None) -> str:
-    """Return groups of solid cells in words, for messages; None stands for all."""
+    """Return a description of groups of solid cells, for messages; None stands for all."""
     return EVERYWHERE if groups is None else ", ".join(f"'{group}'" for group in groups)
 
 
 def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
-    """Return by element the numbers (n,) of the solid cells of groups, or of all."""
+    """Return the numbers (n,) of the solid cells of groups, or of all, by element."""
     if groups is None:
         return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
     rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[group] for group in groups])))
@@ -276,9 +276,9 @@ def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
-    """Return the facets (n, n_nodes) of a group by element, each once, though it may stand in the mesh more often.
+    """Return the facets (n, n_nodes) of a group by element, each once, even if the mesh contains it several times.
 
-    MeshError if there is no such group of cells, ModelError if it has no facets.
+    Raises MeshError if there is no such group of cells, ModelError if it has no facets.
     """
     if group in mesh.point_groups and group not in mesh.cell_groups:
         raise ModelError(f"group '{group}' holds points only: this load needs a group of facets")
@@ -290,9 +290,9 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
 
 
 def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
-    """Return facets (n, n_nodes), those of `block` (n, n_nodes), turned so that their normals point out of the solid.
+    """Return the facets (n, n_nodes) of `block` (n, n_nodes), oriented so that their normals point out of the solid.
 
-    ModelError if a facet does not lie on the outside of a solid.
+    Raises ModelError if a facet does not lie on the outside of a solid.
     """
     outer = outer_facets(mesh).get(element, np.empty((0, block.shape[1]), np.int32))
     rows = same_facets(outer, block)
@@ -309,7 +309,7 @@ def outward(mesh: Mesh, group: str, element: str, block: Numbers) -> Numbers:
 def evaluated(value: Value, points: Array, name: str) -> Array:
     """Return the value (...) [unit of the load] at `points` (..., dim) [length].
 
-    ModelError if it is a function that returns another shape, or a result is not finite.
+    Raises ModelError if it is a function that returns another shape, or a result is not finite.
     """
     if not callable(value):
         return np.full(points.shape[:-1], float(value))
@@ -329,7 +329,7 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
 
 
 def check_number(name: str, value: Any) -> None:
-    """Raise ModelError if `value` is not a finite number, or one that arithmetic cannot hold; `name` names it."""
+    """Raise ModelError, with its `name`, if `value` is not a finite number, or is too large for arithmetic."""
     number: Any = value if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     if not abs(number) < math.inf:
         raise ModelError(f"{name} is {value!r}, which is not a finite number")
@@ -338,23 +338,22 @@ def check_number(name: str, value: Any) -> None:
 
 
 def check_value(name: str, value: Any) -> None:
-    """Raise ModelError if `value` is neither a finite number nor a function; `name` names it."""
+    """Raise ModelError, with its `name`, if `value` is neither a finite number nor a function."""
     if not callable(value):
         check_number(name, value)
 
 
 def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, Any]:
-    """Return components given by the names of their axes, those that are not None, by number.
+    """Return components given by the names of their axes, by number, without those that are None.
 
-    ModelError if there is none, or an axis is not one of the space.
+    Raises ModelError if there is none, or there is no such axis.
     """
-    given = {name: value for name, value in components.items() if value is not None}
-    if not given:
+    chosen = {name: value for name, value in components.items() if value is not None}
+    if not chosen:
         raise ModelError(f"{caption} has no component: give for example y=-1.0")
-    for name in given:
-        if name not in "xyz"[:dim]:
-            raise ModelError(f"{caption}: {unknown('component', name, 'xyz'[:dim])}")
-    return {"xyz".index(name): value for name, value in given.items()}
+    for name in chosen:
+        check_known("component", name, "xyz"[:dim], ModelError, f"{caption}: ")
+    return {"xyz".index(name): value for name, value in chosen.items()}
 
 
 def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
@@ -386,7 +385,7 @@ def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> 
 
 
 def _turned(measure: Array, x: Array, kinematics: str) -> Array:
-    """Return a measure (c, q) or (c, q, dim) taken over the full circle in axisymmetry."""
+    """Return a measure (c, q) or (c, q, dim), multiplied by the circumference in axisymmetry."""
     if kinematics != "axisymmetric":
         return measure
     circle = 2.0 * np.pi * x[:, :, 0]
@@ -404,6 +403,6 @@ def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
-    Of `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
+    `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

@@ -18,14 +18,14 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Numbers of local matrices that are formed at a time.
+# Number of entries of local matrices that are computed at a time.
 AT_ONCE = 2_000_000
 
 
 def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
     """Return the consistent mass matrix (n_dofs, n_dofs) [mass] of the solid cells, in axisymmetry of the full circle.
 
-    Integrals are exact on straight cells. ModelError if some cells have no density, or all have none.
+    Integrals are exact on straight cells. Raises ModelError if cells have no density.
     """
     missing = 0
 
@@ -54,8 +54,8 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
     """Return the matrix (n_dofs, n_dofs) of the work of stresses on rotations of the material [force / length].
 
     It is the geometric or initial-stress stiffness (Bathe, Finite Element Procedures, 2014, section 6.2.3): the integrals of
-    ``grad(N_a) . stress . grad(N_b)`` for every component, in axisymmetry with the hoop stress on the radial ones beside.
-    At the quadrature points of the stiffness.
+    ``grad(N_a) . stress . grad(N_b)`` for every component, plus the hoop stress term of radial components in
+    axisymmetry, at the quadrature points of the stiffness.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
 
 
 def _assembled(mesh: Mesh, pattern: Sparsity, local: Callable[[str, Indices], Array]) -> bsr_array:
-    """Return the matrix with blocks that are diagonal, of the diagonals (n_cells, n_nodes, n_nodes, dim or 1) of cells."""
+    """Return the matrix with diagonal blocks, assembled from their diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
     diagonals = np.zeros((mesh.dim, len(pattern.indices)))
     for name, cells in mesh.solids.items():
         size = max(1, AT_ONCE // cells.shape[1] ** 2)

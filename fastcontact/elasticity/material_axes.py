@@ -22,8 +22,8 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 class CylindricalAxes:
     """Material axes around a line: 1 radial, 2 tangential, 3 along the line.
 
-    In the plane, the line crosses it at `origin`. In axisymmetry, the line is the axis: give ``direction=(0, 1, 0)``.
-    ModelError if a vector has not three components, or the direction no length.
+    In the plane, the line crosses the plane at `origin`. In axisymmetry, the line must be the axis: ``direction=(0, 1,
+    0)``. ModelError if a vector does not have three components, or the direction is zero.
 
     Parameters
     ----------
@@ -80,9 +80,9 @@ class CylindricalAxes:
 
 
 def checked_axes(axes: Any) -> Axes:
-    """Return axes given by vectors as three orthonormal ones, functions as they are.
+    """Return axes given by vectors as three orthonormal ones, and functions unchanged.
 
-    ModelError if vectors are neither one of the plane, nor two or three in space at right angles.
+    Raises ModelError unless they are one vector in the plane, or two or three orthogonal ones in space.
     """
     if axes is None or callable(axes):
         return axes  # type: ignore[no-any-return]
@@ -117,7 +117,8 @@ def checked_axes(axes: Any) -> Axes:
 def frames(axes: Axes, points: Array, kinematics: str) -> Array:
     """Return checked axes at `points` (n, dim) [length] as unit vectors in rows, (n, 3, 3) [-].
 
-    ModelError if a function returns another shape or no orthonormal vectors, or a cylinder is not that of the axisymmetry.
+    Raises ModelError if a function returns another shape or no orthonormal vectors, or the line of a cylinder is not the axis
+    of symmetry.
     """
     if axes is None:
         return np.broadcast_to(np.eye(3), (len(points), 3, 3))
@@ -132,7 +133,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
     try:
         frame = np.asarray(returned, complex if np.iscomplexobj(returned) else float)
     except (TypeError, ValueError):
-        raise ModelError(f"the function of a material's axes returned {returned!r:.80}, which are no numbers") from None
+        raise ModelError(f"the function of a material's axes returned {returned!r:.80}, not numbers") from None
     if frame.shape != (len(points), 3, 3):
         raise ModelError(
             f"the function of a material's axes returned numbers of shape {frame.shape} for {len(points)} points: it must "
@@ -160,7 +161,7 @@ def rotations(frame: Array) -> Array:
 
 
 def _vectors(values: Any, name: str) -> Array:
-    """Return finite numbers as an array; ModelError names what they are otherwise."""
+    """Return finite numbers as an array; ModelError, with their `name`, otherwise."""
     try:
         vectors = np.asarray(values)
     except ValueError:  # rows of several lengths

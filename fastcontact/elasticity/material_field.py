@@ -1,4 +1,4 @@
-"""The materials of all solid cells: moduli, and which of them each cell has."""
+"""The materials of all solid cells: moduli, and their assignment to cells."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.elasticity.incompatible_modes import MODES
 from fastcontact.elasticity.initial_states import InitialState, StressOffset
 from fastcontact.elasticity.materials import MODULI, Material
@@ -21,7 +20,7 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Where some of the moduli are those of a material that varies.
+    """Points at which the moduli of a varying material are stored.
 
     Attributes
     ----------
@@ -29,9 +28,9 @@ class Places:
     first : int
         Number of the first of them in `MaterialField.moduli`.
     points : ndarray (n, dim)
-        Where axes are taken: the middles of cells, or their quadrature points [length].
+        Points at which axes are evaluated: the middles of cells, or their quadrature points [length].
     constants : SimpleNamespace
-        Of `Material.constants_at`.
+        Result of `Material.constants_at`.
     """
 
     material: int
@@ -54,14 +53,14 @@ class MaterialField:
     materials : sequence of Material
     kinematics : str
     moduli : ndarray (n_moduli, n_components, n_components)
-        Of each material, then of the places of materials that vary [pressure].
+        Moduli of each material, then those at the `places` of varying materials [pressure].
     places : sequence of Places
     owner : ndarray of int (n_moduli,)
         Material of each of the moduli.
     number, rows : dict of str to ndarray of int (n_cells,)
-        By solid element: every cell's material, and its place in `moduli`, where it varies that of its middle.
+        By solid element: every cell's material, and its row in `moduli` (at the middle of the cell if the material varies).
     inside : dict of str to ndarray of int (n_cells, n_q)
-        By solid element with materials that vary inside cells: place in `moduli` of every quadrature point.
+        By solid element with materials that vary inside cells: row in `moduli` of every quadrature point.
     """
 
     materials: Sequence[Material]
@@ -75,7 +74,7 @@ class MaterialField:
 
     @property
     def loops(self) -> dict[str, Numbers]:
-        """By solid element what element loops take: `inside` where materials vary inside cells, elsewhere `rows`."""
+        """Rows of moduli for the element loops, by solid element: `inside` if materials vary inside cells, else `rows`."""
         return {**self.rows, **self.inside}
 
     @property
@@ -85,15 +84,15 @@ class MaterialField:
 
     @cached_property
     def averaged(self) -> Mask:
-        """Which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
+        """Which moduli (n_moduli,) have a mean dilatation; none in plane stress, where elements do not lock."""
         averaged = np.array([material.averaged for material in self.materials], bool)
         return np.asarray(averaged[self.owner] & (self.kinematics != "plane_stress"))
 
     @cached_property
-    def treatment(self) -> NDArray[np.uint8]:
-        """What elements make of the strain, by moduli (n_moduli,): 1 a mean dilatation, 2 incompatible modes, 0 nothing.
+    def treatment(self) -> AnyArray:
+        """Strain treatment of elements, by moduli (n_moduli,): 1 mean dilatation, 2 incompatible modes, 0 none.
 
-        The sum of both is incompatible modes in the elements that have them, a mean dilatation in others. Axisymmetric cells
+        Their sum means incompatible modes in the elements that have them, and a mean dilatation in others. Axisymmetric cells
         have no incompatible modes.
         """
         modes = np.array([material.incompatible_modes for material in self.materials], bool)[self.owner]
@@ -104,13 +103,13 @@ class MaterialField:
 
     @cached_property
     def contrast(self) -> float:
-        """Largest ratio of what is added to the softest stiffness of a material in other directions, at least 1 [-].
+        """Largest excess of a material's stiffness over that in its softest direction, over the latter, at least 1 [-].
 
-        That is ``nu / (1 - 2 nu)`` for isotropic materials, which become incompressible as it grows: the eigenvalues of the
-        moduli for normal strains are then ``3 lambda + 2 mu`` and ``2 mu``.
+        For isotropic materials it is ``nu / (1 - 2 nu)``, which grows towards incompressibility: the eigenvalues of the
+        moduli for normal strains are ``3 lambda + 2 mu`` and ``2 mu``.
         """
         normal = 2 if self.kinematics == "plane_stress" else 3
-        used = self.moduli[:, 0, 0] > 0.0  # those of materials that vary are zero: no cell has their number
+        used = self.moduli[:, 0, 0] > 0.0  # unused rows of varying materials are zero
         values = np.linalg.eigvalsh(self.moduli[used, :normal, :normal])
         return max(1.0, float(((values[:, -1] / values[:, 0]).max() - 1.0) / 3.0))
 
@@ -121,13 +120,13 @@ class MaterialField:
 
     @cached_property
     def expansion(self) -> Array:
-        """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN of materials that have no expansion."""
+        """Thermal strains (n_moduli, n_components) [1 / temperature]; NaN for materials without expansion."""
         return self._of_materials(np.zeros(self.moduli.shape[:2]), "expansion_at")
 
     def _of_materials(self, values: Array, method: str) -> Array:
-        """Fill `values` (n_moduli, ...) with what a method of the materials returns."""
+        """Fill `values` (n_moduli, ...) with the results of a method of the materials."""
         for number, material in enumerate(self.materials):
-            if not material.varies:  # else there is no cell of this number
+            if not material.varies:  # rows of varying materials are unused
                 values[number] = getattr(material, method)(self._anywhere, self.kinematics)[0]
         for place in self.places:
             at = getattr(self.materials[place.material], method)
@@ -141,26 +140,24 @@ class MaterialField:
     def offset(
         self, rise: Array | None, states: Sequence[tuple[float, InitialState]] = (), n_points: int = 0
     ) -> StressOffset | None:
-        """Return what stresses have beside those of the displacements; None where there is nothing.
+        """Return the stress in addition to that of the displacements; None without any.
 
         Parameters
         ----------
         rise : ndarray (n_points,), optional
-            Of the temperature [temperature].
+            Temperature rise [temperature].
         states : sequence of (float, InitialState)
-            Initial stresses and strains, and what they are multiplied with.
+            Factors, and initial stresses and strains.
         n_points : int
-            Of the mesh, for initial states without temperatures.
+            Number of points of the mesh, for initial states without temperatures.
         """
         if rise is None and not states:
             return None
-        strain = np.nan_to_num(self.expansion)
-        per_degree = np.einsum("mij,mj->mi", self.moduli, strain)
-        expansion = np.where(self.averaged, strain[:, 0], 0.0)
-        return StressOffset(np.zeros(n_points) if rise is None else rise, per_degree, expansion, tuple(states))
+        at_nodes = np.zeros(n_points) if rise is None else rise
+        return StressOffset(at_nodes, np.nan_to_num(self.expansion), tuple(states))
 
     def without_expansion(self, mesh: Mesh, rise: Array) -> int:
-        """Return how many cells have a rise of the temperature (n_points,) [temperature] and a material without expansion."""
+        """Return the number of cells with a temperature rise (n_points,) [temperature] and a material without expansion."""
         unknown = np.isnan(self.expansion[:, 0])
         count = 0
         for name, block in mesh.solids.items():
@@ -170,9 +167,9 @@ class MaterialField:
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:
-        """By solid element the material (n_cells,) of every cell, those between which stress does not jump under one number.
+        """Material (n_cells,) of every cell by solid element; materials between which stress is continuous share a number.
 
-        These have the same moduli, axes and expansion.
+        Such materials have the same moduli, axes and expansion.
         """
         first: dict[object, int] = {}
         same = np.empty(self.n_materials, np.int32)
@@ -226,7 +223,7 @@ def material_field(
 
 
 def _law(material: Material, moduli: Array) -> tuple[object, ...]:
-    """Return what is equal for materials between which stress does not jump."""
+    """Return a key that is equal for materials between which stress is continuous."""
     constants = tuple(getattr(material, name, None) for name in MODULI) if material.graded else None
     compliance = b"" if material.graded else material.local_compliance.tobytes()
     own_axes = material.axes if material.varies else None

@@ -13,16 +13,16 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class MaterialSides:
-    """Places for nodal values: one for each node, and further ones where materials meet.
+    """Slots for nodal values: one for each node, and additional ones at material interfaces.
 
     Attributes
     ----------
     cells : mapping of str to ndarray (n_cells, n_nodes)
-        By solid element, the places of the nodes of each cell.
+        Slots of the nodes of each cell, by solid element.
     node : ndarray of int (n_places,)
-        Node of each place; the first n_points are the nodes themselves.
+        Node of each slot; the first n_points are the nodes themselves.
     points, material, place : ndarray of int (k,)
-        Where materials meet, for each node and each of its materials: node, material, place; ordered by node.
+        At interfaces, for each node and each of its materials: node, material, slot; ordered by node.
     """
 
     cells: Mapping[str, Numbers]
@@ -33,7 +33,7 @@ class MaterialSides:
 
 
 def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides:
-    """Return where materials meet; `material` has by solid element the number (n_cells,) of each cell's material."""
+    """Return the material interfaces; `material` are the numbers (n_cells,) of each cell's material, by solid element."""
     n = mesh.n_points
     least, most = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
     for number in np.unique(np.concatenate([np.empty(0, np.int32), *material.values()]))[::-1]:

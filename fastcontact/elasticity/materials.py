@@ -18,15 +18,15 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Value
 from fastcontact.elasticity.material_axes import PAIRS, Axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, mapped, varying, wrapped
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
 
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
-# What elements make of the dilatation.
+# Treatments of the dilatation.
 VOLUMETRIC = ("auto", "plain", "mean_dilatation")
-# Poisson's ratio from which on a material has a mean dilatation by itself.
+# Poisson's ratio above which a material has a mean dilatation by default.
 NEARLY_INCOMPRESSIBLE = 0.49
 # Constants that may vary, those of the moduli first.
 MODULI = ("E", "nu", "G")
@@ -35,7 +35,7 @@ CONSTANTS = (*MODULI, "density", "expansion", "conductivity")
 
 @typed(ModelError)
 class Material:
-    """A linear elastic material: its moduli in axes of its own, and what loads and temperature need to know of it.
+    """A linear elastic material: moduli in material axes, density, and thermal properties.
 
     Attributes
     ----------
@@ -44,14 +44,13 @@ class Material:
     expansion : float, Varying, tuple or None
         Coefficients of thermal expansion [1 / temperature].
     conductivity : float, Varying, tuple or None
-        Of heat, one or three along the axes [power / (length temperature)].
+        Thermal conductivity, one or three along the axes [power / (length temperature)].
     axes : sequence, callable or None
         Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
     averaged : bool
-        Whether elements have a mean dilatation, where they can and kinematics are not plane stress.
+        Whether elements that support it have a mean dilatation, except in plane stress.
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes, where kinematics are not axisymmetric, in place of a
-        mean dilatation.
+        Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation, except in axisymmetry.
     """
 
     density: Any
@@ -69,13 +68,13 @@ class Material:
 
     @property
     def contact_modulus(self) -> float:
-        """The least plane-strain modulus E / (1 - nu^2) along the axes, by which contact is scaled [pressure]."""
+        """Smallest plane-strain modulus E / (1 - nu^2) along the axes, the scale of contact stiffness [pressure]."""
         D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
         free = [D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))]
         return float(np.min(free))
 
     def _all_compliances(self) -> Array:
-        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, those of all samples where constants vary."""
+        """Return compliances (n, 6, 6) [1 / pressure] in material axes, at all samples if constants vary."""
         if not self.graded:
             return self.local_compliance[None]
         return np.concatenate([self.compliances(self.constants_at(*sample)) for sample in self._cells().samples()])
@@ -92,25 +91,25 @@ class Material:
 
     @property
     def varies(self) -> bool:
-        """Whether axes, moduli or expansion depend on the position."""
+        """Whether axes, moduli or expansion depend on position."""
         return callable(self.axes) or self.graded or bool(varying(self.expansion) or varying(self.axes))
 
     @property
     def graded(self) -> bool:
-        """Whether constants of the moduli depend on the position."""
+        """Whether constants of the moduli depend on position."""
         return any(varying(getattr(self, name, None)) for name in MODULI)
 
     @property
     def varies_inside(self) -> bool:
-        """Whether axes, moduli or expansion vary inside cells: by functions, or by numbers at points.
+        """Whether axes, moduli or expansion vary inside cells: as functions, or as numbers at points.
 
-        Cells with a mean dilatation have the constants of their middle.
+        Cells with a mean dilatation use the constants at their middle.
         """
         varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
         return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
-        """Return the material that knows its cells, which constants that vary need; ModelError where these cannot be."""
+        """Return the material with its cells, for varying constants; ModelError where these are not admissible."""
         names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
         if not names:
             return self
@@ -129,7 +128,7 @@ class Material:
         return bound_material
 
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
-        """Return the constants in cells of an element, those that vary as arrays (n_rows * n,) [unit of the constant].
+        """Return the constants in cells of an element, varying ones as arrays (n_rows * n,) [unit of the constant].
 
         `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
         """
@@ -144,18 +143,18 @@ class Material:
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return for which moduli of constants (n,) the material can be."""
+        """Return for which constants (n,) the material is admissible."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
-        """Return the cells that have the material; ModelError if they are not known."""
+        """Return the cells of the material; ModelError if they are not known."""
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
             raise ModelError("constants of the material depend on the position: ask the one in `materials` of a model")
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
-        """Raise ModelError, with the place, where the constants `names` are such that the material cannot be."""
+        """Raise ModelError, with the position, where the constants `names` are not admissible."""
         constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
         if constants.density is not None:
@@ -189,7 +188,7 @@ class Material:
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
 
-        `constants` are those of `constants_at` there, where they vary.
+        `constants` are those of `constants_at` there, if they vary.
         """
         compliance = self._compliance6(points, kinematics, constants)
         if kinematics == "3d":
@@ -204,21 +203,22 @@ class Material:
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
-        Stress : strain is that of the whole stress in any kinematics, since stresses yz and xz are zero in the plane.
+        In the plane it includes zz, so that stress : compliance : stress is complete; stresses yz and xz are zero
+        there.
         """
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
-        """Return the strains (n, 4), in 3D (n, 6) [1 / temperature] of a degree at `points` (n, dim) [length].
+        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per degree at `points` (n, dim) [length].
 
-        NaN without expansion. ModelError if it is a shear out of the plane, in kinematics that have none.
+        NaN without expansion. ModelError if it has an out-of-plane shear that the kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
             return np.full((len(points), size), np.nan)
-        given = (self if constants is None else constants).expansion
-        along, tensor = self._along_axes(given, points, kinematics, constants)
+        expansion = (self if constants is None else constants).expansion
+        along, tensor = self._along_axes(expansion, points, kinematics, constants)
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
         if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
             raise ModelError(
@@ -230,12 +230,12 @@ class Material:
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
-        `constants` are those of `constants_at` there. ModelError if axes that leave the plane turn heat out of it.
+        `constants` are those of `constants_at` there. ModelError if inclined axes conduct heat out of the plane.
         """
-        given, dim = constants.conductivity, points.shape[1]
-        if not isinstance(given, tuple):
-            return np.broadcast_to(given, len(points))[:, None, None] * np.eye(dim)
-        along, tensor = self._along_axes(given, points, kinematics, constants)
+        conductivity, dim = constants.conductivity, points.shape[1]
+        if not isinstance(conductivity, tuple):
+            return np.broadcast_to(conductivity, len(points))[:, None, None] * np.eye(dim)
+        along, tensor = self._along_axes(conductivity, points, kinematics, constants)
         if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
             raise ModelError(
                 f"the conductivity of the material with {self.described} turns heat out of the plane: turn one axis along z, "
@@ -243,11 +243,11 @@ class Material:
             )
         return np.asarray(tensor[:, :dim, :dim])
 
-    def _along_axes(self, given: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
-        """Return numbers (n, 3) along the material's axes, one or three `given`, and the tensors (n, 3, 3) that they make."""
+    def _along_axes(self, values: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
+        """Return constants (n, 3) along the material's axes, from one or three `values`, and the tensors (n, 3, 3)."""
         along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
-            along[:, axis] = given[axis] if isinstance(given, tuple) else given
+            along[:, axis] = values[axis] if isinstance(values, tuple) else values
         return along, np.einsum("nai,na,naj->nij", axes, along, axes)
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
@@ -260,11 +260,10 @@ class Material:
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
-        """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where kinematics of the plane do not hold."""
-        if kinematics not in KINEMATICS:
-            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+        """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where plane kinematics are not possible."""
+        check_known("kinematics", kinematics, KINEMATICS, ModelError)
         of_stress = rotations(self._frames(points, kinematics, constants))
-        # Strains turn by the inverse of the transpose, which for stresses in another frame is the rotation back.
+        # Engineering strains transform by the inverse transpose of the matrix of stresses.
         back = np.linalg.inv(of_stress)
         local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)
         compliance = np.asarray(back.transpose(0, 2, 1) @ local @ back)
@@ -280,7 +279,7 @@ class Material:
 
 
 def _real(value: Any) -> float:
-    """Return a real number, infinite where it is too large for one; NaN for what is none."""
+    """Return a real number, infinite if it is too large; NaN if it is not a number."""
     try:
         return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -297,7 +296,7 @@ def check_positive(name: str, value: Any, caption: str = "a positive number") ->
 
 
 def check_density(value: Any) -> None:
-    """Raise ModelError if a density is given and is no number from zero on; one that varies is checked with its cells."""
+    """Raise ModelError if a density is given and is not a number >= 0; a varying one is checked with its cells."""
     if not isinstance(value, Varying) and value is not None and not 0.0 <= _real(value) < math.inf:
         raise ModelError(f"the density = {value} must be a number, zero or more")
 
@@ -321,7 +320,7 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of the position, or numbers for each cell or point; type checkers take what is read for a number.
+# A number, a function of the position, or numbers for each cell or point; for type checkers, a number when read.
 if TYPE_CHECKING:
     Constant = Any
 else:
@@ -338,26 +337,27 @@ class LinearElastic(Material):
     Parameters
     ----------
     E : float, callable or ndarray (n,)
-        Young's modulus [pressure], positive. Where it varies, a function from positions (n, dim) [length] to numbers (n,),
-        such as `Tabulated`; or an array, with a number for each solid cell of the groups that have the material, for each of
-        the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) is always one for cells.
+        Young's modulus [pressure], positive: a number; a function from positions (n, dim) [length] to numbers (n,),
+        such as `Tabulated`; or an array with a number for each solid cell of the groups of the material, for each
+        solid cell of the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) always
+        refers to cells.
     nu : float, callable or ndarray (n,)
-        Poisson's ratio, -1 < nu < 0.5 [-]; as E.
+        Poisson's ratio, -1 < nu < 0.5 [-]; like E.
     volumetric : str
-        How elements take the dilatation, the change of volume: ``"plain"`` as it is; ``"mean_dilatation"`` its mean in
-        each quadrangle, hexahedron, wedge and pyramid (in quadratic ones a linear function), so that they do not lock
-        where the material is nearly incompressible. ``"auto"``: the latter from nu = 0.49 on. Nothing changes in
-        triangles and tetrahedra, and in plane stress.
+        Treatment of the dilatation: ``"plain"`` uses the full dilatation; ``"mean_dilatation"`` projects it on its
+        mean in each quadrangle, hexahedron, wedge and pyramid (in quadratic ones on a linear function), so that they
+        do not lock if the material is nearly incompressible; ``"auto"`` selects the latter from nu = 0.49 on. It has
+        no effect on linear triangles and tetrahedra and in plane stress.
     density : float, callable or ndarray (n,), optional
-        Mass per volume [mass / length^3], for gravity and centrifugal loads; zero or more; as E.
+        Mass per volume [mass / length^3], for gravity, centrifugal loads and modes; zero or more; like E.
     expansion : float, callable or ndarray (n,), optional
-        Coefficient of thermal expansion [1 / temperature]; as E.
+        Coefficient of thermal expansion [1 / temperature]; like E.
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes, so that thin parts of them bend without locking in
-        shear, and do not lock in volume either; nothing changes in other elements and in axisymmetry. Where they have them
-        they have no mean dilatation. They cost three times the assembly and ten times the recovery of stress.
+        Whether linear quadrangles and hexahedra have incompatible modes, which avoid shear locking in bending and
+        volumetric locking, in place of a mean dilatation. It has no effect on other elements and in axisymmetry.
+        Assembly then costs three times and stress recovery ten times as much.
     conductivity : float, callable or ndarray (n,), optional
-        Of heat [power / (length temperature)], positive; as E.
+        Thermal conductivity [power / (length temperature)], positive; like E.
 
     Examples
     --------
@@ -387,8 +387,7 @@ class LinearElastic(Material):
                 "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "
                 "then and do not lock)"
             )
-        if self.volumetric not in VOLUMETRIC:
-            raise ModelError(unknown("volumetric", self.volumetric, VOLUMETRIC))
+        check_known("volumetric", self.volumetric, VOLUMETRIC, ModelError)
         check_density(self.density)
         check_expansion(self.expansion, 1)
         check_conductivity(self.conductivity, 1)
@@ -400,12 +399,12 @@ class LinearElastic(Material):
 
     @property
     def young(self) -> tuple[float, float]:
-        """Young's modulus, twice; where it varies, the smallest and the largest."""
+        """Smallest and largest Young's modulus, equal unless it varies [pressure]."""
         return self.E.range if isinstance(self.E, Varying) else (self.E, self.E)
 
     @property
     def contact_modulus(self) -> float:
-        """E / (1 - nu^2) [pressure]; the least where they vary."""
+        """E / (1 - nu^2) [pressure]; the smallest value if they vary."""
         if not self.graded:
             return self.E / (1 - self.nu**2)
         samples = [self.constants_at(*sample) for sample in self._cells().samples()]
@@ -413,7 +412,7 @@ class LinearElastic(Material):
 
     @property
     def largest_nu(self) -> float:
-        """Poisson's ratio [-]; where it varies, the largest, and zero while no cells have the material."""
+        """Poisson's ratio [-]; if it varies, the largest, and zero before the material is assigned to cells."""
         if not isinstance(self.nu, Varying):
             return self.nu
         return 0.0 if self.nu.cells is None else self.nu.range[1]
@@ -434,7 +433,7 @@ class LinearElastic(Material):
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements have a mean dilatation, where they can and kinematics are not plane stress."""
+        """Whether elements use a mean dilatation, if they support it and kinematics are not plane stress."""
         nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 
@@ -456,8 +455,8 @@ class LinearElastic(Material):
 
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `Material.moduli_at`."""
-        given = self if constants is None else constants
-        E, nu = (np.broadcast_to(np.asarray(value, float), len(points)) for value in (given.E, given.nu))
+        source = self if constants is None else constants
+        E, nu = (np.broadcast_to(np.asarray(value, float), len(points)) for value in (source.E, source.nu))
         return isotropic_moduli(E, nu, kinematics)
 
 
@@ -466,8 +465,7 @@ def isotropic_moduli(E: Array, nu: Array, kinematics: str) -> Array:
 
     Of Young's moduli `E` (n,) [pressure] and Poisson's ratios `nu` (n,) [-].
     """
-    if kinematics not in KINEMATICS:
-        raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
+    check_known("kinematics", kinematics, KINEMATICS, ModelError)
     G = E / (2 * (1 + nu))
     if kinematics == "plane_stress":
         D, normal = np.zeros((len(E), 4, 4)), E / (1 - nu * nu)

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.arrays import Array, Indices, Mask
 
 Table = tuple[tuple[float, float], ...]
-# A coefficient below this fraction of the largest of its row has cancelled.
+# Coefficients below this fraction of the largest of their row are round-off of a cancellation.
 ZERO = 1e-10
 Row = dict[int, float]
 
@@ -23,13 +23,13 @@ class MultiPointConstraint:
     Parameters
     ----------
     name : str
-        For messages.
+        Name for messages.
     rows : csr_array (m, n_dofs)
         Coefficients [unit of the caller].
     value : float or ndarray (m,)
-        At multiplier 1 of the ramp [length times the unit of the coefficients].
+        Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     ramp : tuple of (float, float), optional
-        Points (instant, multiplier) of its own history; None: that of the analysis.
+        Points (instant, multiplier) of its history; None: that of the analysis.
     """
 
     name: str
@@ -40,7 +40,7 @@ class MultiPointConstraint:
 
 @dataclass(frozen=True, eq=False)
 class TemporaryConstraint(MultiPointConstraint):
-    """A relation of the load steps between two instants, from the values that it finds when it begins.
+    """A constraint that acts in the load steps between two instants, starting from the values at its beginning.
 
     Parameters
     ----------
@@ -51,9 +51,9 @@ class TemporaryConstraint(MultiPointConstraint):
     value : float or ndarray (m,)
         At multiplier 1 of the ramp [length times the unit of the coefficients].
     begins, ends : float
-        Ends of load steps [-].
+        Instants at ends of load steps [-].
     keeps : bool
-        Whether it keeps the values that it finds, whatever `value` and `ramp` say; otherwise it goes from there to the next
+        Whether it keeps the initial values, ignoring `value` and `ramp`; otherwise it proceeds from there to the next
         point of its history.
     """
 
@@ -62,11 +62,11 @@ class TemporaryConstraint(MultiPointConstraint):
     keeps: bool = False
 
     def acts_from(self, begin: float) -> bool:
-        """Return whether it holds in the load step that begins at an instant."""
+        """Return whether the constraint acts in the load step that begins at an instant."""
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the relations that follow on ``rows @ u``, `reached` (m,) [length] where it begins."""
+        """Return the constraints that continue from ``rows @ u``, `reached` (m,) [length] at the beginning."""
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
@@ -79,21 +79,21 @@ class TemporaryConstraint(MultiPointConstraint):
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """``u = T w + S r``, with w zero at the pivots, satisfies ``R u = r`` for every w that meets the conditions.
+    """``u = T w + S r``, with w zero at the pivots, satisfies ``R u = r`` for every w that satisfies the conditions.
 
     Attributes
     ----------
     pivots : ndarray of int (n_pivots,)
         The displacement components expressed by the others.
     T : csr_array (n, n)
-        Identity but for the rows of the pivots; the columns of the pivots are empty [-].
+        Identity except for the rows of the pivots; the columns of the pivots are empty [-].
     S : csr_array (n, m)
-        Derivatives of the pivots by the right-hand sides [length / unit of r].
+        Derivatives of the pivots with respect to the right-hand sides [length / unit of r].
     conditions : csr_array (k, n + m)
-        Rows of known components and right-hand sides only: ``conditions @ (w, r) = 0``, or there is no solution
+        Rows that only involve known components and right-hand sides: solutions exist if ``conditions @ (w, r) = 0``
         [unit of R], [-].
     origin : ndarray of int (k,)
-        The row of R that each condition comes from.
+        Row of R from which each condition originates.
     """
 
     pivots: Indices
@@ -104,7 +104,7 @@ class Elimination:
 
 
 def stacked_rows(relations: Sequence[MultiPointConstraint], n_dofs: int) -> csr_array:
-    """Return the rows of all relations as one matrix R (m, n_dofs) [unit of the rows]."""
+    """Return the rows of all constraints as one matrix R (m, n_dofs) [unit of the rows]."""
     if not relations:
         return csr_array((0, n_dofs))
     return csr_array(vstack([relation.rows for relation in relations], format="csr"))
@@ -116,7 +116,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
     Parameters
     ----------
     R : csr_array (m, n)
-        Rows may depend on each other [unit of the caller].
+        Rows, possibly linearly dependent [unit of the caller].
     known : ndarray of bool (n,)
         Components that are prescribed and never become pivots.
     """
@@ -136,7 +136,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
             conditions.append(row)
             origin.append(k)
             continue
-        # The component in the fewest relations: one on which many others depend stays.
+        # The component in the fewest constraints: those on which many others depend are kept.
         pivot = min(unknown, key=lambda key: (uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)
@@ -189,7 +189,7 @@ def _matrices(expressed: dict[int, Row], n: int, m: int) -> tuple[csr_array, csr
 
 
 def _rows(rows: list[Row], width: int) -> csr_array:
-    """Return dictionaries as the rows of a matrix."""
+    """Return a matrix with rows given by dictionaries."""
     row = np.array([i for i, entries in enumerate(rows) for _ in entries], np.intp)
     column = np.array([key for entries in rows for key in entries], np.intp)
     values = np.array([c for entries in rows for c in entries.values()], np.float64)

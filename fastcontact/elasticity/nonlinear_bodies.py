@@ -25,9 +25,9 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 History = dict[str, Array]
-# Numbers of the history of a quadrature point, see `constitutive_kernels`.
+# Size of the history of a quadrature point, see `constitutive_kernels`.
 HISTORY, PLASTIC_STRAIN, ACROSS = 9, 6, 8
-# How much of the geometric stiffness a tangent has, see `NonlinearBodies.at`.
+# Parts of the geometric stiffness in a tangent, see `NonlinearBodies.at`.
 WHOLE = 2
 
 
@@ -38,11 +38,11 @@ class DeformedBodies:
     Attributes
     ----------
     tangent : callable
-        Returns K.
+        Function that returns K.
     force : ndarray (n_points, dim)
         Internal forces [force].
     history : dict of str to ndarray (n_cells, n_q, 9)
-        By solid element, if the load step ended here.
+        History by solid element, if the load step ended here.
     stress : dict of str to ndarray (n_cells, n_q, n_components)
         Cauchy stress [pressure].
     energy, plastic_work : float
@@ -71,12 +71,12 @@ class NonlinearBodies:
     kinematics : str
     strain : {"small", "finite"}
     field : MaterialField
-        Of the model.
+        Materials of the model.
     """
 
     def __init__(self, mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> None:
         self.mesh, self.kinematics, self.finite = mesh, kinematics, strain == "finite"
-        if kinematics == "plane_stress":  # the strain across follows from the whole law
+        if kinematics == "plane_stress":  # the out-of-plane strain follows from the full law
             field = material_field(mesh, "plane_strain", field.materials, field.number)
         self._materials, self._owner = field.materials, field.owner
         self._moduli = _six_by_six(field.moduli)
@@ -102,16 +102,16 @@ class NonlinearBodies:
         return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
 
     def _split(self, name: str) -> tuple[Array, Array]:
-        """Return moduli without dilatation, and bulk moduli (n_moduli, 2) of the projected one and the rest."""
+        """Return moduli without dilatation, and bulk moduli (n_moduli, 2) of the projected dilatation and the remainder."""
         moduli, element = self._moduli.copy(), elements.get(name)
         bulk = np.zeros((len(moduli), 2))
         bulk[:, 1] = self._constants[:, 2]
         of_hooke = np.isin(self._constants[:, 0], (LINEAR, SAINT_VENANT))
         projected = self._averaged & (element.dilatation is not None) & (self._constants[:, 0] != SAINT_VENANT)
-        whole = moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0
-        taken = np.where(projected & of_hooke, whole, 0.0)
-        moduli[:, :3, :3] -= taken[:, None, None]
-        bulk[:, 1] += taken
+        bulk_moduli = moduli[:, :3, :3].sum(axis=(1, 2)) / 9.0
+        removed = np.where(projected & of_hooke, bulk_moduli, 0.0)
+        moduli[:, :3, :3] -= removed[:, None, None]
+        bulk[:, 1] += removed
         shear = np.where(of_hooke, moduli[:, 3, 3], self._constants[:, 1])
         rest = 0.0 if element.dilatation == element.order - 1 else np.minimum(bulk[:, 1], REMAINDER * shear)
         bulk[projected] = np.column_stack([bulk[:, 1] - rest, np.broadcast_to(rest, len(bulk))])[projected]
@@ -123,16 +123,16 @@ class NonlinearBodies:
     ) -> DeformedBodies:  # fmt: skip
         """Return the bodies at `displacement` (n_points, dim) [length], with the history `before` the load step.
 
-        They expand by a `rise` (n_points,) of the temperature over the reference [temperature].
-        The tangent is whole, or as `geometric` says without how the mean pressure turns (1), or without initial-stress
-        stiffness (0): it is then positive definite farther from the solution, and where contact alone keeps a body under load
-        from turning. Without `tangent` it is not computed before it is asked for, which takes half of the time, or one and a
-        half times as long.
+        They expand by a temperature `rise` (n_points,) over the reference [temperature].
+        `geometric` selects the full tangent, or the tangent without the rotation of the mean pressure (1), or without
+        initial-stress stiffness (0): it is then positive definite farther from the solution, and where only contact
+        prevents the rotation of a body under load. Without `tangent` it is computed at its first use only: half the time
+        if it is never used, and one and a half times the time if it is.
 
         Raises
         ------
         ConvergenceError
-            If a cell turns inside out, or a point finds no plane stress.
+            If a cell is inverted, or plane stress does not converge at a point.
         """
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
         data, force = np.zeros((len(pattern.indices) if tangent else 0, dim, dim)), np.zeros((mesh.n_points, dim))
@@ -143,15 +143,15 @@ class NonlinearBodies:
             N, dN, weights = elements.get(name).tables
             moduli, bulk = self._split(name)
             polynomials = np.ascontiguousarray(dilatation.basis(name, elements.get(name).quadrature[0]))
-            if (bulk[:, 1] > 0.0).any():  # what is left is no linear function's
+            if (bulk[:, 1] > 0.0).any():  # the remainder is not a linear function
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
-            owner, parts = pattern.owners(mesh, name)
+            owner, row_ranges = pattern.owners(mesh, name)
             new, cauchy = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
             energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
             slots, old = pattern.slots[name], before[name]
 
             def part(number: int) -> tuple[int, int]:
-                rows = slice(*parts[number])  # noqa: B023
+                rows = slice(*row_ranges[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
                     bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, data, force,  # noqa: B023
@@ -159,7 +159,7 @@ class NonlinearBodies:
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
-            for status, cell in parallel.shared(part, range(len(parts))):
+            for status, cell in parallel.shared(part, range(len(row_ranges))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
             history[name], stress[name] = new, cauchy
@@ -182,7 +182,7 @@ class NonlinearBodies:
         return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
-        """Return the fields of `field_names` (n_solids,): of cells, the extremes of their points but for the volume."""
+        """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, except for the volume."""
         fields = (
             {name: self._stretches(name, bodies, displacement) for name in self._cells}
             if self.finite
@@ -205,7 +205,7 @@ class NonlinearBodies:
         return strain.max(axis=1), ratio.max(axis=1)
 
     def _stretches(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array]:
-        """Return v / V of cells (n_cells,), and their principal logarithmic strain of largest size."""
+        """Return v / V of cells (n_cells,), and their largest principal logarithmic strain by magnitude."""
         F, volume = self._deformation(name, displacement, slice(None))
         if self.kinematics == "plane_stress":
             F[..., 2, 2] += bodies.history[name][..., ACROSS]
@@ -215,7 +215,7 @@ class NonlinearBodies:
         return ratio, _farthest(logarithms.reshape(len(F), -1))
 
     def _deformation(self, name: str, displacement: Array, cells: slice) -> tuple[Array, Array]:
-        """Return F (n_cells, n_q, 3, 3) at quadrature points, without the strain across plane stress, and volumes there."""
+        """Return F (n_cells, n_q, 3, 3) at quadrature points, without out-of-plane strain in plane stress, and volumes."""
         N, dN, weights = elements.get(name).tables
         nodes, dim = self.mesh.cells[name][cells], self.mesh.dim
         points, u = self.mesh.points[nodes], displacement[nodes]
@@ -231,26 +231,26 @@ class NonlinearBodies:
 
 
 def _farthest(values: Array) -> Array:
-    """Return of each row of `values` (n, k) the one of largest size (n,)."""
+    """Return the value of largest magnitude in each row of `values` (n, k), as (n,)."""
     return np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], axis=1)[:, 0]
 
 
 def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
-    """Return the names of the fields of cells that steps with these materials have; none for linear bodies."""
+    """Return the names of the cell fields in steps with these materials; none for linear bodies."""
     if strain == "finite":
         return "J", "logarithmic_strain"
     return ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
 
 
 def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> NonlinearBodies | None:
-    """Return the solid cells as nonlinear bodies; None where they are linear."""
+    """Return the solid cells as nonlinear bodies; None if they are linear."""
     if strain == "small" and not any(isinstance(law, NonlinearElastic) for law in field.materials):
         return None
     return NonlinearBodies(mesh, kinematics, strain, field)
 
 
 def check_law(law: Material, strain: str) -> None:
-    """Raise ModelError if a material is none for bodies of these strains."""
+    """Raise ModelError if a material does not support these strains."""
     if isinstance(law, NonlinearElastic) and law.strain != strain:
         wanted = (
             f"Model(..., strain='{law.strain}')"
@@ -268,16 +268,16 @@ def check_law(law: Material, strain: str) -> None:
 
 
 def _six_by_six(moduli: Array) -> Array:
-    """Return moduli (n, 6, 6) of moduli (n, 4, 4) of plane strain, or of those in 3D."""
+    """Return moduli (n, 6, 6), extended from plane-strain moduli (n, 4, 4) if necessary."""
     if moduli.shape[1] == 6:
         return np.ascontiguousarray(moduli)
-    whole = np.zeros((len(moduli), 6, 6))
-    whole[:, :4, :4] = moduli
-    return whole
+    full = np.zeros((len(moduli), 6, 6))
+    full[:, :4, :4] = moduli
+    return full
 
 
 def _at_points(numbers: Numbers, name: str) -> Numbers:
-    """Return the moduli of every quadrature point (n_cells, n_q), of those of cells or points."""
+    """Return the moduli numbers of every quadrature point (n_cells, n_q) from those of cells or points."""
     n_q = len(elements.get(name).quadrature[1])
-    whole = numbers[:, None] if numbers.ndim == 1 else numbers
-    return np.ascontiguousarray(np.broadcast_to(whole, (len(whole), n_q)))
+    columns = numbers[:, None] if numbers.ndim == 1 else numbers
+    return np.ascontiguousarray(np.broadcast_to(columns, (len(columns), n_q)))

@@ -18,9 +18,9 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Materials = dict[str, Numbers]
-# Memory for stresses at points while nodal ones are formed [bytes].
+# Memory for stresses at points during the computation of nodal ones [bytes].
 BATCH = 16_000_000
-# Of so many cells one tells where the nodes of all lie.
+# Sampling interval of cells by which the distribution of nodes is estimated.
 SAMPLED = 16
 
 
@@ -50,10 +50,10 @@ def stress_at_points(
     displacement : ndarray (n_points, dim)
         Of all points [length].
     averaged : ndarray of bool (n_materials,), optional
-        Which materials have a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); none by
-        default.
+        Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); by
+        default none.
     offset : StressOffset, optional
-        What stresses have by temperature and initial states.
+        Stresses due to temperatures and initial states.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     return {
@@ -75,8 +75,8 @@ def nodal_stress(
 ) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
-    The stresses at points are formed for few cells at a time, which takes less memory. Arguments as for `stress_at_points`.
-    With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
+    Arguments are as for `stress_at_points`. Stresses at points are computed for a few cells at a time, which takes less
+    memory. With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     places = mesh.cells if sides is None else sides.cells
@@ -104,22 +104,22 @@ class NodalAverage:
     def add(self, cells: Numbers, extrapolation: Array, values: Array) -> None:
         """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
 
-        The matrix `extrapolation` (n_nodes, n_q) [-] leads from values at the points to values at the nodes.
+        The matrix `extrapolation` (n_nodes, n_q) [-] maps values at the points to values at the nodes.
         """
-        given = parallel.read_only(cells), extrapolation, values
+        arguments = parallel.read_only(cells), extrapolation, values
         into = self._total, self._count
         # For any dimension and number of components.
-        parallel.shared(lambda part: element_2d_kernels.add_nodal(*given, *part, *into), self._parts(cells))
+        parallel.shared(lambda portion: element_2d_kernels.add_nodal(*arguments, *portion, *into), self._parts(cells))
 
     def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
-        """Return ranges of nodes that have about equally many of the cells: each thread adds at its own nodes."""
+        """Return ranges of nodes with about equal numbers of cells: each thread adds at its own nodes."""
         some = np.sort(cells[::SAMPLED, 0])
         count = len(parallel.portions(*cells.shape)) if len(some) else 1
         ends = [0, *(int(some[k * len(some) // count]) for k in range(1, count)), len(self._count)]
         return list(itertools.pairwise(ends))
 
     def result(self) -> Array:
-        """Return the average (n_points, n_components) [pressure], once; zero where there is no cell."""
+        """Return the average (n_points, n_components) [pressure], zero at points without cells; may be called once."""
         self._total /= np.maximum(self._count, 1.0)[:, None]
         return self._total
 
@@ -128,7 +128,7 @@ class NodalAverage:
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    By `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_ELNO of code_aster.
+    By `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO of code_aster.
     """
     return {
         name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
@@ -187,7 +187,7 @@ def _with_components(stress: Array) -> Array:
 
 @typed(ModelError)
 def equivalent_strain(strain: Array) -> Array:
-    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], of an isotropic material von Mises / 3 G.
+    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], the von Mises stress over 3 G if isotropic.
 
     Components xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
     """

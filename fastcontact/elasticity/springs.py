@@ -10,17 +10,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, sum_of_blocks
 from fastcontact.round_off import ROUND_OFF
 
-# Ratio of the stiffness of a spring between nodes to that of the bodies there: warned about, and refused.
+# Ratios of the stiffness of a spring between nodes to that of the bodies there that cause a warning and an error.
 STIFF, STIFFEST = 1e5, 1e12
-DIGITS = 16  # of the numbers that are computed with
+DIGITS = 16  # decimal digits of double precision
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +48,16 @@ class Springs:
 
 def grounded(
     name: str,
-    nodes: NDArray[np.integer],
+    nodes: AnyArray,
     stiffness: Mapping[int, float],
     n_dofs: int,
     dim: int,
     along: Mapping[str, float] | None = None,
     direction: Array | None = None,
 ) -> Springs:
-    """Return springs from each of the `nodes` (n,) to the ground, as `joined` describes those between nodes.
+    """Return springs from each of the `nodes` (n,) to the ground; see `joined`.
 
-    Along every axis of `stiffness` [force / length], and `along` or across the unit vector `direction` (dim,) [-].
+    They act along every axis of `stiffness` [force / length], and `along` or across the unit vector `direction` (dim,) [-].
     """
     directions, values = _frame(stiffness, along or {}, direction, dim)
     rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
@@ -68,7 +67,7 @@ def grounded(
 def joined(
     name: str,
     points: Array,
-    ends: tuple[NDArray[np.integer], NDArray[np.integer]],
+    ends: tuple[AnyArray, AnyArray],
     stiffness: Mapping[int, float],
     along: Mapping[str, float],
     direction: Array | None = None,
@@ -141,7 +140,7 @@ def spring_stiffness(springs: Sequence[Springs], n: int) -> csr_array:
 
 
 def spring_force(springs: Sequence[Springs], u: Array) -> Array:
-    """Return the nodal forces (n,) [force] that hold springs at the displacements `u` (n,) [length]."""
+    """Return the nodal forces (n,) [force] of springs at the displacements `u` (n,) [length]."""
     if not springs:
         return np.zeros_like(u)
     R = stacked(springs, len(u))
@@ -149,10 +148,10 @@ def spring_force(springs: Sequence[Springs], u: Array) -> Array:
 
 
 def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
-    """Return a warning for each of the springs that costs digits, being so much stiffer than the bodies at its ends.
+    """Return a warning for each spring that is so much stiffer than the bodies at its ends that digits are lost.
 
-    The sum of a body's stiffness and a spring's has the digits of the larger one, and the body's are what is left of them.
-    Springs along an axis to the ground add to the diagonal alone, which costs nothing: they are supports.
+    The sum of the stiffnesses of a body and a spring has the absolute accuracy of the larger one. Springs along an axis
+    to the ground only add to the diagonal, which is harmless: they act as supports.
 
     Parameters
     ----------
@@ -163,7 +162,7 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
     Raises
     ------
     ModelError
-        If fewer than about four digits were left.
+        If fewer than about four digits would remain.
     """
     dim, texts = K.blocksize[0], []
     for spring in springs:
@@ -191,7 +190,7 @@ def _stiffer(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
     row, node = rows.coords[0], rows.coords[1] // dim
     ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
     body = np.bincount(index.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
-    # Not springs that add to the diagonal alone, nor points that no body holds.
+    # Excludes springs that only add to the diagonal, and points without a body.
     coupling = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
     if not coupling.any():
         return 0.0, 0.0

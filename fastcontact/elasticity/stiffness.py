@@ -29,7 +29,7 @@ Indices = NDArray[np.int64]
 
 
 class Owners(NamedTuple):
-    """How threads share the assembly: the part of each point, `owner` (n_points,) of int; the range of cells of each part."""
+    """Division of the assembly among threads: part of each point, `owner` (n_points,), and range of cells of each part."""
 
     owner: NDArray[np.uint8]
     cells: list[tuple[int, int]]
@@ -53,7 +53,7 @@ class Sparsity:
     _owners: dict[tuple[str, int], Owners] = field(default_factory=dict, init=False, repr=False)
 
     def owners(self, mesh: Mesh, name: str) -> Owners:
-        """Return how threads share the assembly of an element, computed once for every number of them."""
+        """Return the division of the assembly of an element, computed once for every number of threads."""
         key = name, len(parallel.portions(*mesh.cells[name].shape))
         if key not in self._owners:
             self._owners[key] = owners(mesh.cells[name], mesh.n_points)
@@ -67,12 +67,12 @@ def sparsity(mesh: Mesh) -> Sparsity:
     start = np.cumsum(sizes, dtype=np.int64)
     nodes = np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in blocks.values())])
     first, cells = pattern_kernels.cells_at_nodes(start, nodes, mesh.n_points)
-    given, parts = (start, nodes, first, cells), parallel.portions(mesh.n_points)
+    arguments, portions = (start, nodes, first, cells), parallel.portions(mesh.n_points)
     count = np.empty(mesh.n_points, np.int32)
-    parallel.shared(lambda part: pattern_kernels.count_neighbours(*given, *part, count), parts)
+    parallel.shared(lambda portion: pattern_kernels.count_neighbours(*arguments, *portion, count), portions)
     indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
     indices = np.empty(indptr[-1], np.int32)
-    parallel.shared(lambda part: pattern_kernels.neighbours(*given, *part, indptr, indices), parts)
+    parallel.shared(lambda portion: pattern_kernels.neighbours(*arguments, *portion, indptr, indices), portions)
     return Sparsity(indptr, indices, {name: _slots(block, indptr, indices) for name, block in blocks.items()})
 
 
@@ -80,8 +80,8 @@ def _slots(cells: Numbers, indptr: Numbers, indices: Numbers) -> Numbers:
     """Return the `slots` of `Sparsity` for one element."""
     slots = np.empty((*cells.shape, cells.shape[1]), np.int32)
 
-    def find(part: tuple[int, int]) -> None:
-        rows = slice(*part)
+    def find(portion: tuple[int, int]) -> None:
+        rows = slice(*portion)
         pattern_kernels.find_slots(cells[rows], indptr, indices, slots[rows])
 
     parallel.shared(find, parallel.portions(*cells.shape))
@@ -143,7 +143,7 @@ def stiffness(
 
 
 def is_isotropic(moduli: Array) -> Mask:
-    """Return which moduli (n_materials,) are isotropic but for round-off: element loops in 3D have a shorter form for these.
+    """Return which moduli (n_materials,) are isotropic up to round-off, for which element loops in 3D have a shorter form.
 
     Parameters
     ----------
@@ -159,9 +159,9 @@ def is_isotropic(moduli: Array) -> Mask:
 
 
 def of_cells(material: Numbers) -> Numbers:
-    """Return one number for each cell (n_cells,) of int, where nothing varies inside the cell the only one.
+    """Return one material number for each cell (n_cells,) of int, unique if nothing varies inside the cell.
 
-    Of `material` (n_cells,) or (n_cells, n_q) of int.
+    The argument `material` (n_cells,) of int may also be (n_cells, n_q).
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
@@ -184,12 +184,12 @@ def _add_part(
 ) -> int:  # fmt: skip
     """Add the rows of a part of the cells of one element to `data` (n_blocks, dim, dim).
 
-    `moduli` are these, which of them are isotropic, their split, and which have incompatible modes. Returns the number of
-    the first cell with a Jacobian that is not positive, or -1.
+    `moduli` are the moduli, which of them are isotropic, their split, and which have incompatible modes. Returns the
+    number of the first cell with a Jacobian that is not positive, or -1.
     """
     (D, isotropic, split, bends), tables = moduli, elements.get(name).tables
-    owner, parts = pattern.owners(mesh, name)
-    rows = slice(*parts[number])
+    owner, row_ranges = pattern.owners(mesh, name)
+    rows = slice(*row_ranges[number])
     cells, material, slots = mesh.cells[name][rows], material[rows], pattern.slots[name][rows]
     target = axisymmetric, slots, owner, number, data
     for tables_of_pass, numbers in _passes(tables, material):
@@ -214,8 +214,8 @@ def _add_part(
 def owners(cells: Numbers, n_points: int) -> Owners:
     """Return the part of each point, and the cells that each part computes, of `cells` (n_cells, n_nodes).
 
-    A point belongs to the first portion of the cells that has it, so that a part has the rows of its own cells and of few
-    others. Portions are chosen so that parts compute the same number of cells, those others included.
+    A point belongs to the first portion of the cells that contains it, so that a part computes its own cells and few others.
+    Portions are chosen so that all parts compute the same number of cells, including these others.
     """
     portions = parallel.portions(*cells.shape)
     if len(portions) == 1:
@@ -228,7 +228,7 @@ def owners(cells: Numbers, n_points: int) -> Owners:
 
 
 def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indices]:
-    """Return the owners for portions of the cells that begin and end at `ends`, and how many cells each computes."""
+    """Return the owners for portions of the cells that begin and end at `ends`, and the number of cells each computes."""
     owner = np.full(n_points, parallel.MOST, np.uint8)
     last, work = np.zeros((2, len(ends) - 1), np.int64)
     pattern_kernels.first_parts(cells, ends, parallel.MOST, owner, last, work)

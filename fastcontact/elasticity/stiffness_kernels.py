@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Sparsity pattern of the stiffness matrix by node blocks, and the block index of each node pair of each cell.
 
-Cells of all elements stand in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
+Cells of all elements are in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
 """
 
 import numpy as np
@@ -82,10 +82,10 @@ def find_slots(cells, indptr, indices, slots):
 
 @kernel
 def first_parts(cells, ends, unowned, owner, last, work):
-    """Fill `owner` (n_points,), given as `unowned`, with the first of the parts of the cells that has each point.
+    """Fill `owner` (n_points,), initially `unowned`, with the first part of the cells that contains each point.
 
-    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``; ``work[p]`` cells have a point that it owns, none of
-    them from ``last[p]`` on. Both (n_parts,) are given as zeros.
+    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``; ``work[p]`` cells before ``last[p]`` have a point that it
+    owns. Both (n_parts,) are initially zero.
     """
     for part in range(len(ends) - 1):
         for c in range(ends[part], ends[part + 1]):

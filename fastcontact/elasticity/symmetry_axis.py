@@ -12,7 +12,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 def axis_nodes(mesh: Mesh) -> Indices:
     """Return the nodes of solid cells on the axis x = 0, ascending.
 
-    A body that reaches the axis stays closed there: by symmetry its points on the axis move along it only.
+    By symmetry, points of a body on the axis only move along the axis.
     """
     near = np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max()
     used = np.zeros(mesh.n_points, bool)

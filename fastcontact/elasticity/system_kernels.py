@@ -16,19 +16,19 @@ def _near(i, indptr, indices, supported_nodes):
 
 
 @interpretable_kernel
-def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high, start, columns, taken, moves):
+def take_out(indptr, indices, data, supported, supported_nodes, pivots, low, high, start, columns, removed, moves):
     """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
 
     Parameters
     ----------
     supported : ndarray of bool (n_rows, size), supported_nodes : ndarray of bool (n_rows,)
-        Which components have a support, and which nodes have one.
+        Components with a support, and nodes with one.
     kept : (n,)
-        What stays on the diagonal.
+        Values that remain on the diagonal.
     low, high : int
-        Block rows `low` to ``high - 1`` are looked at.
+        Block rows `low` to ``high - 1`` are processed.
     start : (n + 1,)
-        Where rows begin; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with how many there are.
+        Row offsets; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with the number of entries.
     columns, taken : (n_taken,)
         Filled if it `moves` numbers.
     moves : bool
@@ -43,10 +43,10 @@ def take_out(indptr, indices, data, supported, supported_nodes, kept, low, high,
                 j = indices[k]
                 for b in range(size):
                     if supported[i, a] or supported[j, b]:
-                        stays = kept[row] if size * j + b == row else 0.0
+                        stays = pivots[row] if size * j + b == row else 0.0
                         if data[k, a, b] != stays:
                             if moves:
-                                columns[at], taken[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
+                                columns[at], removed[at], data[k, a, b] = size * j + b, data[k, a, b] - stays, stays
                             at += 1
             if not moves:
                 start[row + 1] = at

@@ -35,26 +35,26 @@ class Temperature:
     value : float, callable or ndarray (n_points,)
         A number, a function of the position, or a value for each point of the mesh [temperature].
     reference : float
-        At which there is no thermal strain [temperature].
+        Temperature without thermal strain [temperature].
     ramp : tuple, optional
         History of the rise over the reference.
     times : tuple of float
-        Instants of the history of which it is a part, if it is one.
+        Instants of the history to which it belongs, if any.
     place : int
-        Which of them it is that of.
+        Index of its own instant in `times`.
     """
 
     groups: tuple[str, ...] | None
     value: Value | Array
     reference: float
     ramp: Table | None = None
-    # Of a history by instants: these, and which one it is; told by `histories`.
+    # For a history by instants, set by `histories`: the instants, and the index of this one.
     times: tuple[float, ...] = field(default=(), init=False)
     place: int = field(default=0, init=False)
 
     @property
     def name(self) -> str:
-        """Where it is given, for messages."""
+        """Description with the groups, for messages."""
         return f"the temperature of {listed(self.groups)}"
 
     @property
@@ -63,7 +63,7 @@ class Temperature:
         return (EVERYWHERE,) if self.groups is None else self.groups
 
     def check(self, mesh: Mesh) -> None:
-        """Raise MeshError or ModelError if a group, the value or the reference cannot be."""
+        """Raise MeshError or ModelError if a group, the value or the reference is not admissible."""
         check_solids(mesh, self.groups, ": it has no temperature")
         check_number(f"the reference of {self.name}", self.reference)
         if not isinstance(self.value, np.ndarray):
@@ -88,14 +88,14 @@ class Temperature:
 
 
 def checked_value(value: Any) -> Any:
-    """Return a temperature, a list of numbers as an array."""
+    """Return a temperature, with lists of numbers as arrays."""
     return np.array(value, float) if isinstance(value, (list, tuple, np.ndarray)) and np.ndim(value) else value
 
 
 def histories(
     groups: tuple[str, ...] | None, values: Array, reference: float, times: Sequence[float]
 ) -> list[Temperature]:
-    """Return a temperature for each of several instants, that between them follow one another linearly.
+    """Return a temperature for each of several instants, between which they are interpolated linearly.
 
     Parameters
     ----------

@@ -24,17 +24,17 @@ AXES = ("x", "y", "z", "radius")
 @typed(ModelError)
 @dataclass(frozen=True)
 class Tabulated:
-    """A function of one coordinate, by a table: straight between its places, constant before the first and after the last.
+    """A tabulated function of one coordinate: piecewise linear, and constant beyond both ends.
 
-    For material constants, temperatures, pressures and other values that may be functions of the position.
-    ModelError unless places and values are finite numbers, and places ascend.
+    For material constants, temperatures, pressures and other values that may be functions of position. ModelError
+    unless coordinates and values are finite and coordinates ascend.
 
     Parameters
     ----------
     along : str
-        ``"x"``, ``"y"``, ``"z"``, or ``"radius"``: the distance from the axis z, in the plane from the origin.
+        ``"x"``, ``"y"``, ``"z"``, or ``"radius"``, the distance from the z axis, in the plane from the origin.
     table : sequence of (float, float)
-        Place [length] and value [unit of the quantity] in each row.
+        Coordinate [length] and value [unit of the quantity] in each row.
 
     Examples
     --------
@@ -87,7 +87,7 @@ class Cells:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of cells."""
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
@@ -112,9 +112,9 @@ class Varying:
     given : callable or ndarray
         A function from positions (n, dim) [length] to numbers (n,), or numbers for each cell or each point.
     cells : Cells, optional
-        Those that have the material, once they are known.
+        Cells with the material, once they are known.
     name : str
-        For messages.
+        Name for messages.
     """
 
     def __init__(self, given: Any, cells: Cells | None = None, name: str = "the constant") -> None:
@@ -139,32 +139,32 @@ class Varying:
         low, high = self.range
         return f"{low:{spec}} to {high:{spec}}"
 
-    def _place(self, given: Array, cells: Cells) -> None:
-        """Find out from its length what an array has a number for."""
+    def _place(self, values: Array, cells: Cells) -> None:
+        """Determine from its length whether an array is by cell or by point."""
         mesh = cells.mesh
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
         counts = ", ".join(f"{count} {unit}" for unit, count in lengths.items())
-        column = given.ndim == 2 and given.shape[1] == 1
+        column = values.ndim == 2 and values.shape[1] == 1
         if column:
-            given = given[:, 0]
+            values = values[:, 0]
             del lengths["points of the mesh"]
-        if given.ndim != 1 or given.dtype.kind not in "fiu" or len(given) not in lengths.values():
+        if values.ndim != 1 or values.dtype.kind not in "fiu" or len(values) not in lengths.values():
             raise ModelError(
-                f"{self._name} is an array of {given.dtype} of shape {given.shape}: it must have a number for each cell of "
+                f"{self._name} is an array of {values.dtype} of shape {values.shape}: it must have a number for each cell of "
                 f"the material or of the mesh, or for each point ({counts})"
             )
-        if not column and len(given) == mesh.n_points and len(given) in (cells.count, total):
+        if not column and len(values) == mesh.n_points and len(values) in (cells.count, total):
             raise ModelError(
-                f"{self._name} has {len(given)} numbers, and there are as many cells as points: give those of cells as a "
+                f"{self._name} has {len(values)} numbers, and there are as many cells as points: give those of cells as a "
                 "column, shape (n, 1), those of points as a function"
             )
-        if not np.isfinite(given).all():
-            raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(given))[0])}")
-        if len(given) == mesh.n_points and not column:
-            self._nodal = given.astype(float)
+        if not np.isfinite(values).all():
+            raise ModelError(f"{self._name} is not finite at row {int(np.flatnonzero(~np.isfinite(values))[0])}")
+        if len(values) == mesh.n_points and not column:
+            self._nodal = values.astype(float)
             return
-        self._by_cell = _by_cell(given, cells)
+        self._by_cell = _by_cell(values, cells)
 
     @property
     def inside(self) -> bool:
@@ -173,7 +173,7 @@ class Varying:
 
     @cached_property
     def range(self) -> tuple[float, float]:
-        """The smallest and the largest number in its cells."""
+        """The smallest and the largest value in its cells."""
         assert self.cells is not None
         samples = [self.at(*sample) for sample in self.cells.samples()]
         return float(min(values.min() for values in samples)), float(max(values.max() for values in samples))
@@ -196,18 +196,18 @@ class Varying:
 class CellAxes(Varying):
     """Axes (n_cells, 3, 3) of a material that differ from cell to cell, unit vectors in rows [-].
 
-    For each cell of the material, or of the mesh.
+    One for each cell of the material, or of the mesh.
     """
 
-    def _place(self, given: Array, cells: Cells) -> None:
-        """Find out from its length whether an array has axes for the cells of the material or of the mesh."""
+    def _place(self, values: Array, cells: Cells) -> None:
+        """Determine from its length whether an array has axes for the cells of the material or of the mesh."""
         total = sum(map(len, cells.mesh.solids.values()))
-        if len(given) not in (cells.count, total):
+        if len(values) not in (cells.count, total):
             raise ModelError(
-                f"the axes of a material are {len(given)}: they must be as many as its cells, {cells.count}, or those of the "
-                f"mesh, {total}"
+                f"the axes of a material are {len(values)}: they must be as many as its cells, {cells.count}, or those of "
+                f"the mesh, {total}"
             )
-        self._by_cell = _by_cell(given, cells)
+        self._by_cell = _by_cell(values, cells)
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the axes (n_rows * n, 3, 3) [-] at points of cells, see `Varying.at`."""
@@ -216,27 +216,27 @@ class CellAxes(Varying):
         return np.repeat(self._by_cell[name][rows], len(N), axis=0)
 
 
-def _by_cell(given: Array, cells: Cells) -> dict[str, Array]:
-    """Return by element the values (n_cells, ...) that are `given` for `cells` or for all solid cells; NaN elsewhere."""
+def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
+    """Return the values `values` for `cells` or for all solid cells, by element; NaN elsewhere."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
-        blocks[name] = np.full((len(block), *given.shape[1:]), np.nan)
-        rows = np.arange(len(block)) if len(given) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
-        blocks[name][rows] = given[first : first + len(rows)]
+        blocks[name] = np.full((len(block), *values.shape[1:]), np.nan)
+        rows = np.arange(len(block)) if len(values) != cells.count else cells.rows.get(name, np.empty(0, np.intp))
+        blocks[name][rows] = values[first : first + len(rows)]
         first += len(rows)
     return blocks
 
 
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
-    """Return places (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int, by shape values `N`.
+    """Return positions (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int.
 
-    `N` is (n, n_nodes) [-].
+    `N` (n, n_nodes) [-] are the shape values.
     """
     return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
 
 
 def wrapped(value: Any, vector: bool = False) -> Any:
-    """Return a constant as it is if it is a number, else as `Varying`; with `vector`, each of a sequence."""
+    """Return a number unchanged, and other constants as `Varying`; with `vector`, for each of a sequence."""
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
@@ -256,10 +256,10 @@ def wrapped(value: Any, vector: bool = False) -> Any:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Return a constant, or each of a tuple of them, after `change`."""
+    """Return `change` of a constant, or of each of a tuple."""
     return tuple(change(v) for v in value) if isinstance(value, tuple) else change(value)
 
 
 def varying(value: Any) -> list[Varying]:
-    """Return the constants that vary of a constant, or of a tuple of them."""
+    """Return the varying ones of a constant, or of a tuple of constants."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

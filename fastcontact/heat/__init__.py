@@ -1,1 +1,1 @@
-"""Heat: conduction in the solid cells, its loads, and the conductance of contacts."""
+"""Heat conduction in the solid cells: matrix, loads, and conductance of contacts."""

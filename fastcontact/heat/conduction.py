@@ -1,4 +1,4 @@
-"""Steady conduction of heat in the solid cells: the matrix of Fourier's law, and the flux that temperatures drive."""
+"""Steady heat conduction in the solid cells: the conduction matrix of Fourier's law, and the heat flux."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Conduction:
     ----------
     mesh : Mesh
     kinematics : str
-        In axisymmetry over the full circle, in the plane by unit thickness.
+        Axisymmetric models are integrated over the full circle, plane ones per unit thickness.
     materials : sequence of Material
     number : mapping of str to ndarray of int (n_cells,)
-        By solid element: every cell's material.
+        By solid element: the material number of every cell.
     displacement : ndarray (n_points, dim), optional
-        Of the configuration; conductivities are those of reference positions [length].
+        Displacement of the configuration; conductivities are evaluated at reference positions [length].
     """
 
     mesh: Mesh
@@ -54,7 +54,7 @@ class Conduction:
     def matrix(self) -> csr_array:
         """Return the conduction matrix (n_points, n_points): integrals of ``grad N_a . k . grad N_b`` [power / temperature].
 
-        By rules that are exact for constant conductivities on straight cells.
+        Quadrature is exact for constant conductivities on straight cells.
         """
         pattern = sparsity(self.mesh)
         values = np.zeros(len(pattern.indices))
@@ -65,7 +65,7 @@ class Conduction:
         return csr_array((values, pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
-        """Return the mean heat flux (n_solids, dim) of every cell [power / area], by temperatures (n_points,)."""
+        """Return the mean heat flux (n_solids, dim) of every cell [power / area] for temperatures (n_points,)."""
         flux = []
         for name, rows in self._cells():
             gradient, k, volume = self._at(name, rows)
@@ -75,7 +75,7 @@ class Conduction:
         return np.concatenate(flux)
 
     def _cells(self) -> Iterator[tuple[str, Indices]]:
-        """Yield elements and numbers (n,) of cells, so many at a time as memory bears."""
+        """Yield elements and numbers (n,) of cells, in portions that limit the memory."""
         for name, cells in self.mesh.solids.items():
             n_q = len(integration_rule(elements.get(name))[1])
             size = max(1, AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))
@@ -83,7 +83,7 @@ class Conduction:
                 yield name, np.arange(first, min(first + size, len(cells)))
 
     def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
-        """Return gradients (c, q, n, dim) [1 / length], conductivities (c, q, dim, dim) and volumes (c, q) at the points."""
+        """Return gradients (c, q, n, dim) [1 / length], conductivities (c, q, dim, dim), volumes (c, q) at all points."""
         mesh, (xi, weights) = self.mesh, integration_rule(elements.get(name))
         N, dN = elements.get(name).shape(xi), elements.get(name).gradient(xi)
         nodes = mesh.cells[name][rows]

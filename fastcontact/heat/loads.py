@@ -1,7 +1,7 @@
-"""What heats or cools solid cells: prescribed temperatures, fluxes, films, sources, heat at nodes.
+"""Heat loads of solid cells: prescribed temperatures, fluxes, films, sources, nodal heat.
 
-Powers of nodes are integrals with the shape functions, in axisymmetry over the full circle, in the plane by unit thickness.
-They are those over the areas and volumes of a `deformed` mesh, with values by positions in the reference mesh.
+Nodal powers are integrals with the shape functions, in axisymmetry over the full circle, in the plane per unit thickness.
+They use areas and volumes of the `deformed` mesh, and values at positions in the reference mesh.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ from fastcontact.mesh.mesh import Mesh
 
 
 class TemporaryHeat(Load):
-    """A prescribed temperature or a film, which acts in the load steps from one instant to another."""
+    """A prescribed temperature or a film that acts in the load steps between two instants."""
 
     begins: float
     ends: float
 
     @property
     def label(self) -> str:
-        """What tells it from others of the same kind and group."""
+        """Label that distinguishes the load from others of the same kind and group."""
         return self.name if self.begins == -np.inf else f"{self.name} from {self.begins:g}"
 
     @property
     def temporary(self) -> bool:
-        """Whether it does not act in all load steps."""
+        """Whether the load does not act in all load steps."""
         return self.begins > -np.inf or self.ends < np.inf
 
     def acts_from(self, begin: float) -> bool:
-        """Return whether it acts in the load step that begins at an instant."""
+        """Return whether the load acts in the load step that begins at an instant."""
         return self.begins <= begin < self.ends
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
-        """Raise MeshError or ModelError if it cannot act on this mesh."""
+        """Raise MeshError or ModelError if the load cannot act on this mesh."""
         super().check(mesh, kinematics)
         if not self.begins < self.ends:
             raise ModelError(f"{self.name} begins at {self.begins:g} and ends at {self.ends:g}: it must begin before")
@@ -60,9 +60,9 @@ class TemporaryHeat(Load):
 
 @dataclass(frozen=True)
 class FixedTemperature(TemporaryHeat):
-    """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise over the reference.
+    """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise above the reference.
 
-    One that begins later goes from the rise that it finds there, `reached` (n_points,), to the next point of its history.
+    One that begins later starts from the current rise, `reached` (n_points,), and leads to the next point of its history.
     """
 
     KIND = "the temperature"
@@ -74,7 +74,7 @@ class FixedTemperature(TemporaryHeat):
     reached: Array | None = None
 
     def check(self, mesh: Mesh, kinematics: str) -> None:
-        """Raise MeshError or ModelError if it cannot act on this mesh."""
+        """Raise MeshError or ModelError if the load cannot act on this mesh."""
         super().check(mesh, kinematics)
         if self.begins > -np.inf and self.ramp is None:
             raise ModelError(
@@ -83,7 +83,7 @@ class FixedTemperature(TemporaryHeat):
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the history of the value, and that of what it finds: one goes as the other comes."""
+        """Return the histories of the value and of the initial rise, which fades out as the value fades in."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -94,7 +94,7 @@ class FixedTemperature(TemporaryHeat):
 
 
 class Heating(Load):
-    """A load of heat that does not depend on the temperature."""
+    """A heat load that is independent of the temperature."""
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
         """Return the powers (n_points,) of the nodes of the `deformed` mesh at multiplier 1, into the body [power]."""
@@ -124,7 +124,7 @@ class HeatFlux(Heating):
 
 @dataclass(frozen=True)
 class HeatSource(VolumeLoad, Heating):
-    """Heat by volume [power / length^3] in groups of solid cells, or in all."""
+    """Heat per volume [power / length^3] in groups of solid cells, or in all."""
 
     KIND = "the heat source"
     groups: tuple[str, ...] | None
@@ -140,7 +140,7 @@ class HeatSource(VolumeLoad, Heating):
 
 @dataclass(frozen=True)
 class NodalHeat(Heating):
-    """Heat [power] at every node of a group."""
+    """Nodal heat [power] at every node of a group."""
 
     KIND = "the heat at nodes"
     group: str
@@ -165,7 +165,7 @@ class Film(TemporaryHeat):
     coefficient : float or callable
         [power / (area temperature)].
     ambient : float or callable
-        Temperature of the surroundings [temperature]; histories multiply its rise over the reference.
+        Temperature of the surroundings [temperature]; histories multiply its rise above the reference.
     """
 
     KIND: ClassVar[str] = "the film"
@@ -182,10 +182,10 @@ class Film(TemporaryHeat):
         return [self.coefficient, self.ambient]
 
     def exchange(self, mesh: Mesh, kinematics: str, deformed: Mesh, reference: float) -> tuple[csr_array, Array]:
-        """Return the matrix (n_points, n_points) [power / temperature] and the powers (n_points,) by the rise of the ambient.
+        """Return the matrix (n_points, n_points) [power / temperature] and the powers (n_points,) of the ambient rise.
 
-        The latter at multiplier 1 [power]; `reference` is the temperature that rises count from [temperature]. ModelError if
-        a coefficient is negative.
+        The powers are those at multiplier 1 [power]; rises are relative to `reference` [temperature]. Raises ModelError if a
+        coefficient is negative.
         """
         entries, powers = Entries(), np.zeros((mesh.n_points, 1))
         for element, facets in facets_of(mesh, self.group).items():

@@ -1,4 +1,4 @@
-"""Which bodies prescribed temperatures and films reach, through what conducts between bodies."""
+"""Search for bodies without thermal connection to a prescribed temperature or a film."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastcontact.arrays import AnyArray, Indices, Mask
 
 
 def not_reached(body: AnyArray, held: Mask, joined: AnyArray) -> Indices:
-    """Return the numbers of bodies whose steady temperature nothing determines, ascending.
+    """Return the numbers of bodies with undetermined steady temperature, ascending.
 
     Parameters
     ----------

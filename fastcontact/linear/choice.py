@@ -13,14 +13,14 @@ from fastcontact.linear.factors.factor_solver import AFFORDABLE
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
-# Solvers that need a package which is not among the dependencies, and the extra that brings it.
+# Solvers that need an optional package, and the extra that installs it.
 OPTIONAL = {"cholmod": ("kvxopt", "cholmod")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
-# The largest relative residual with which a solution is one.
+# Largest admissible relative residual.
 LOOSEST = 1e-3
-# Above these sizes a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second where
-# constraints need columns of K^-1, which factors give at once and multigrid one solution each.
+# Sizes above which a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second applies
+# where constraints need columns of K^-1, which a factorisation provides at once and multigrid by one solution each.
 DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
 DIRECT_WITH_COLUMNS_UP_TO = AFFORDABLE
 
@@ -41,15 +41,15 @@ def make(
     tolerance : float
         Relative residual of iterative solvers, at most 0.001.
     precision : {"single", "double"}, optional
-        Of the multigrid cycle, single by default; direct solvers work in double precision always.
+        Precision of the multigrid cycle, single by default; direct solvers always work in double precision.
     columns : bool
-        Whether constraints cannot be eliminated, but need columns of ``K^-1``: those with a full compliance of their own.
-        For ``"auto"``.
+        Whether constraints cannot be eliminated but need columns of ``K^-1``, as those with a full compliance do. For
+        ``"auto"``.
 
     Raises
     ------
     ModelError
-        If there is no such solver, a package that it needs is missing, or the tolerance makes no sense.
+        If there is no such solver, a package that it needs is missing, or the tolerance is out of range.
     """
     check_tolerance(tolerance)
     if name == "auto":
@@ -66,7 +66,7 @@ def make(
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Raise ModelError if a tolerance of linear solvers makes no sense."""
+    """Raise ModelError if a tolerance of linear solvers is out of range."""
     if not 0.0 < tolerance <= LOOSEST:
         raise ModelError(
             f"the tolerance {tolerance} of the linear solver must be positive and at most {LOOSEST}, such as 1e-10"
@@ -74,7 +74,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def tight_enough(tolerance: float, relative: float) -> float:
-    """Return a `tolerance` that was checked, or the criterion on forces out of balance where that is smaller."""
+    """Return a checked `tolerance`, or the criterion on the out-of-balance force if that is smaller."""
     check_tolerance(tolerance)
     if tolerance > relative:
         log.info("linear solver: the tolerance %.1e falls to %.1e, the criterion on balance", tolerance, relative)
@@ -83,7 +83,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
 
 
 def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
-    """Return the solver chosen by ``"auto"``, and why."""
+    """Return the solver chosen by ``"auto"``, and the reason."""
     limit = (DIRECT_WITH_COLUMNS_UP_TO if columns else DIRECT_UP_TO)[dim]
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"

@@ -1,7 +1,7 @@
 """Schur complement of linear constraints: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
 
-Only the degrees of freedom that appear in B matter. Their part of ``K^-1`` is computed when they first appear and
-kept, so further active sets and pairings cost a small dense solution and one solution with K each.
+Only the degrees of freedom in B matter. Their rows and columns of ``K^-1`` are computed at their first appearance and cached,
+so further active sets and pairings cost a small dense solution and one solution with K each.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-# Right-hand sides at a time: whole columns of K^-1 are long, and only short parts of them are kept.
+# Number of right-hand sides at a time: full columns of K^-1 are long, and only short parts of them are stored.
 CHUNK = 32
-# Constraints whose full compliance is formed and factorised, at most: 3.2 GB a copy, and minutes; with friction, where
-# Newton's method factorises it several times for each pairing and it is not symmetric, ten seconds each.
+# Largest number of constraints whose full compliance is formed and factorised: 3.2 GB per copy, and minutes; with friction,
+# where Newton's method factorises a nonsymmetric matrix several times for each pairing, ten seconds each.
 MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
-# Formulations whose constraints no solver needs columns of the inverse for.
+# Formulation whose constraints never need columns of the inverse.
 CHEAP = 'formulation="mortar" with multipliers="dual"'
 
 
 class TooManyColumnsError(ConvergenceError):
-    """Columns of the inverse would cost an iterative solver more than factors do."""
+    """Columns of the inverse would cost an iterative solver more than a factorisation."""
 
     def __init__(self, count: int) -> None:
         super().__init__(
@@ -39,7 +39,7 @@ class TooManyColumnsError(ConvergenceError):
 
 
 def check_rows(count: int, most: int | None = None) -> None:
-    """Refuse a full compliance of so many constraints.
+    """Refuse a full compliance of too many constraints.
 
     Raises
     ------
@@ -56,27 +56,27 @@ def check_rows(count: int, most: int | None = None) -> None:
 
 
 class InverseColumns:
-    """Rows and columns of ``K^-1`` for the degrees of freedom asked for so far.
+    """Rows and columns of ``K^-1`` for the degrees of freedom requested so far.
 
     Parameters
     ----------
     n : int
         Size of K.
     solve_many : method
-        Of the solver that keeps these columns; maps right-hand sides (n, k) [force] to solutions (n, k) [length].
+        Method of the solver that owns these columns; maps right-hand sides (n, k) [force] to solutions (n, k) [length].
     most : int, optional
-        Columns allowed; all by default.
+        Largest number of columns; unlimited by default.
 
     Attributes
     ----------
     asked : list of ndarray of int
-        Degrees of freedom in the order in which they were solved for: round-off, and what an iterative solver leaves,
-        depend on it.
+        Degrees of freedom in the order in which they were solved for, on which round-off and errors of iterative solutions
+        depend.
     """
 
     def __init__(self, n: int, solve_many: Callable[[Array], Array], most: int | None = None) -> None:
         self._most = n if most is None else most
-        # A weak reference: solver and columns would keep each other, and the factors, the largest thing there is, alive.
+        # A weak reference: a cycle of solver and columns would keep the factors, the largest objects, alive.
         self._solve_many = weakref.WeakMethod(solve_many)
         self._place = np.full(n, -1, np.intp)
         self._dofs = np.empty(0, np.intp)
@@ -84,7 +84,7 @@ class InverseColumns:
         self.asked: list[Indices] = []
 
     def give(self, dofs: Indices, values: Array) -> None:
-        """Take rows and columns `dofs` (k,) of ``K^-1``, known by other means; only while nothing is kept yet."""
+        """Store rows and columns `dofs` (k,) of ``K^-1`` computed otherwise; only while nothing is stored."""
         self._dofs, self._values = dofs, values
         self._place[dofs] = np.arange(len(dofs))
 
@@ -97,17 +97,17 @@ class InverseColumns:
         rows = csr_array((R.data[used], column, starts), shape=(R.shape[0], len(self._dofs)))
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
-    def put_back(self, asked: Sequence[Indices]) -> None:
-        """Keep what was `asked` for, in that order, and nothing else; solve only for what is not kept now."""
-        pairs = zip(self.asked, asked, strict=False)
-        same = next((i for i, (mine, other) in enumerate(pairs) if not np.array_equal(mine, other)), len(asked))
+    def put_back(self, requests: Sequence[Indices]) -> None:
+        """Restore exactly the columns of `requests`, in that order; solve only for missing ones."""
+        pairs = zip(self.asked, requests, strict=False)
+        same = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
         self._forget(sum(len(dofs) for dofs in self.asked[same:]))
         del self.asked[same:]
-        for dofs in asked[len(self.asked) :]:
+        for dofs in requests[len(self.asked) :]:
             self._places(dofs)
 
     def _forget(self, count: int) -> None:
-        """Forget the last `count` columns."""
+        """Discard the last `count` columns."""
         if count:
             self._place[self._dofs[-count:]] = -1
             self._dofs, self._values = self._dofs[:-count], self._values[:-count, :-count].copy()
@@ -145,9 +145,9 @@ def lu_factors(A: Array) -> tuple[Array, Array]:
     Raises
     ------
     LinAlgError
-        If it is singular but for round-off.
+        If it is singular up to round-off.
     """
-    with warnings.catch_warnings(action="ignore"):  # of an exact zero
+    with warnings.catch_warnings(action="ignore"):  # warning of an exactly zero pivot
         lu, pivots = lu_factor(A)
     if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
@@ -164,7 +164,7 @@ def multipliers(
 ) -> Array:  # fmt: skip
     """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length].
 
-    C is a matrix (m, m), its diagonal (m,) where it has no more, or None.
+    C is a matrix (m, m), the diagonal (m,) of a diagonal one, or None.
     """
     return solve_multipliers(columns.of_rows(B), wanted, C)
 

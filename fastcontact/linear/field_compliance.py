@@ -1,13 +1,14 @@
 r"""Compliance of point forces outside a multiplier field, and the equivalent equations for the field.
 
-Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. What the field does not
-represent complies: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
+Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. Components outside the field
+are compliant: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
 field over these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
-:math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes but at the
-edge of the contact. Springs of the stiffness rho W act along the rows B: on what the field does not represent.
+:math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes except at
+the edge of the contact. Springs of the stiffness rho W act along the rows B, on components outside the field.
 
-Points that are softer by S, as with a penalty, have the compliance :math:`C + S`. With :math:`W' = W / (1 + \rho W S)` in
-place of W, which is in the equations of the field as in the springs, E becomes :math:`E + P^T W W' S P`: all values comply.
+Points with an additional compliance S, such as a penalty, have the compliance :math:`C + S`. With
+:math:`W' = W / (1 + \rho W S)` in place of W, in the equations of the field as well as in the springs, E becomes
+:math:`E + P^T W W' S P`: all values are compliant.
 """
 
 from __future__ import annotations
@@ -24,22 +25,22 @@ from fastcontact.arrays import Array, Indices, Mask
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """See the module; exact constraints are fields of one point without springs.
+    """See the module; exact constraints are represented by fields of one point without springs.
 
     Attributes
     ----------
     P : csr_array (m, k)
-        Field values to the points of the equations [-].
+        From field values to the points of the equations [-].
     weights : ndarray (m,)
         W, positive [area].
     stiffness : ndarray (m,)
         rho W [force / length].
     others : csr_array (k, k)
-        E: the mass matrix of the points without equations over rho, and what softer points add.
+        E: the mass matrix of the points without equations over rho, plus the contribution of compliant points.
     dense : callable
         Returns C (m, m) [length / force].
     bordered : bool
-        Whether values without compliance stay unknowns, too: on quadratic facets, whose equations resemble each other.
+        Whether values without compliance remain unknowns, too: on quadratic facets, whose equations are nearly dependent.
     """
 
     P: csr_array
@@ -50,25 +51,25 @@ class FieldCompliance:
     bordered: bool = False
 
     @classmethod
-    def stacked(cls, parts: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
-        """Return several, one below the other."""
+    def stacked(cls, compliances: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
+        """Return the block-diagonal combination of several compliances."""
         return cls(
-            csr_array(block_diag([part.P for part in parts], format="csr")),
-            np.concatenate([part.weights for part in parts]),
-            np.concatenate([part.stiffness for part in parts]),
-            csr_array(block_diag([part.others for part in parts], format="csr")),
+            csr_array(block_diag([compliance.P for compliance in compliances], format="csr")),
+            np.concatenate([compliance.weights for compliance in compliances]),
+            np.concatenate([compliance.stiffness for compliance in compliances]),
+            csr_array(block_diag([compliance.others for compliance in compliances], format="csr")),
             dense,
-            any(part.bordered for part in parts),
+            any(compliance.bordered for compliance in compliances),
         )
 
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
-        """Return that of m exact constraints."""
+        """Return the compliance of m exact constraints."""
         identity = csr_array(diags_array(np.ones(m)))
         return cls(identity, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
     def softened(self, softness: Array, dense: Callable[[], Array]) -> FieldCompliance:
-        """Return that of points softer by `softness` (m,) [length / force]."""
+        """Return the compliance increased by `softness` (m,) at the points [length / force]."""
         share = 1.0 / (1.0 + self.stiffness * softness)
         weights = self.weights * share
         added = self.P.T @ diags_array(self.weights * weights * softness) @ self.P
@@ -81,7 +82,7 @@ class FieldCompliance:
         shares = csr_array(self.P.T @ diags_array(self.weights))
         size = np.asarray(abs(shares).sum(axis=1))
         touched = np.flatnonzero(size > 0.0)
-        # Each in units of its own area: equations at the edge of the contact are small ones.
+        # Each equation is scaled by its area, which is small at the edge of the contact.
         units = 1.0 / size[touched]
         shares = csr_array(diags_array(units) @ shares[touched])
         edge = (self.others.diagonal()[touched] > 0.0) | self.bordered
@@ -97,16 +98,16 @@ class FieldCompliance:
         if across.nnz:
             beside = np.flatnonzero(np.diff(across.indptr))
             of_beside = csr_array(across[beside])
-            gives = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
+            correction = of_beside @ splu(csc_array(self.others[rest][:, rest])).solve(of_beside.T.toarray())
             selection = csr_array((np.ones(len(beside)), (beside, np.arange(len(beside)))), (len(given), len(beside)))
-            E = csr_array(E - selection @ csr_array(gives) @ selection.T)
+            E = csr_array(E - selection @ csr_array(correction) @ selection.T)
         in_units = diags_array(units)
         return csr_array(in_units @ E @ in_units)
 
 
 @dataclass(frozen=True, eq=False)
 class FieldEquations:
-    """``rows u + E p = right``, p the values of the field that some equation touches; ``P p`` are pressures at the points.
+    """``rows u + E p = right``, p the values of the field with any equation; ``P p`` are pressures at the points.
 
     Attributes
     ----------
@@ -114,11 +115,11 @@ class FieldEquations:
     right : ndarray (l,)
     P : csr_array (m, l)
     edge : ndarray of bool (l,)
-        Values that stay unknowns: those at the edge of the contact, which are compliant; with a penalty all, see `bordered`.
+        Values that remain unknowns: the compliant ones at the edge of the contact; with a penalty all, see `bordered`.
     compliance : csr_array (e, e)
-        E among those that stay unknowns.
+        E among these unknowns.
     at, units : ndarray (e,)
-        Which values of the field these are, and in which units.
+        Their positions in the field, and their scaling.
     """
 
     rows: csr_array

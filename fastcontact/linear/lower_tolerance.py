@@ -9,7 +9,7 @@ from typing import Any
 from fastcontact.linear.protocol import LinearSolver
 
 log = logging.getLogger("fastcontact")
-# What solutions should leave of what is allowed, and the least relative residual to ask for: round-off leaves no less.
+# Target of the residual over its bound, and the smallest relative residual that round-off allows.
 LEFT, LEAST = 0.1, 1e-15
 
 
@@ -19,7 +19,7 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
     if not tolerance < solver.tolerance:
         return False
     log.info(
-        "linear solver: forces are out of balance by %.1e times what is allowed, its tolerance falls from %.1e to %.1e",
+        "linear solver: forces are out of balance by %.1e times the bound, its tolerance falls from %.1e to %.1e",
         excess, solver.tolerance, tolerance,
     )  # fmt: skip
     solver.asked = solver.tolerance if solver.asked is None else solver.asked
@@ -28,7 +28,7 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
 
 
 def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
-    """Let `solver` have the tolerance of a snapshot, lowered or not."""
-    asked = solver.tolerance if solver.asked is None else solver.asked
-    solver.tolerance = snapshot.get("tolerance", asked)
-    solver.asked = None if solver.tolerance == asked else asked
+    """Restore the tolerance of a snapshot, lowered or not."""
+    requested = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = snapshot.get("tolerance", requested)
+    solver.asked = None if solver.tolerance == requested else requested

@@ -2,8 +2,8 @@
 
 Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
 force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their
-multipliers (m,) are forces [force], their compliance C is a length per force: a matrix (m, m), or its diagonal (m,) where it
-has no more.
+multipliers (m,) are forces [force], their compliance C is a length per force: a matrix (m, m), or the diagonal (m,) of a
+diagonal one.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
-# Relative accuracy of the solutions unless another is asked for.
+# Default relative accuracy of the solutions.
 TOLERANCE = 1e-10
-# Contrasts of materials up to this, see `LinearSolver`, are taken for none.
+# Contrasts of materials up to this, see `LinearSolver`, are ignored.
 MILD = 10.0
-# Called with an unfinished solution (u, multiplier, relative residual); where it returns True, the solver stops there.
+# Called with an unfinished solution (u, multiplier, relative residual); the solver stops if it returns True.
 Monitor = Callable[[Array, Array, float], bool]
 
 
@@ -40,7 +40,7 @@ class Product(Protocol):
 
 @dataclass
 class Counters:
-    """Work done since `prepare`: factorisations or hierarchies built, and solutions or iterations."""
+    """Work done since `prepare`: factorisations or hierarchies, and solutions or iterations."""
 
     setups: int = 0
     iterations: int = 0
@@ -55,10 +55,10 @@ class Loaded(Protocol):
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
-        B has full row rank where C, symmetric and positive semidefinite, is None or singular. Solvers that iterate start
-        from `guess` (n,), call `monitor` from time to time and return the unfinished solution where that returns True;
-        they stop at a relative residual of `tolerance` where that is given and above their own. `nodes` (m,) are the nodes
-        that the equations belong to, a hint which unknowns to eliminate.
+        B has full row rank where C, symmetric and positive semidefinite, is None or singular. Iterative solvers start from
+        `guess` (n,), call `monitor` regularly and return the unfinished solution if it returns True; they stop at a relative
+        residual of `tolerance` if that is given and larger than their own. `nodes` (m,) are the nodes of the equations, whose
+        unknowns are preferred for elimination.
         """
         ...
 
@@ -67,28 +67,28 @@ class Loaded(Protocol):
         ...
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """Return ``K^-1 (f + force)``, shape (n,), right at the `involved` unknowns of `LinearSolver.prepare`.
+        """Return ``K^-1 (f + force)``, shape (n,), valid at the `involved` unknowns of `LinearSolver.prepare`.
 
-        Solvers for which the other unknowns cost extra leave those as they are in `elsewhere` (n,), where that is given.
-        `solve` does the same with its `guess`.
+        Solvers for which the other unknowns are an extra cost copy them from `elsewhere` (n,), if given. `solve` does
+        the same with its `guess`.
         """
         ...
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
-        """Return ``K^-1 (f + force)``, shape (n,); `u` (n,) is what `involved_solution` or `solve` returned for it."""
+        """Return ``K^-1 (f + force)``, shape (n,); `u` (n,) is the result of `involved_solution` or `solve` for it."""
         ...
 
     def condensed(self) -> Loaded | None:
-        """Return the problem of the `involved` unknowns alone, K condensed to them; None from solvers that do not condense.
+        """Return the problem condensed to the `involved` unknowns; None for solvers that do not condense.
 
-        All its vectors and columns are those unknowns, in their order.
+        Its vectors and columns have these unknowns, in their order.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionTerms:
-    """Forces that sliding friction adds to those of equations.
+    """Forces of sliding friction in addition to those of equations.
 
     Attributes
     ----------
@@ -107,7 +107,7 @@ class FrictionTerms:
 
 @runtime_checkable
 class LoadedNonsymmetric(Loaded, Protocol):
-    """Also solves where multipliers act through other rows than those of the equations: sliding friction."""
+    """Solver of systems whose multipliers act through other rows than those of the equations, as in sliding friction."""
 
     @property
     def contrast(self) -> float:
@@ -126,7 +126,7 @@ class LoadedNonsymmetric(Loaded, Protocol):
 
         C (m,) is a diagonal compliance, None stands for zero. S, forces and rows are those of `friction`; without it they
         are zero and B. Equations of one of the `nodes` (m,) may share unknowns. The iteration starts from `guess` (n,) and
-        ends at a relative residual of `tolerance`, or of the solver's own where that is larger.
+        ends at a relative residual of `tolerance`, or at the solver's own if that is larger.
 
         Raises
         ------
@@ -144,28 +144,20 @@ class LinearSolver(Protocol):
     tolerance : float
         Relative accuracy of the solutions [-]; `improve` may lower it.
     asked : float, optional
-        The tolerance that was asked for, where `improve` has lowered it [-].
+        The original tolerance, if `improve` has lowered it [-].
     counters : Counters
-    error : float
-        By how much solutions for nearly the same right-hand side may differ, in units of their largest component, however
-        small `tolerance` is [-].
     gave_up : str
-        Why another way of solving replaced this one; empty where none did.
+        Reason why another method replaced this one; empty if none did.
     contrast : float
         By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
         much, and iterations that need not end with exact solutions go on by so much further [-].
-    basis_transformation : csr_array (n, n), optional
-        Rows of mid nodes of quadratic facets: what they move by where corners do, if gaps are weighted with functions that
-        are linear on facets. A hint which motions to eliminate [-].
     """
 
     tolerance: float
     counters: Counters
     asked: float | None = None
-    error: float = 0.0
     gave_up: str = ""
     contrast: float = 1.0
-    basis_transformation: csr_array | None = None
 
     @property
     def iterative(self) -> bool:
@@ -174,7 +166,7 @@ class LinearSolver(Protocol):
 
     @property
     def condenses(self) -> bool:
-        """Whether, as prepared, the solver has K condensed to the `involved` unknowns."""
+        """Whether the prepared solver has K condensed to the `involved` unknowns."""
         return False
 
     def prepare(
@@ -187,29 +179,28 @@ class LinearSolver(Protocol):
         K : bsr_array (n, n)
             Symmetric and positive definite [force / length].
         rigid_modes : ndarray (n, n_modes)
-            Displacements that cost little energy [length].
+            Near null space of K, the rigid-body modes [length].
         involved : ndarray of int (k,), optional
-            The unknowns that equations may involve, a hint.
+            Unknowns that equations may involve; a hint.
         release : bool
-            Whether a solver that stores K's numbers in its own way may take over their memory and leave K empty. What is
-            returned then multiplies in the place of K.
+            Whether a solver with its own storage of K may reuse the memory of K and leave it empty. The returned object then
+            replaces K in products.
 
         Returns
         -------
         bsr_array or Product
-            K, or what takes its place.
+            K, or its replacement.
         """
         ...
 
     def load(self, f: Array) -> Loaded:
-        """Take the right-hand side f (n,) [force]."""
+        """Return the prepared matrix with the right-hand side f (n,) [force]."""
         ...
 
     def snapshot(self) -> dict[str, Any]:
-        """Return all that later solutions owe to earlier ones: plain numbers, strings and arrays.
+        """Return everything on which later solutions depend, as plain numbers, strings and arrays.
 
-        It is the part of the state of an analysis that the solver has, and is saved with it: arrays are replaced, never
-        written into.
+        It is the solver's part of the state of an analysis, and is saved with it: arrays are replaced, never written into.
         """
         ...
 

@@ -19,10 +19,10 @@ class Entries:
 
     def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
         """Add blocks (n, k, l) at rows (n, k) and columns (n, l); zeros are left out."""
-        kept = np.flatnonzero(values)
-        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[kept])
-        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[kept])
-        self._values.append(values.ravel()[kept])
+        nonzero = np.flatnonzero(values)
+        self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[nonzero])
+        self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[nonzero])
+        self._values.append(values.ravel()[nonzero])
 
     def matrix(self, size: tuple[int, int]) -> csr_array:
         """Return the sum of all entries."""
@@ -46,7 +46,7 @@ def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
 
 
 def rows_of(mean: csr_array, direction: Array) -> csr_array:
-    """Return rows (m, n_dofs): the relative motion (m, n_points) of nodes along their directions (m, dim)."""
+    """Return rows (m, n_dofs) along directions (m, dim) from weights (m, n_points) of nodes."""
     dim = direction.shape[1]
     row = np.repeat(np.arange(mean.shape[0]), np.diff(mean.indptr))
     values = mean.data[:, None] * direction[row]
@@ -72,17 +72,17 @@ def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
     values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
     result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
     if not factor.all():
-        result = result.copy()  # places are moved
+        result = result.copy()  # indices are moved
         result.eliminate_zeros()
     return result
 
 
 def taken(matrix: csr_array, rows: Indices) -> csr_array:
-    """Return `rows` (k,) of a matrix, ascending; the matrix itself where they are all."""
+    """Return `rows` (k,) of a matrix, ascending; the matrix itself if these are all."""
     return matrix if len(rows) == matrix.shape[0] else matrix[rows]
 
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
-    """Return the matrix (m, n), rows empty whose entries are below `least` of the largest in that row of `origin` (m, k)."""
-    kept = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
-    return matrix if kept.all() else scaled(matrix, kept)
+    """Return the matrix (m, n) without rows whose entries are below `least` times the largest in the row of `origin`."""
+    significant = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
+    return matrix if significant.all() else scaled(matrix, significant)

@@ -13,7 +13,7 @@ from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear import springs_kernels
 from fastcontact.linear.sparse_rows import scaled
 
-# Springs that differ by less than this part of their size are alike.
+# Relative difference below which springs count as equal.
 ALIKE = 0.3
 
 
@@ -24,11 +24,11 @@ class Springs:
     Attributes
     ----------
     rows : csr_array (q, n)
-        What each spring is stretched by [-].
+        Rows of the elongation of each spring [-].
     stiffness : ndarray (q,)
-        Not negative [force / length].
+        Stiffness, not negative [force / length].
     through : csr_array (q, n), optional
-        Rows that their forces act along [-]; `rows` by default. What is made of springs for preconditioners has none.
+        Rows along which the forces act [-]; `rows` by default. Springs of preconditioners have none.
     """
 
     rows: csr_array
@@ -56,7 +56,7 @@ class Springs:
         return Springs(rows, np.concatenate([one.stiffness for one in pair]), through)
 
     def under(self, pivots: Indices, weights: csr_array) -> Springs:
-        """Return them where ``u[pivots] = weights u``, weights (m, n); rows are then zero at the pivots."""
+        """Return the springs for ``u[pivots] = weights u``, weights (m, n); rows are then zero at the pivots."""
         R, W, n = self.rows, weights, self.rows.shape[1]
         number = np.full(n, -1, np.int32)
         number[pivots] = np.arange(len(pivots))
@@ -64,27 +64,27 @@ class Springs:
         follows = column >= 0
         starts = np.concatenate([[0], np.cumsum(follows)])[R.indptr]
         followed = csr_array((R.data[follows], column[follows], starts), shape=(R.shape[0], W.shape[0]))
-        kept = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
-        return Springs(csr_array(kept + followed @ W), self.stiffness)
+        unchanged = csr_array((R.data[~follows], R.indices[~follows], R.indptr - starts), shape=R.shape)
+        return Springs(csr_array(unchanged + followed @ W), self.stiffness)
 
     def scaled(self, factor: float, kind: DTypeLike = float) -> Springs:
-        """Return them `factor` times as stiff, in a precision."""
+        """Return springs with `factor` times the stiffness, in a given precision."""
         return Springs(self.rows.astype(kind), (factor * self.stiffness).astype(kind))
 
     def to_dict(self) -> dict[str, AnyArray]:
-        """Return them as plain arrays."""
+        """Return the springs as plain arrays."""
         R = self.rows
         return {"indptr": R.indptr, "indices": R.indices, "data": R.data, "stiffness": self.stiffness}
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, AnyArray], n: int) -> Springs:
-        """Return what `to_dict` has kept, for n unknowns."""
-        shape = (len(kept["stiffness"]), n)
-        return cls(csr_array((kept["data"], kept["indices"], kept["indptr"]), shape=shape), kept["stiffness"])
+    def from_dict(cls, arrays: Mapping[str, AnyArray], n: int) -> Springs:
+        """Return the springs saved by `to_dict`, for n unknowns."""
+        shape = (len(arrays["stiffness"]), n)
+        return cls(csr_array((arrays["data"], arrays["indices"], arrays["indptr"]), shape=shape), arrays["stiffness"])
 
     def alike(self, other: Springs | None) -> bool:
-        """Return whether others act on the same unknowns with nearly the same stiffness."""
+        """Return whether `other` springs act on the same unknowns with nearly the same stiffness."""
         if other is None or self.rows.shape != other.rows.shape:
             return False
-        mine, theirs = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))
-        return bool(abs(mine - theirs).sum() <= ALIKE * abs(theirs).sum())
+        scaled_self, scaled_other = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))
+        return bool(abs(scaled_self - scaled_other).sum() <= ALIKE * abs(scaled_other).sum())

@@ -1,1 +1,1 @@
-"""Meshes: points, cells, named groups; elements and quadrature, mesh makers, mesh files."""
+"""Meshes: points, cells, named groups; elements and quadrature, mesh generators, mesh files."""

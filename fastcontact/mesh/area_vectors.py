@@ -1,4 +1,4 @@
-"""Area vectors of facets: along their normals, as long as they are large."""
+"""Area vectors of facets: normals whose length is the area."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from fastcontact.arrays import Array
 
 
 def area_vectors(corners: Array, dN: Array) -> Array:
-    """Return the area vectors (n, q, dim) by unit of the reference facet [length^(dim - 1)].
+    """Return the area vectors (n, q, dim) per unit of the reference facet [length^(dim - 1)].
 
-    To the right of a line's direction; to where a face's nodes run counter-clockwise.
+    They point to the right of a line's direction, and to the side from which a face's nodes run counter-clockwise.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def area_vectors(corners: Array, dN: Array) -> Array:
 def weighted_area_vectors(
     corners: Array, N: Array, dN: Array, weights: Array, shares: Array, turned: bool
 ) -> tuple[Array, Array]:
-    """Return integrals of the area vectors of facets, and their derivatives by the nodes (Bonet and Wood, 2008, 8.5).
+    """Return integrals of the area vectors of facets, and their derivatives w.r.t. the nodes (Bonet and Wood, 2008, 8.5).
 
     Parameters
     ----------
@@ -37,18 +37,18 @@ def weighted_area_vectors(
     N, dN : ndarray (q, k), ndarray (q, k, dim - 1)
         Their shape functions and derivatives [-].
     weights : ndarray (n, q)
-        Of the quadrature, times what is integrated beside the area.
+        Weights of the quadrature, times additional integrands.
     shares : ndarray (q, k)
-        What integrals there are for each facet: by these weights [-].
+        Weight functions of the k integrals for each facet [-].
     turned : bool
-        Facets of rings, the radius first: over the full circle.
+        Whether to integrate over the full circle, the radius being the first coordinate.
 
     Returns
     -------
     vectors : ndarray (n, k, dim)
         [area]
     derivative : ndarray (n, k, dim, k, dim)
-        By the nodes, which come last [length].
+        Derivative with respect to the nodes, whose indices come last [length].
     """
     normal = area_vectors(corners, dN)
     by_node = np.zeros((*normal.shape[:2], dN.shape[1], corners.shape[2], corners.shape[2]))

@@ -1,4 +1,4 @@
-"""Names of groups that go with another one: they are its name and one of these."""
+"""Suffixes of the names of groups that accompany another group."""
 
 # Facets on the other side of a cut along the group.
 OPPOSITE = " opposite"

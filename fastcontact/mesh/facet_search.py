@@ -1,4 +1,4 @@
-"""Facets of solid cells, found by their nodes: those outside of bodies, and those between two cells."""
+"""Facets of solid cells with given nodes: outer facets of bodies, and facets between two cells."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from fastcontact.mesh import elements
 def facets_with_nodes(
     solids: Mapping[str, Numbers], chosen: Mask, between: bool, own: Mapping[str, Mask] | None = None
 ) -> dict[str, Numbers]:
-    """Return by facet element the facets (n_facets, n_nodes) of solid cells all of whose nodes are chosen.
+    """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all chosen, by facet element.
 
-    Each once, as its first cell has it, which is outward for those of one cell.
+    Each facet appears once, with the orientation of its first cell, which is outward for facets of a single cell.
 
     Parameters
     ----------
@@ -23,9 +23,9 @@ def facets_with_nodes(
         Connectivity by element.
     chosen : ndarray of bool (n_points,)
     between : bool
-        Facets of two cells; otherwise those of one.
+        Whether to return facets between two cells; otherwise those of a single cell.
     own : mapping of str to ndarray of bool (n_cells,), optional
-        The cells that the facets must belong to, by default all.
+        Cells to which the facets must belong, by default all.
     """
     candidates: dict[str, list[Numbers]] = {}
     owned: dict[str, list[Mask]] = {}
@@ -36,24 +36,24 @@ def facets_with_nodes(
             inside = chosen[nodes].all(axis=1)
             candidates.setdefault(kind, []).append(nodes[inside])
             owned.setdefault(kind, []).append(np.ones(int(inside.sum()), bool) if own is None else own[name][inside])
-    kept, wanted = {}, 2 if between else 1
+    found, wanted = {}, 2 if between else 1
     for kind, blocks in candidates.items():
-        facets, ours = np.concatenate(blocks), np.concatenate(owned[kind])
+        facets, is_own = np.concatenate(blocks), np.concatenate(owned[kind])
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        mine = np.bincount(group.ravel(), ours, len(count))
-        rows = np.sort(first[(count == wanted) & (mine == wanted)])
+        count_own = np.bincount(group.ravel(), is_own, len(count))
+        rows = np.sort(first[(count == wanted) & (count_own == wanted)])
         if len(rows):
-            kept[kind] = facets[rows]
-    return kept
+            found[kind] = facets[rows]
+    return found
 
 
 def added(block: Numbers, facets: Numbers) -> tuple[Numbers, Indices]:
-    """Return a block of facets with those that it lacks at its end, and the rows where all of them are."""
+    """Return a block of facets extended by missing ones, and the rows of all `facets` in it."""
     both = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
-    row = first[facet.ravel()]  # the first of the same nodes
+    row = first[facet.ravel()]  # the first with equal nodes
     new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
     place = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
     return np.concatenate([block, both[new]]), place[row[len(block) :]].astype(np.intp)

@@ -1,4 +1,4 @@
-"""Meshes that other libraries hold in memory: gmsh, meshio, PyVista, each imported when it is asked for."""
+"""Meshes from other libraries in memory: gmsh, meshio, PyVista, each imported at first use."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from fastcontact.mesh.files.meshio_content import UNFIT, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
 from fastcontact.mesh.mesh import Mesh
 
-# Groups in arrays of 0 and 1 of our own result files.
+# Prefix of groups as arrays of 0 and 1 in our result files.
 RESULT_PREFIX = "group_"
-# How gmsh writes the open model: in its newest format, what belongs to a physical group or, without any group, everything.
+# Options with which gmsh writes the open model: newest format, cells in physical groups or, without any groups, all cells.
 GMSH_OPTIONS = {"Mesh.MshFileVersion": 4.1, "Mesh.Binary": 1.0, "Mesh.SaveAll": 0.0, "Mesh.SaveParametric": 0.0}
 
 
@@ -29,7 +29,7 @@ def from_meshio(mesh: Any) -> Mesh:
     """Return the mesh that meshio holds, with its groups.
 
     Groups are its cell and point sets, the tags of Gmsh and Medit, and arrays of 0 and 1 called ``cell_group:...`` and
-    ``point_group:...``. Cells that are inside out are turned; a flat mesh in 3D coordinates becomes a 2D one.
+    ``point_group:...``. Inverted cells are reoriented; a flat mesh in 3D coordinates becomes a 2D one.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def from_meshio(mesh: Any) -> Mesh:
     Raises
     ------
     MeshError
-        If it has no cells, or of a kind that fastcontact does not know, or its arrays do not fit together.
+        If it has no cells or unknown cells, or its arrays are inconsistent.
 
     Examples
     --------
@@ -53,17 +53,17 @@ def from_meshio(mesh: Any) -> Mesh:
     sets = [mesh.cell_data, mesh.cell_sets, getattr(mesh, "point_data", {}), getattr(mesh, "point_sets", {})]
     if is_masked([mesh.points, *(block.data for block in mesh.cells), *sets]):
         raise MeshError(f"meshio's mesh {REFUSAL}")
-    # Of Gmsh's tags meshio's readers keep the dimension of each name; their format repeats a cell for each of its groups.
+    # meshio's readers keep the dimension of Gmsh's tag names; the format repeats a cell for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
-    return _made(plain_parts(mesh), file_format, "meshio's mesh")
+    return _mesh_of(plain_parts(mesh), file_format, "meshio's mesh")
 
 
 def from_pyvista(grid: Any) -> Mesh:
     """Return the cells of a PyVista data set as a mesh, with its groups.
 
-    Groups are its arrays of truth values, by their names, and those of 0 and 1 called ``cell_group:...``,
-    ``point_group:...`` (mesh files) or ``group_...`` (result files). Cells that are inside out are turned; a flat mesh in 3D
-    coordinates becomes a 2D one. Surfaces of a solid are no cells of such a data set: see `Mesh.with_facet_group`.
+    Groups are its boolean arrays, and arrays of 0 and 1 called ``cell_group:...``, ``point_group:...`` (mesh files) or
+    ``group_...`` (result files). Inverted cells are reoriented; a flat mesh in 3D coordinates becomes a 2D one. Such a
+    data set has no facet cells on the surface of a solid; `Mesh.with_facet_group` adds them.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def from_pyvista(grid: Any) -> Mesh:
     Raises
     ------
     MeshError
-        If it has no cells, or of a kind that fastcontact does not know.
+        If it has no cells or unknown cells.
 
     Examples
     --------
@@ -100,26 +100,26 @@ def from_pyvista(grid: Any) -> Mesh:
         "point_data": _flags(grid.point_data, POINT_PREFIX),
         "cell_sets": {}, "point_sets": {}, "field_data": {},
     }  # fmt: skip
-    return _made(content, "", "PyVista's data set")
+    return _mesh_of(content, "", "PyVista's data set")
 
 
 def from_gmsh() -> Mesh:
     """Return the mesh of the model that is open in gmsh, with its physical groups.
 
-    As in Gmsh's own files, cells that belong to no physical group are left out if there are any groups. Cells that are inside
-    out are turned; a flat mesh in 3D coordinates becomes a 2D one.
+    As in files of Gmsh, cells without a physical group are omitted if there are any groups. Inverted cells are
+    reoriented; a flat mesh in 3D coordinates becomes a 2D one.
 
     Raises
     ------
     FileError
         If the package gmsh is not installed.
     MeshError
-        If no model is open, or it has no mesh yet, or cells that fastcontact does not know.
+        If no model is open, it has no mesh, or it has unknown cells.
 
     Warns
     -----
     FastcontactWarning
-        If solid cells are left out, with their number.
+        If solid cells are omitted, with their number.
 
     Examples
     --------
@@ -138,7 +138,7 @@ def from_gmsh() -> Mesh:
     dim = gmsh.model.getDimension()
     if not any(map(len, gmsh.model.mesh.getElements(dim)[1])) if dim >= 0 else True:
         raise MeshError("the model that is open in gmsh has no mesh: call gmsh.model.mesh.generate(2) or (3)")
-    _tell_what_is_left_out(gmsh, dim)
+    _warn_of_omissions(gmsh, dim)
     before = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
     try:
         with tempfile.TemporaryDirectory() as folder:
@@ -152,22 +152,22 @@ def from_gmsh() -> Mesh:
             gmsh.option.setNumber(name, value)
 
 
-def _tell_what_is_left_out(gmsh: Any, dim: int) -> None:
-    """Warn of solid cells without a physical group, which Gmsh does not write where there are groups."""
+def _warn_of_omissions(gmsh: Any, dim: int) -> None:
+    """Warn of solid cells without a physical group, which Gmsh does not write if there are any groups."""
     if not gmsh.model.getPhysicalGroups():
         return
-    alone = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
-    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in alone)
+    loose = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
+    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in loose)
     if count:
         kind = "volumes" if dim == 3 else "surfaces"
         warn(
             f"{count} solid cells belong to no physical group and are left out (those of the {kind} "
-            f"{', '.join(map(str, alone[:6]))}): give every body a group"
+            f"{', '.join(map(str, loose[:6]))}): give every body a group"
         )
 
 
 def _flags(data: Any, prefix: str) -> dict[str, Any]:
-    """Return the arrays that mean groups, under the names that `mesh_of` knows."""
+    """Return the arrays that define groups, under the names expected by `mesh_of`."""
     groups = {}
     for name in data.keys():  # noqa: SIM118, PyVista's data are no mapping
         values = np.asarray(data[name])
@@ -180,8 +180,8 @@ def _flags(data: Any, prefix: str) -> dict[str, Any]:
     return groups
 
 
-def _made(content: dict[str, Any], file_format: str, library: str) -> Mesh:
-    """Return the mesh of plain data, its cells turned where they are inside out."""
+def _mesh_of(content: dict[str, Any], file_format: str, library: str) -> Mesh:
+    """Return the mesh of plain data, with inverted cells reoriented."""
     try:
         mesh, _ = mesh_of(content, file_format)
     except MeshError as error:

@@ -1,14 +1,14 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of cells, and the tables of slopes that those in space are computed from."""
+"""Jacobians of cells, and derivatives of shape functions arranged for them."""
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import innermost_kernel, kernel
 
 
 @kernel
 def transposed(dN):
-    """Return derivatives (n_q, n_nodes, dim) as (n_q, dim, n_nodes), so that loops over nodes run along memory."""
+    """Return derivatives (n_q, n_nodes, dim) as (n_q, dim, n_nodes), so that loops over nodes are contiguous."""
     n_q, n_nodes, dim = dN.shape
     out = np.empty((n_q, dim, n_nodes))
     for q in range(n_q):
@@ -18,9 +18,22 @@ def transposed(dN):
     return out
 
 
-@kernel
+@innermost_kernel
+def jacobian_2d(x, slopes, q):
+    """Return the four entries of J, row by row, of the nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
+    j00 = j01 = j10 = j11 = 0.0
+    for a in range(x.shape[1]):
+        r, s = slopes[q, 0, a], slopes[q, 1, a]
+        j00 += r * x[0, a]
+        j01 += r * x[1, a]
+        j10 += s * x[0, a]
+        j11 += s * x[1, a]
+    return j00, j01, j10, j11
+
+
+@innermost_kernel
 def jacobian_3d(x, slopes, q):
-    """Return the nine entries of J, row by row, of the nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
+    """Return the nine entries of J, row by row, for nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
     j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
     for a in range(x.shape[1]):
         r, s, t = slopes[q, 0, a], slopes[q, 1, a], slopes[q, 2, a]
@@ -46,9 +59,9 @@ def at_nodes(values, cells, c, x):
 
 @kernel
 def inverse_jacobian(x, dN, q, J, inverse):
-    """Fill `inverse` (dim, dim) with the derivatives dxi_k / dx_i at [i, k], of the nodes `x` (n_nodes, dim); return det J.
+    """Fill `inverse` (dim, dim) with the derivatives dxi_k / dx_i at [i, k], for nodes `x` (n_nodes, dim); return det J.
 
-    `dN` (n_q, n_nodes, dim) are shape derivatives, `J` (dim, dim) is overwritten; in two or three dimensions.
+    `dN` (n_q, n_nodes, dim) are shape derivatives, `J` (dim, dim) is overwritten; dim is 2 or 3.
     """
     dim = x.shape[1]
     for k in range(dim):

@@ -1,4 +1,4 @@
-"""A mesh: points, cells by element, named groups. It never changes; operations return a new one."""
+"""Immutable meshes: points, cells by element, named groups."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
 
 
 def _numbers(name: str, values: ArrayLike) -> AnyArray:
-    """Return whole numbers as an array that loses nothing when it becomes one of 32 bits."""
+    """Return whole numbers as an array that can be converted to 32 bits."""
     array = np.asarray(values)
     if array.size == 0:
         return array.astype(np.int32)
@@ -40,7 +40,7 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
 
 
 def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
-    """Return where each block begins in the sequence of all, by name."""
+    """Return the offset of each block in the sequence of all, by name."""
     return dict(zip(blocks, np.cumsum([0, *map(len, blocks.values())]).tolist(), strict=False))
 
 
@@ -49,9 +49,9 @@ def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
 class Mesh:
     """Points, cells and named groups.
 
-    A mesh has cells of several dimensions: solids, and the facets (lines in 2D) that carry group names. Cells are
-    numbered through all elements in the order of `cells`; a cell group is a sorted array of those numbers. MeshError if
-    an array has the wrong shape, a number is not finite, or an index is out of range.
+    A mesh has cells of several dimensions: solids, and facets (lines in 2D) for groups of the boundary. Cells are
+    numbered consecutively over all elements in the order of `cells`; a cell group is a sorted array of these numbers.
+    MeshError if an array has the wrong shape, a number is not finite, or an index is out of range.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ class Mesh:
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
     def split(self, numbers: AnyArray) -> dict[str, Indices]:
-        """Return by element the rows (m,) of its cells among the cell `numbers` (n,); elements without any are absent."""
+        """Return for each element the rows (m,) of its cells in `numbers` (n,); elements without such cells are absent."""
         rows = {}
         for name, start in self.offsets.items():
             inside = (numbers >= start) & (numbers < start + len(self.cells[name]))
@@ -178,7 +178,7 @@ class Mesh:
         return rows
 
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
-        """Return the connectivity (n_cells, n_nodes) of a cell group by element, only that of dimension `dim` if given.
+        """Return the connectivity (n_cells, n_nodes) of a cell group by element, only for dimension `dim` if given.
 
         MeshError if there is no cell group of that name.
         """
@@ -198,7 +198,7 @@ class Mesh:
     def points_of(self, group: str) -> AnyArray:
         """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
 
-        MeshError if there is no group of that name; the message offers the nearest names.
+        MeshError if there is no such group; the message lists similar names.
         """
         if group in self.point_groups:
             return self.point_groups[group]
@@ -230,13 +230,13 @@ class Mesh:
 
     def replace(self, **changes: Any) -> Mesh:
         """Return a mesh with some of `points`, `cells`, `cell_groups`, `point_groups` replaced."""
-        kept = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
-        return Mesh(**{**kept, **changes})
+        fields = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
+        return Mesh(**{**fields, **changes})
 
     def with_groups(
         self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
     ) -> Mesh:
-        """Return the mesh with further (or redefined) groups, by name: `cells` (n,) of int, `points` (n,) of int."""
+        """Return the mesh with added or redefined groups, by name: `cells` (n,) of int, `points` (n,) of int."""
         return self.replace(
             cell_groups={**self.cell_groups, **(cells or {})},
             point_groups={**self.point_groups, **(points or {})},
@@ -250,24 +250,24 @@ class Mesh:
         between: bool = False,
         of: str | None = None,
     ) -> Mesh:
-        """Return the mesh with a new group of facets of its solids, chosen by place; facets that it lacks are added.
+        """Return the mesh with a new group of facets of its solids, selected by position; missing facets are added as cells.
 
         Parameters
         ----------
         name : str
-            Of the group; one of that name is replaced.
+            Name of the group; an existing group of this name is replaced.
         where : callable
             From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes do.
         between : bool
-            Facets between two cells, such as a section through a body; by default those on the outside.
+            Select facets between two cells, such as a section through a body, instead of those on the outer surface.
         of : str, optional
-            Group of the solid cells that the facets belong to, by default all: it tells faces of two bodies apart that
-            coincide.
+            Group of the solid cells to which the facets belong, by default all. It distinguishes coinciding faces of
+            two bodies.
 
-        Groups of points are made by ``with_groups(points={name: np.flatnonzero(...)})``.
+        ``with_groups(points={name: np.flatnonzero(...)})`` adds groups of points.
 
-        MeshError if there is no such facet, there is a group of points of that name, `of` holds no solid cells, or `where`
-        returns anything else.
+        MeshError if there is no such facet, a point group has this name, `of` holds no solid cells, or `where` returns an
+        array of another type or shape.
 
         Examples
         --------
@@ -285,16 +285,16 @@ class Mesh:
             )
         facets = facets_with_nodes(self.solids, chosen, between, None if of is None else self._cells_inside(name, of))
         if not facets:
-            theirs = f" of '{of}'" if of else ""
+            inside = f" of '{of}'" if of else ""
             raise MeshError(
-                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{theirs} "
+                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{inside} "
                 f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
                 "with a tolerance, or make a group of points by with_groups"
             )
         return self.with_facets({name: facets})
 
     def _cells_inside(self, name: str, group: str) -> dict[str, Mask]:
-        """Return by element which solid cells (n_cells,) are in a group; MeshError that names facet group `name` if none."""
+        """Return which solid cells (n_cells,) are in a group, by element; MeshError, with facet group `name`, if none."""
         if not self.cells_of(group, dim=self.dim):
             raise MeshError(
                 f"facet group '{name}' is to be of '{group}', which holds no solid cells: name a body's group"
@@ -303,9 +303,9 @@ class Mesh:
         return {kind: np.isin(np.arange(len(block)), rows.get(kind, [])) for kind, block in self.solids.items()}
 
     def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
-        """Return the mesh with new groups of facets; facets that it lacks are added, groups of the same names replaced.
+        """Return the mesh with new groups of facets; missing facets are added, groups of the same names are replaced.
 
-        `groups` (n_facets, n_nodes) of int has their nodes by name of the group and by element.
+        `groups` (n_facets, n_nodes) of int holds the nodes of the facets, by name of the group and by element.
         """
         cells = dict(self.cells)
         rows: dict[str, dict[str, AnyArray]] = {}
@@ -319,13 +319,13 @@ class Mesh:
         def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
             return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])
 
-        kept = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
-        return self.replace(cells=cells, cell_groups={**kept, **{name: numbers(rows[name]) for name in rows}})
+        renewed = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
+        return self.replace(cells=cells, cell_groups={**renewed, **{name: numbers(rows[name]) for name in rows}})
 
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
         """Return the mesh with a new cell group `name`, the union of the cell groups `members`."""
-        parts = []
+        cells = []
         for member in members:
             self.cells_of(member)
-            parts.append(self.cell_groups[member])
-        return self.with_groups(cells={name: np.concatenate(parts)})
+            cells.append(self.cell_groups[member])
+        return self.with_groups(cells={name: np.concatenate(cells)})

@@ -14,7 +14,7 @@ from fastcontact.arrays import Array
 Rule = tuple[Array, Array]
 
 
-@cache  # every pairing of mortar in the plane asks for it
+@cache  # used in every pairing of mortar in the plane
 def gauss_line(n: int) -> Rule:
     """Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)
@@ -80,7 +80,7 @@ def triangle_16() -> Rule:
 
 
 def _symmetric(centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
-    """Return a rule on the triangle from its orbits: weights (of 1 in all), then coordinates equal up to permutation."""
+    """Return a rule on the triangle from its orbits: weights (of sum 1), and coordinates up to permutation."""
     points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in centre], list(centre)
     for weight, a in threes:
         points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
@@ -104,7 +104,7 @@ def triangle_7_closed() -> Rule:
 
 
 def quartered_triangle(rule: Rule) -> Rule:
-    """Return a rule on the triangle applied on its four quarters; points that coincide are merged."""
+    """Return a rule on the triangle applied to its four quarters, with coincident points merged."""
     points, weights = rule
     shifts = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
     pieces = [shift + 0.5 * points for shift in shifts] + [0.5 - 0.5 * points]
@@ -119,7 +119,7 @@ def square(rule: Rule) -> Rule:
 
 
 def _merged(points: Array, weights: Array) -> Rule:
-    """Return a rule whose points that coincide are one."""
+    """Return a rule with coincident points merged."""
     unique, index = np.unique(np.round(points, 14), axis=0, return_inverse=True)
     merged = np.zeros(len(unique))
     np.add.at(merged, index.ravel(), weights)
@@ -192,7 +192,7 @@ def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
 def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
     """Return a product rule with `n` points along each direction on the reference cell of a linear element.
 
-    Along the directions of squares, cubes and prisms that run straight through, `straight` points if given.
+    Along the Cartesian directions of squares, cubes and prisms, `straight` points if given.
     """
     m = n if straight is None else straight
     return {
@@ -206,12 +206,12 @@ def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
     }[cell]()
 
 
-def subdivided(rule: Rule, parts: int) -> Rule:
-    """Return a rule on [-1, 1] applied on `parts` equal pieces; points that coincide are merged."""
+def subdivided(rule: Rule, count: int) -> Rule:
+    """Return a rule on [-1, 1] applied to `count` equal intervals, with coincident points merged."""
     points, weights = rule
-    left = -1.0 + 2.0 * np.arange(parts) / parts
-    all_points = (left[:, None] + (points[:, 0] + 1.0) / parts).ravel()
-    return _merged(all_points[:, None], np.tile(weights / parts, parts))
+    left = -1.0 + 2.0 * np.arange(count) / count
+    all_points = (left[:, None] + (points[:, 0] + 1.0) / count).ravel()
+    return _merged(all_points[:, None], np.tile(weights / count, count))
 
 
 def collapsed_triangle(n: int) -> Rule:

@@ -1,4 +1,4 @@
-"""Quality of a mesh: angles, lengths, and cells that are flat or inside out."""
+"""Quality of a mesh: angles, lengths, and degenerate or inverted cells."""
 
 from __future__ import annotations
 
@@ -12,10 +12,9 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
 from fastcontact.mesh.mesh import Mesh
 
-# A Jacobian below this fraction of the squared (cubed) longest edge is rounding, not area.
+# Jacobians below this fraction of the squared (cubed) longest edge are round-off.
 _FLAT = 1e-12
-# Smallest over largest Jacobian of a cell, largest angle [degrees], volume over the cube of the longest edge beyond which
-# a cell is poor.
+# Limits for poor cells: smallest over largest Jacobian, largest angle [degrees], volume over the cube of the longest edge.
 EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
 
 
@@ -62,7 +61,7 @@ class MeshQuality:
 
 @typed(MeshError)
 def quality(mesh: Mesh) -> MeshQuality:
-    """Return the quality figures of a mesh.
+    """Return quality measures of a mesh.
 
     Examples
     --------
@@ -139,7 +138,7 @@ def poorest_cell(mesh: Mesh) -> str:
 
 
 def _check_nodes(mesh: Mesh, name: str) -> None:
-    """Raise MeshError if a cell has a node twice: its facets there have no area, and its stresses no number."""
+    """Raise MeshError if a cell contains a node twice: its facets there have no area, and its stresses are undefined."""
     nodes = np.sort(mesh.cells[name], axis=1)
     twice = nodes[:, 1:] == nodes[:, :-1]
     bad = np.flatnonzero(twice.any(axis=1))
@@ -154,7 +153,7 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
 def _check_twice(mesh: Mesh, name: str) -> None:
     """Raise MeshError if two cells of an element have the same nodes: together they would be twice as stiff."""
     nodes = mesh.cells[name].astype(np.int64)
-    # Sums tell most cells apart; only those with equal sums are compared node by node.
+    # Sums distinguish most cells; only those with equal sums are compared node by node.
     key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)
     order = np.argsort(key, kind="stable")
     alike = np.flatnonzero(key[order[1:]] == key[order[:-1]])
@@ -163,13 +162,13 @@ def _check_twice(mesh: Mesh, name: str) -> None:
     if (count > 1).any():
         row = int(rows[first[count > 1].min()])
         raise MeshError(
-            f"{_described(mesh, name, row)} stands in the mesh {int(count.max())} times, one of "
+            f"{_described(mesh, name, row)} occurs in the mesh {int(count.max())} times, one of "
             f"{int((count > 1).sum())} such cells: remove the copies"
         )
 
 
 def _described(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
-    """Return the number, element, place and, where it is given, size of a cell for messages."""
+    """Return number, element, position and, if given, size of a cell for messages."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
     return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"
@@ -181,26 +180,26 @@ def _corners(mesh: Mesh, name: str) -> Array:
 
 
 def _angles(corners: Array) -> Array:
-    """Corner angles (n_cells, n_corners) of polygons (n_cells, n_corners, dim) [radian]."""
+    """Return the corner angles (n_cells, n_corners) of polygons (n_cells, n_corners, dim) [radian]."""
     ahead = np.roll(corners, -1, axis=1) - corners
     behind = np.roll(corners, 1, axis=1) - corners
     cosine = (ahead * behind).sum(axis=2)
     if corners.shape[2] == 3:
         return np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), cosine)
     sine = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
-    # Counted inside the polygon whichever way round it is, so that a re-entrant corner has more than 180 degrees.
+    # Interior angles for either orientation, so that a re-entrant corner has more than 180 degrees.
     sine *= np.where(sine.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     return np.arctan2(sine, cosine) % (2 * np.pi)
 
 
 def _edge_lengths(mesh: Mesh, name: str) -> Array:
-    """Lengths (n_cells, n_edges) of the straight edges of the cells [length]."""
+    """Return the lengths (n_cells, n_edges) of the straight edges of the cells [length]."""
     ends = mesh.points[mesh.cells[name][:, elements.get(name).edges]]
     return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
 
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
-    """Return of each cell (n_cells,) area or volume, whether that is only rounding, whether a Jacobian is not positive."""
+    """Return area or volume of each cell (n_cells,), whether it is round-off, and whether a Jacobian is not positive."""
     measure, low, high, longest = _extremes(mesh, name)
     rounding = _FLAT * longest**mesh.dim
     flat = np.maximum(np.abs(low), np.abs(high)) <= rounding

@@ -1,22 +1,16 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of solid cells at the points of a quadrature, and their longest edges, by which bad cells are found."""
+"""Jacobians of solid cells at quadrature points, and their longest edges, for the detection of bad cells."""
 
 import numpy as np
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
-from fastcontact.mesh.jacobian_kernels import jacobian_3d, transposed
+from fastcontact.mesh.jacobian_kernels import jacobian_2d, jacobian_3d, transposed
 
 
 @kernel
 def _determinant_2d(x, slopes, q):
     """Return det J of the cell with nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
-    j00 = j01 = j10 = j11 = 0.0
-    for a in range(x.shape[1]):
-        r, s = slopes[q, 0, a], slopes[q, 1, a]
-        j00 += r * x[0, a]
-        j01 += r * x[1, a]
-        j10 += s * x[0, a]
-        j11 += s * x[1, a]
+    j00, j01, j10, j11 = jacobian_2d(x, slopes, q)
     return j00 * j11 - j01 * j10
 
 
@@ -37,7 +31,7 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
     dN : (n_q, n_nodes, dim), weights : (n_q,)
         Shape derivatives at the points of a quadrature, and its weights.
     edges : (n_edges, 2)
-        Local nodes at the ends of the edges, which count as straight.
+        Local nodes at the ends of the edges, which are treated as straight.
     """
     n_q, n_nodes, dim = dN.shape
     slopes, x = transposed(dN), np.empty((dim, n_nodes))
@@ -53,9 +47,9 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
         low[c], high[c], measure[c] = smallest, largest, total
         square = 0.0
         for e in range(edges.shape[0]):
-            own = 0.0
+            length = 0.0
             for i in range(dim):
                 along = x[i, edges[e, 1]] - x[i, edges[e, 0]]
-                own += along * along
-            square = max(square, own)
+                length += along * along
+            square = max(square, length)
         longest[c] = np.sqrt(square)

@@ -1,7 +1,7 @@
 """Parts of bodies connected by a hinge: they share a single node, or nodes on one line.
 
-Cells with a common facet belong to one part, and so do parts with two common nodes in the plane, or in space with three that
-are not in line. What is left between parts are hinges.
+Cells with a common facet belong to one part, and so do parts with two common nodes in the plane, or with three non-collinear
+ones in space. The remaining common nodes of parts are hinges.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, cells_joined_by_facets, remembered
 
-# Nodes nearer to each other, or to a line, than this fraction of the size of the mesh are at one place, or on the line.
+# Nodes nearer to each other, or to a line, than this fraction of the size of the mesh coincide, or lie on the line.
 IN_LINE = 1e-6
 
 
@@ -29,7 +29,7 @@ class RigidParts:
     count : int
         Number of parts; that of the bodies where there are no hinges.
     part : ndarray of int (n_points,)
-        The part of each point, the lowest where several meet; -1 for points without a solid cell.
+        The part of each point, the lowest one of several; -1 for points without a solid cell.
     hinge_node, hinge_part : ndarray of int (k,)
         Nodes at hinges, ascending, each once for every part that it belongs to.
     """
@@ -76,7 +76,7 @@ def rigid_parts(mesh: Mesh) -> RigidParts:
 
 
 def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return a part (n_points,) of each point, the lowest of several, and nodes (k,) of several parts with each of them.
+    """Return a part (n_points,) of each point, the lowest of several, and nodes (k,) of several parts with each part.
 
     `label` (n_solids,) is the part of each solid cell; points without one get -1.
     """
@@ -98,18 +98,18 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
 
 
 def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return two parts (m,) each and the node at which they meet, from nodes, ascending, with each part that has them."""
+    """Return pairs of parts (m,) and their common nodes, from ascending nodes with each of their parts."""
     meetings = [np.empty((3, 0), np.intp)]
-    apart = 1
-    while len(same := np.flatnonzero(node[apart:] == node[:-apart])):
-        meetings.append(np.stack([part[same], part[same + apart], node[same]]))
-        apart += 1
+    shift = 1
+    while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
+        meetings.append(np.stack([part[same], part[same + shift], node[same]]))
+        shift += 1
     first, second, at = np.concatenate(meetings, axis=1)
     return first, second, at
 
 
 def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
-    """Return whether two parts cannot turn about each other, for each meeting (m,) of `first` and `second` at a node."""
+    """Return whether two parts cannot rotate relative to each other, for each pair (m,) `first`, `second` at a node."""
     if not len(at):
         return np.empty(0, bool)
     _, pair, count = np.unique(np.stack([first, second]), axis=1, return_inverse=True, return_counts=True)
@@ -117,6 +117,6 @@ def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
     mean = np.column_stack([np.bincount(pair, points[at, d]) for d in range(dim)]) / count[:, None]
     away = points[at] - mean[pair]
     moment = np.stack([[np.bincount(pair, away[:, i] * away[:, j]) for j in range(dim)] for i in range(dim)])
-    # In the plane nodes must be spread along a line, in space along two.
+    # In the plane the common nodes must extend in one direction, in space in two.
     spread = np.linalg.eigvalsh(np.moveaxis(moment, 2, 0))[:, 1]
     return np.asarray((spread > (IN_LINE * np.ptp(points, axis=0).max()) ** 2)[pair])

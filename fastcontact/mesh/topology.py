@@ -10,7 +10,6 @@ from typing import Concatenate, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
@@ -49,11 +48,11 @@ def corner_volumes(mesh: Mesh, name: str) -> Array:
 
 @typed(MeshError)
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
-    """Return the mesh with every solid cell oriented as it should be, and how many cells were turned.
+    """Return the mesh with all solid cells oriented, and the number of reoriented cells.
 
-    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward. MeshError if a
-    cell that was inside out lies on the same side of a facet as its neighbour: the mesh is folded there, and turning the
-    cell would hide that.
+    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward. MeshError if
+    an inverted cell lies on the same side of a facet as its neighbour: the mesh is folded there, and reorienting the
+    cell would hide this.
     """
     measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
@@ -72,7 +71,7 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
 
 
 def _check_folds(mesh: Mesh) -> None:
-    """Raise MeshError if two solid cells, all of them oriented, go round a common facet in the same direction."""
+    """Raise MeshError if two oriented solid cells have a common facet with the same orientation."""
     folds, owners = [], []
     for name, block in mesh.solids.items():
         element = elements.get(name)
@@ -92,7 +91,7 @@ def _check_folds(mesh: Mesh) -> None:
         )
 
 
-def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
+def _direction(facets: Indices) -> Indices:
     """Return three nodes (n, 3) by which facets and their orientation differ: the lowest, the next, the last."""
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
@@ -102,7 +101,7 @@ def _direction(facets: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def remembered(function: Callable[Concatenate[Mesh, Further], Found]) -> Callable[Concatenate[Mesh, Further], Found]:
-    """Return `function`, computed once for every mesh and further arguments: meshes do not change, and much needs it."""
+    """Decorate `function` to cache its result for each mesh and further arguments; meshes are immutable."""
     known: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Found]] = WeakKeyDictionary()
 
     @wraps(function)
@@ -147,9 +146,9 @@ def outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
 
 @typed(MeshError)
 def cells_joined_by_facets(mesh: Mesh) -> Numbers:
-    """Return for each cell (n_cells,) of the mesh the lowest one that common facets join it to, from cell to cell.
+    """Return for each cell (n_cells,) of the mesh the lowest cell connected with it through common facets.
 
-    Cells that are no solids stand for themselves.
+    For cells that are not solids it is the cell itself.
     """
     return _facets(mesh)[1]
 
@@ -170,18 +169,18 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             facets_of_kind.setdefault(facet_element, []).append(block[:, list(facet)])
             owners.setdefault(facet_element, []).append(numbers)
-    parent, kept, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
+    parent, outer, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
     for name, blocks in facets_of_kind.items():
         facets = np.ascontiguousarray(np.concatenate(blocks))
-        alone = np.empty(len(facets), bool)
+        single = np.empty(len(facets), bool)
         owner = np.concatenate(owners[name])
-        topology_kernels.alone(facets, owner, mesh.n_points, alone, parent)
-        if alone.any():
-            kept[name], behind[name] = np.ascontiguousarray(facets[alone]), owner[alone]
-            kept[name].setflags(write=False)
+        topology_kernels.alone(facets, owner, mesh.n_points, single, parent)
+        if single.any():
+            outer[name], behind[name] = np.ascontiguousarray(facets[single]), owner[single]
+            outer[name].setflags(write=False)
     while not (parent[parent] == parent).all():
         parent = parent[parent]
-    return MappingProxyType(kept), parent, MappingProxyType(behind)
+    return MappingProxyType(outer), parent, MappingProxyType(behind)
 
 
 def same_facets(among: Numbers, facets: Numbers) -> Indices:
@@ -210,9 +209,9 @@ class OrderedLine:
 
 @typed(MeshError)
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
-    """Return the nodes of a line group in order, as code_aster's NOEUD_ORDO and ABSC_CURV.
+    """Return the ordered nodes and the abscissa of a line group, like code_aster's NOEUD_ORDO and ABSC_CURV.
 
-    MeshError if the group holds no lines, branches, closes on itself, is in pieces, or `start` is not one of its ends.
+    MeshError if the group holds no lines, branches, is closed or disconnected, or `start` is not one of its ends.
 
     Parameters
     ----------

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Boundary facets, and cells joined by facets, by sorting facets by their nodes."""
+"""Boundary facets, and cells connected by facets, by sorting facets by their nodes."""
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def _same(keys, f, g):
 
 @kernel
 def _root(parent, cell):
-    """Return the cell that stands for all that `cell` is joined to; the way there is halved for the next one."""
+    """Return the root of the set of `cell`, with path halving."""
     while parent[cell] != cell:
         parent[cell] = parent[parent[cell]]
         cell = parent[cell]
@@ -40,14 +40,14 @@ def _root(parent, cell):
 
 
 @interpretable_kernel
-def alone(facets, owner, n_points, found, parent):
-    """Fill `found` (n_facets,) with whether no other one of the facets (n_facets, n_nodes) has the same nodes.
+def alone(facets, owner, n_points, single, parent):
+    """Fill `single` (n_facets,) with whether no other of the facets (n_facets, n_nodes) has the same nodes.
 
-    Cells, the `owner` (n_facets,) of each facet, that have facets with the same nodes are joined in the forest `parent`
-    (n_cells,), in place: the lower root becomes that of both.
+    Cells, the `owner` (n_facets,) of each facet, that have facets with the same nodes are united in the forest `parent`
+    (n_cells,), in place: the lower root becomes the root of both.
 
-    The facets are sorted by counting, by one node after the other, the lowest last. Facets with the same nodes then follow
-    each other, in a time that does not depend on how many meet at a node.
+    The facets are sorted by counting sorts over their nodes, the lowest last. Facets with the same nodes are then
+    consecutive, in a time independent of the number of facets at a node.
     """
     keys, n = _sorted_nodes(facets), facets.shape[0]
     order, other = np.empty(n, np.int32), np.empty(n, np.int32)
@@ -66,7 +66,7 @@ def alone(facets, owner, n_points, found, parent):
         order, other = other, order
     for k in range(n):
         beside = k > 0 and _same(keys, order[k], order[k - 1])
-        found[order[k]] = not (beside or (k + 1 < n and _same(keys, order[k], order[k + 1])))
+        single[order[k]] = not (beside or (k + 1 < n and _same(keys, order[k], order[k + 1])))
         if beside:
             one, two = _root(parent, owner[order[k]]), _root(parent, owner[order[k - 1]])
             parent[max(one, two)] = min(one, two)

@@ -1,4 +1,4 @@
-"""How deep bodies lie inside each other."""
+"""Penetration depths of overlapping bodies."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
     """Yield (body, other, points (n,), depth (n,)) for each pair of bodies that may overlap.
 
     Depths are distances of points on the outside of the first body to the outside of the second, zero where they do not lie
-    in it [length]. The axis of an axisymmetric body is not its outside. Facets count as they are curved. Two meshes of one
-    smooth curved surface stray from it, each by less than the square of the rise of a facet over its length: within that
-    bodies touch and do not overlap.
+    in it [length]. The axis of an axisymmetric body is not part of its outside. Facets are treated as curved. Two meshes of a
+    smooth curved surface deviate from it, each by less than the square of the rise of a facet over its length: within this
+    tolerance bodies touch and do not overlap.
     """
     count, body = bodies(mesh)
     if count < 2:
@@ -57,20 +57,20 @@ def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[in
             continue
         kinds = [(name, coordinates[facets]) for name, facets in sides[other].items() if len(facets)]
         corners = [block for _, block in kinds]
-        taken = None
+        selected = None
         if kinematics == "axisymmetric":
             size = max(float(np.abs(block).max()) for block in corners)
-            taken = [(np.abs(block[:, :, 0]) > LENGTH_ROUND_OFF * size).any(axis=1) for block in corners]
-        depth, facet = _depths(coordinates[near], corners, taken)
+            selected = [(np.abs(block[:, :, 0]) > LENGTH_ROUND_OFF * size).any(axis=1) for block in corners]
+        depth, facet = _depths(coordinates[near], corners, selected)
         play = np.concatenate([_strays(name, block) for name, block in kinds])[facet]
         yield number, other, near, np.where(depth <= play + stray[near], 0.0, depth)
 
 
 def _strays(name: str, corners: Array) -> Array:
-    """Return how far facets (n, k, dim) may stray from a smooth surface through their nodes (n,) [length].
+    """Return the largest deviations (n,) of facets (n, k, dim) from a smooth surface through their nodes [length].
 
-    A parabola over a chord of length h that rises by r over it strays from its circle by r^3 / h^2; r^2 / h leaves room
-    for curvatures that change. Straight facets tell nothing of a surface they might stand for, and get zero.
+    A parabola of rise r over a chord of length h deviates from its circle by r^3 / h^2; r^2 / h leaves a margin for varying
+    curvature. Straight facets contain no information about a curved surface, and get zero.
     """
     element = elements.get(name)
     if element.order == 1:
@@ -83,15 +83,15 @@ def _strays(name: str, corners: Array) -> Array:
     return np.asarray((rise**2 / length).max(axis=1))
 
 
-def _depths(points: Array, kinds: list[Array], taken: list[Mask] | None = None) -> tuple[Array, Indices]:
-    """Return how deep each of `points` (n, dim) lies in the closed surface of facets (m, n_nodes, dim), 0 outside.
+def _depths(points: Array, kinds: list[Array], selected: list[Mask] | None = None) -> tuple[Array, Indices]:
+    """Return the depths of `points` (n, dim) in the closed surface of facets (m, n_nodes, dim), 0 outside.
 
-    Also the closest facet (n,), counted through the kinds. Distances are those to the facets that are `taken`, by default
-    all. Where the closest point lies inside a facet, its normal tells in from out. Where it lies on an end, an edge or a
-    corner the normals around may disagree, and the winding number of the surface tells.
+    The second result is the closest facet (n,), numbered through the kinds. Distances are those to the facets `selected`, by
+    default all. If the closest point lies inside a facet, the normal of the facet decides whether the point is inside.
+    On ends, edges and corners adjacent normals may disagree, and the winding number of the surface decides.
     """
-    taken = [np.ones(len(corners), bool) for corners in kinds] if taken is None else taken
-    counted = [corners[kept] for corners, kept in zip(kinds, taken, strict=True)]
+    selected = [np.ones(len(corners), bool) for corners in kinds] if selected is None else selected
+    counted = [corners[mask] for corners, mask in zip(kinds, selected, strict=True)]
     closest = closest_of_kinds(points, [corners for corners in counted if len(corners)])
     size = max(float(np.abs(corners).max()) for corners in kinds)
     height = np.einsum("nd,nd->n", points - closest.position, closest.normal)  # above the tangent planes
@@ -103,7 +103,7 @@ def _depths(points: Array, kinds: list[Array], taken: list[Mask] | None = None) 
         body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), np.concatenate(pieces), number)
         inside[unsure] = number > 0.5
     depth = np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0)
-    return depth, np.flatnonzero(np.concatenate(taken))[closest.facet]
+    return depth, np.flatnonzero(np.concatenate(selected))[closest.facet]
 
 
 def _flat_pieces(corners: Array) -> Indices:

@@ -19,9 +19,9 @@ def _solid_angle(triangles, k, point):
 
 @kernel
 def winding_numbers(points, pieces, winding):
-    """Fill how often a closed surface winds around each of ``points`` (n, dim): 1 inside, 0 outside.
+    """Fill the winding numbers of a closed surface around each of ``points`` (n, dim): 1 inside, 0 outside.
 
-    Its ``pieces`` (m, dim, dim) are lines or triangles; outward normals count positive. The sum of their angles.
+    The number is the sum of the angles of its ``pieces`` (m, dim, dim), lines or triangles, positive for outward normals.
     """
     for i in range(points.shape[0]):
         total = 0.0

@@ -35,7 +35,7 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
 
 
 def _hinges(mesh: Mesh, motions: FreeMotions) -> str:
-    """Return what else helps where parts of bodies turn about nodes."""
+    """Return further advice for parts of bodies that can rotate about nodes."""
     if not len(motions.hinges):
         return ""
     return (
@@ -45,7 +45,7 @@ def _hinges(mesh: Mesh, motions: FreeMotions) -> str:
 
 
 def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[float]) -> None:
-    """Raise ModelError if the table of a load, support or relation (name, table) does not cover the instants."""
+    """Raise ModelError if the table of a load, support or constraint (name, table) does not cover the instants."""
     instants = list(instants)
     for name, table in ramped:
         outside = [t for t in instants if table is not None and not table[0][0] <= t <= table[-1][0]]
@@ -59,7 +59,7 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
 def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
     """Raise ModelError if `forces` (n_points, dim) [force] act on points without solid cell.
 
-    Points with relations, `related` (n_points,) of bool, are left out.
+    Points with multi-point constraints, `related` (n_points,) of bool, are left out.
     """
     lost = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
     if len(lost):
@@ -70,7 +70,7 @@ def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
 
 
 def _carried(mesh: Mesh, related: Mask) -> Mask:
-    """Return whether each point (n_points,) has a solid cell or a relation."""
+    """Return whether each point (n_points,) has a solid cell or a constraint."""
     carried = related.copy()
     for block in mesh.solids.values():
         carried[block] = True
@@ -80,7 +80,7 @@ def _carried(mesh: Mesh, related: Mask) -> Mask:
 def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mask) -> None:
     """Raise ModelError if all points of a support (name, group) are without solid cell.
 
-    Points with relations, `related` (n_points,) of bool, are left out.
+    Points with multi-point constraints, `related` (n_points,) of bool, are left out.
     """
     carried = _carried(mesh, related)
     for name, group in supports:
@@ -93,15 +93,12 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
 
 
 def check_penetration(name: str, pair: Formulation) -> None:
-    """Raise ContactError if the sides of contact pair `name` lie inside each other by more than an element before any load.
+    """Raise ContactError if the sides of contact pair `name` penetrate by more than an element before any load.
 
     An intended interference is smaller, or given as a clearance.
     """
-    gap = initial_gaps(pair)
-    size = np.zeros(len(gap))
-    for block in pair.secondary.blocks:
-        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
-        np.maximum.at(size, block.local, long[:, None])
+    gap, _ = initial_gaps(pair)
+    size = facet_lengths(pair)
     row = int(np.argmin(gap / size))
     if gap[row] < -size[row]:
         point = pair.secondary.points[row]
@@ -112,24 +109,34 @@ def check_penetration(name: str, pair: Formulation) -> None:
         )
 
 
-def initial_gaps(pair: Formulation) -> Array:
-    """Return the gaps (n_nodes,) before any load, clearances counting where they open them [length].
+def facet_lengths(pair: Formulation) -> Array:
+    """Return the length of the longest facet at each secondary node (n_nodes,) [length]."""
+    size = np.zeros(len(pair.secondary.points))
+    for block in pair.secondary.blocks:
+        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        np.maximum.at(size, block.local, long[:, None])
+    return size
 
-    Infinite at nodes that face nothing or are left out, and where penetration is no mistake: in tied pairs and gap_only.
+
+def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
+    """Return gaps (n_nodes,) before any load, clearances counting where they open them [length], and normals (n_nodes, dim).
+
+    Infinite at nodes that face nothing or are excluded, and where penetration is admissible: in tied pairs and gap_only.
     """
     if pair.options.tied or pair.options.gap_only:
-        return np.full(len(pair.secondary.points), np.inf)
+        shape = len(pair.secondary.points), pair.points.shape[1]
+        return np.full(shape[0], np.inf), np.zeros(shape)
     at_rest = Configuration.undeformed(pair.points)
-    gap = pair.nodal_gap(at_rest, with_clearance=False)[0]
+    gap, normal = pair.nodal_gap(at_rest, with_clearance=False)
     if pair.options.clearance is not None or pair.options.clearance_primary is not None:
         gap = np.maximum(gap, pair.nodal_gap(at_rest)[0])
-    return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap)
+    return np.where(pair.options.excluded_nodes(pair.secondary), np.inf, gap), normal
 
 
 def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]) -> None:
-    """Raise ModelError if bodies overlap in the reference configuration and no contact pair joins them.
+    """Raise ModelError if bodies overlap in the reference configuration without a contact pair between them.
 
-    `paired` holds the (secondary, primary) groups of the contact pairs.
+    `paired` are the (secondary, primary) groups of the contact pairs.
     """
     _, body = bodies(mesh)
     joined = {frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired}

@@ -12,7 +12,7 @@ from fastcontact.model.ramp import History
 
 
 class FormulationOptions(TypedDict, total=False):
-    """Fields of formulations: of every one first, then of single ones."""
+    """Options of formulations: those of all first, then those of single ones."""
 
     friction: float | None
     surface_smoothing: bool | None
@@ -27,7 +27,7 @@ class FormulationOptions(TypedDict, total=False):
 
 
 class SharedOptions(TypedDict, total=False):
-    """What every contact pair takes, whatever its formulation."""
+    """Options of every contact pair, whatever its formulation."""
 
     kind: str | None
     clearance: Value | None
@@ -49,7 +49,7 @@ class SharedOptions(TypedDict, total=False):
 
 
 class ContactOptions(FormulationOptions, SharedOptions, total=False):
-    """What `add_contact` takes beside the sides."""
+    """Options of `add_contact` other than the sides."""
 
 
 SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))

@@ -11,13 +11,13 @@ from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.model.pair_options import clearance_ramp, friction_ramp
 from fastcontact.model.ramp import Table
 
-# Force on an obstacle by component, None where the component is prescribed; empty for none at all.
+# Force on an obstacle by component, None for prescribed components; empty without any force.
 Driving = tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
 class FluidPressure:
-    """Fluid of a `pressure` at multiplier 1 [pressure] from the group `source`, with a history of its own or None."""
+    """Fluid of a `pressure` at multiplier 1 [pressure] from the group `source`, with its history or None."""
 
     pressure: float
     source: str
@@ -28,10 +28,10 @@ class FluidPressure:
 class ContactPair:
     """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
 
-    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp`
-    a history of its own or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. It turns
-    by `rotation`, with the history `rotation_ramp`, by default `ramp`. A pair that was found, not named, knows its least gap
-    then, `found_gap` [length].
+    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp` its
+    history or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. It rotates by
+    `rotation`, with the history `rotation_ramp`, by default `ramp`. An automatically detected pair has the smallest gap at
+    detection, `found_gap` [length].
     """
 
     name: str
@@ -50,25 +50,25 @@ class ContactPair:
 
     @property
     def method(self) -> str:
-        """The formulation and the kind of its multipliers, where the pair names one, for messages."""
+        """The formulation and the kind of its multipliers, if the pair specifies one, for messages."""
         return method(self.formulation, self.options)
 
     @property
     def clearance_ramp(self) -> Table | None:
-        """History of the clearance; None where it does not change."""
+        """History of the clearance; None if it is constant."""
         return clearance_ramp(self.name, self.options)
 
     @property
     def friction_ramp(self) -> Table | None:
-        """History of the coefficient of friction; None where it does not change."""
+        """History of the coefficient of friction; None if it is constant."""
         return friction_ramp(self.name, self.options)
 
     @property
     def opposite(self) -> str:
-        """What the secondary side may touch, for messages."""
+        """Name of the opposite side, for messages."""
         return self.primary if self.obstacle is None else "a rigid obstacle"
 
 
 def method(formulation: str, options: Mapping[str, Any]) -> str:
-    """Return a formulation and the kind of its multipliers, where options name one."""
+    """Return a formulation and the kind of its multipliers, if options specify one."""
     return f"{formulation} with {options['multipliers']} multipliers" if "multipliers" in options else formulation

@@ -1,6 +1,6 @@
-"""Couplings of a reference point with a group: rigid, all nodes follow it; distributing, it follows their mean motion.
+"""Couplings of a reference point with a group: rigid (all nodes follow it) and distributing (it follows their mean motion).
 
-A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same place
+A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same position
 [radian]: about x, y and z in space, about z as the first component in the plane.
 """
 
@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.errors import MeshError, ModelError, unknown
+from fastcontact.errors import MeshError, ModelError, check_known
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
@@ -34,7 +34,7 @@ class ReferencePoint:
 
 
 def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> MultiPointConstraint:
-    """Return equations, lists of terms that sum to zero, as a relation of a mesh of `shape` (n_points, dim)."""
+    """Return equations, lists of terms that sum to zero, as a constraint of a mesh of `shape` (n_points, dim)."""
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
     column = [point * dim + axis for terms in rows for point, axis, _ in terms]
@@ -54,7 +54,7 @@ def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
 
 
 def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: Sequence[int]) -> list[list[Term]]:
-    """Return the equations by which points follow the motion of a reference point with its rotation.
+    """Return the equations of a rigid coupling: points follow the translation and rotation of a reference point.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: 
 
 
 def distributing_rows(reference: ReferencePoint, points: Indices, places: Array, weight: Array) -> list[list[Term]]:
-    """Return the equations by which a reference point follows the mean motion of points.
+    """Return the equations of a distributing coupling: a reference point follows the mean motion of points.
 
     The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the points.
 
@@ -85,7 +85,7 @@ def distributing_rows(reference: ReferencePoint, points: Indices, places: Array,
     places : ndarray (n, dim)
         Their reference coordinates [length].
     weight : ndarray (n,)
-        Whose sum is 1 [-].
+        Weights of sum 1 [-].
     """
     dim = places.shape[1]
     middle = weight @ places
@@ -103,10 +103,11 @@ def distributing_rows(reference: ReferencePoint, points: Indices, places: Array,
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
-    """Return a reference point by the name of its group; ModelError if it is not one."""
+    """Return a reference point by the name of its group; ModelError if there is none of that name."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
-            f"'{name}' is no reference point: make the model of fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
+            f"'{name}' is not a reference point: make the model of "
+            f"fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
         )
     point = mesh.point(name)
     return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))
@@ -116,7 +117,7 @@ def coupling(
     mesh: Mesh, kinematics: str, names: tuple[str, str], kind: str, axes: Sequence[int],
     weighting: tuple[str, float | None] = ("uniform", None),
 ) -> MultiPointConstraint:  # fmt: skip
-    """Return the relation of a coupling.
+    """Return the multi-point constraint of a coupling.
 
     Parameters
     ----------
@@ -126,15 +127,14 @@ def coupling(
         Reference point and group.
     kind : {"rigid", "distributing"}
     axes : sequence of int
-        Components that follow; all for a distributing one.
+        Coupled components; all for a distributing coupling.
     weighting : (str, float or None)
-        Of a distributing one, by the distance from the reference point; see `Spread`.
+        Weighting of a distributing coupling by the distance from the reference point; see `Spread`.
 
     MeshError, ModelError if there are no such groups, or they cannot be coupled.
     """
     name = f"the coupling of '{names[0]}' with '{names[1]}'"
-    if kind not in KINDS:
-        raise ModelError(unknown("kind of coupling", kind, KINDS))
+    check_known("kind of coupling", kind, KINDS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
             f"{name}: in axisymmetry nothing can rotate; use couple('{names[1]}', 'y') to move a group as one"

@@ -1,4 +1,4 @@
-"""A model in words: what will be solved."""
+"""Textual description of a model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS = {
 
 
 def sentences(model: Any) -> Iterator[str]:
-    """Yield what a `Model` is made of, a line each: kinematics and mesh, materials, supports, loads, contact, solution."""
+    """Yield lines that describe a `Model`: kinematics and mesh, materials, supports, loads, contact, solution."""
     mesh = model.mesh
     cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
     article = "An" if model.kinematics == "axisymmetric" else "A"
@@ -45,7 +45,7 @@ def sentences(model: Any) -> Iterator[str]:
     for load in model.loads:
         yield f"Load: {load.name}: {_load(load)}{_history(load.ramp)}."
     for temperature in model.temperatures:
-        if temperature.place:  # a further instant of the one before
+        if temperature.place:  # another instant of the previous one
             continue
         value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
         where = temperature.name.removeprefix("the temperature of ")
@@ -89,11 +89,11 @@ def _supports(model: Any) -> Iterator[str]:
     for support in model.supports:
         value = "a function of position" if callable(support.value) else f"{support.value:g}"
         component = f"{'xyz'[support.component]} = {value}"
-        parts = by_place.setdefault((support.group, support.ramp), [])
-        parts.append(component)
+        texts = by_place.setdefault((support.group, support.ramp), [])
+        texts.append(component)
         if support.rotation is not None and support.component == model.mesh.dim - 1:
             turn = support.rotation
-            parts.append(f"turned by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
+            texts.append(f"turned by {turn.angle:g} radian about {turn.centre}{_history(support.rotation_ramp)}")
     for (group, ramp), components in by_place.items():
         count = len(model.mesh.points_of(group))
         yield f"Support: {', '.join(components)} on '{group}' ({count} points){_history(ramp)}."

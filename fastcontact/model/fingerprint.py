@@ -1,7 +1,7 @@
 """Fingerprints of models: short digests of each part. Models with equal fingerprints have equal results.
 
-Numbers count bit for bit, functions by their values at the points that they act on. Names of groups count, the order in
-which loads and supports were added does not, and neither does what may change when an analysis is resumed: titles, the
+Numbers are compared bit for bit, functions by their values at the points on which they act. Names of groups are included; the
+order in which loads and supports were added is not, nor is anything that may change when an analysis is resumed: titles, the
 linear solver, tolerances and limits.
 """
 
@@ -34,12 +34,12 @@ SMOOTHING = "surface_smoothing of contact"
 def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[str, str]:
     """Return the digest of each part of a model, and of the options (plain values by name) that change its results.
 
-    By the name of the part in messages: "the mesh", "the materials", "contact 'hertz'", ...
+    Keys are the names of the parts in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
     elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
     bends = [elements and material.incompatible_modes for material, _ in model.materials]
-    parts: dict[str, Any] = {
+    inputs: dict[str, Any] = {
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),
         "the materials": model.materials,
@@ -61,7 +61,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
-    return {"the mesh": _digest_of_mesh(mesh), **{name: _digest(part, mesh) for name, part in parts.items()}}
+    return {"the mesh": _digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
 
 
 def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
@@ -70,9 +70,9 @@ def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
 
 
 def formulation_behind(model: Model, name: str, digest: str | None) -> str | None:
-    """Return what to write for a pair so that it has a `digest` of before, where another formulation is all that differs.
+    """Return the formulation with which a pair has an earlier `digest`, if this is the only difference, else None.
 
-    None where it is not: pairs that named none had other defaults in earlier versions.
+    Pairs without a formulation had other defaults in earlier versions.
     """
     (pair,) = (candidate for candidate in model.contact if candidate.name == name)
     plain = _without(_without(pair, "surface_smoothing"), "multipliers")
@@ -89,7 +89,7 @@ def _without(pair: ContactPair, option: str) -> ContactPair:
 
 
 def _choices() -> Iterable[tuple[str, dict[str, str]]]:
-    """Return formulations and what they may need to be told."""
+    """Return formulations with options that they may need."""
     for formulation in FORMULATIONS:
         yield formulation, {}
     for multipliers in ("standard", "dual"):
@@ -142,13 +142,15 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
     """Add a description with fields, an obstacle or a function."""
     add(type(value).__qualname__.encode())
     points = _points_of(value, mesh, points)
-    fields = [field for field in dataclasses.fields(value) if field.init] if dataclasses.is_dataclass(value) else []
+    is_material = isinstance(value, Material)
+    fields = list(dataclasses.fields(value)) if dataclasses.is_dataclass(value) else []
+    fields = [field for field in fields if field.init or is_material]
     if hasattr(value, "distance"):
         _take(list(value.distance(points)), add, mesh, points)
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
-    if isinstance(value, Material):  # a density or expansion that is not given counts as little as in older files
+    if is_material:  # a density or expansion that is not given counts as little as in older files
         fields = [field for field in fields if getattr(value, field.name) is not None]
         fields = [field for field in fields if field.name != "incompatible_modes"]
     if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # likewise
@@ -157,7 +159,7 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if field.name not in ("begins", "ends", "reached") or value.temporary]
     if isinstance(value, ContactPair):
         fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
-    if isinstance(value, LinearElastic):  # what the choice comes to, and nothing where it is plain, as in older files
+    if isinstance(value, LinearElastic):  # the effective choice, and nothing for "plain", as in older files
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")
     for field in fields:
@@ -166,15 +168,15 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
 
 
 def _called(function: Callable[[Array], Any], points: Array) -> Any:
-    """Return the values (n,) of a function of position; its name where it has none at these points."""
+    """Return the values (n,) of a function of position; its name if it fails at these points."""
     try:
         return np.asarray(function(points), float)
-    except Exception:  # the check of the model reports what is wrong with a user's function
+    except Exception:  # the check of the model reports errors in a user's function
         return getattr(function, "__qualname__", "function")
 
 
 def _points_of(value: Any, mesh: Mesh, points: Array) -> Array:
-    """Return the positions where the functions of a load, support or contact pair count."""
+    """Return the positions at which the functions of a load, support or contact pair are evaluated."""
     group = value.secondary if isinstance(value, ContactPair) else getattr(value, "group", None)
     if isinstance(group, str) and group in mesh.group_names:
         return np.asarray(mesh.points[mesh.points_of(group)])

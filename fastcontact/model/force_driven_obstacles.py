@@ -1,10 +1,9 @@
-"""Rigid obstacles moved by forces: each is a body of one more point, without stiffness, that contact alone holds.
+"""Rigid obstacles moved by forces: each is a body of one additional point, without stiffness, that only contact holds.
 
 The points of the mesh are followed by one for each such obstacle; its displacement is that of the obstacle. Components
-under a force are free rigid motions like those of a body without supports, and get weak springs like theirs (see
-`analysis.floating_bodies`); the others are prescribed. A gap against a rigid obstacle changes by
-``n . (u - q)``, with q its displacement: the row of an obstacle is minus what the row of the gap makes of a common
-translation of all points.
+under a force are free rigid motions like those of a floating body, and get weak springs like these (see
+`analysis.floating_bodies`); the others are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``, with q the
+displacement of the obstacle: the row of the obstacle is minus the sum of the gap's row over all points.
 """
 
 from __future__ import annotations
@@ -28,14 +27,14 @@ from fastcontact.model.rigid_motions import FreeMotions
 
 @dataclass(frozen=True, eq=False)
 class ForceDrivenObstacles:
-    """The obstacles of a model that forces drive; what has no extra points passes through unchanged.
+    """The force-driven obstacles of a model; without any, all methods return their arguments unchanged.
 
     Parameters
     ----------
     pairs : sequence of ContactPair
-        Those with such an obstacle.
+        Contact pairs with such an obstacle.
     shape : (int, int)
-        Of the points of the mesh, (n_points, dim).
+        Shape of the points of the mesh, (n_points, dim).
     """
 
     pairs: Sequence[ContactPair]
@@ -62,11 +61,11 @@ class ForceDrivenObstacles:
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
 
     def positions(self, u: Array) -> dict[str, Array]:
-        """Return by contact pair the displacements (dim,) of the obstacles, from all displacements u (n_dofs,) [length]."""
+        """Return the displacement (dim,) of the obstacle of each pair, from all displacements u (n_dofs,) [length]."""
         return {pair.name: u[self.dofs(number)] for number, pair in enumerate(self.pairs)}
 
     def number(self, name: str) -> int | None:
-        """Return the number of the obstacle of contact pair `name`, None if no force drives it."""
+        """Return the number of the obstacle of contact pair `name`, None if it is not force-driven."""
         return next((i for i, pair in enumerate(self.pairs) if pair.name == name), None)
 
     def stiffness(self, K: bsr_array) -> bsr_array:
@@ -77,7 +76,7 @@ class ForceDrivenObstacles:
         return bsr_array((K.data, K.indices, indptr), shape=(self.n_dofs, self.n_dofs))
 
     def relations(self, relations: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
-        """Return relations whose rows have columns for the obstacles, too."""
+        """Return constraints with additional columns for the obstacles."""
         if not self.pairs:
             return list(relations)
         return [dataclasses.replace(relation, rows=self._wider(relation.rows)) for relation in relations]
@@ -91,26 +90,26 @@ class ForceDrivenObstacles:
         return np.vstack([fixed, np.array(held, bool).reshape(-1, self.shape[1])])
 
     def prescribed(self, by_ramp: dict[PartHistory, Array]) -> dict[PartHistory, Array]:
-        """Return by history the displacements (n_points + n, dim) at multiplier 1, those of the obstacles included."""
+        """Return the displacements (n_points + n, dim) at multiplier 1 by history, including those of the obstacles."""
         return self._with(by_ramp, [pair.motion for pair in self.pairs])
 
     def forces(self, by_ramp: Mapping[Table | None, Array]) -> dict[PartHistory, Array]:
-        """Return by history the forces (n_points + n, dim) at multiplier 1, those on the obstacles included."""
+        """Return the forces (n_points + n, dim) at multiplier 1 by history, including those on the obstacles."""
         return self._with(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
 
     def _with(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
         n, dim = self.shape
         wider: dict[PartHistory, Array] = {
-            ramp: np.vstack([part, np.zeros((len(self), dim))]) for ramp, part in by_ramp.items()
+            ramp: np.vstack([rows, np.zeros((len(self), dim))]) for ramp, rows in by_ramp.items()
         }
         for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
             if any(value):
-                part = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
-                part[n + number] = value
+                rows = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
+                rows[n + number] = value
         return wider
 
     def motions(self, motions: FreeMotions) -> FreeMotions:
-        """Return free motions with those of the obstacles, one a component under a force."""
+        """Return free motions including those of the obstacles, one for each component under a force."""
         if not self.pairs:
             return motions
         free = np.flatnonzero(self.without_stiffness)
@@ -123,20 +122,20 @@ class ForceDrivenObstacles:
             (f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
-        parts = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
-        return FreeMotions(displacement, parts, [*motions.labels, *labels], motions.hinges)
+        matrix = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)
+        return FreeMotions(displacement, matrix, [*motions.labels, *labels], motions.hinges)
 
     def near_nullspace(self, modes: Array) -> Array:
-        """Return displacements (n_dofs, k) that cost little energy: `modes`, translations first, and obstacles with them."""
+        """Return the near null space (n_dofs, k): `modes`, translations first, extended to the obstacles."""
         return np.vstack([modes, np.tile(np.eye(self.shape[1], modes.shape[1]), (len(self), 1))])
 
     def constraints(
         self, name: str, constraints: Constraints, position: Array, moved: Array | None = None
     ) -> Constraints:
-        """Return the constraints of pair `name`, set up with its obstacle at `position` (dim,), with the obstacle free.
+        """Return the constraints of pair `name`, computed with its obstacle at `position` (dim,), with the obstacle free.
 
-        Rows then have columns for all obstacles, and slip counts the motion of the obstacle. Where it turns, too, `moved`
-        (dim,) is what it has moved in the step as far as `constraints` counts that as slip [length].
+        Rows then have columns for all obstacles, and slip includes the motion of the obstacle. If the obstacle also rotates,
+        `moved` (dim,) is its motion in the step that `constraints` already includes as slip [length].
         """
         if not self.pairs:
             return constraints
@@ -154,7 +153,7 @@ class ForceDrivenObstacles:
         )
 
     def _free(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
-        """Return rows with those of the obstacle that they act against, and their direction (m, dim)."""
+        """Return rows extended by the columns of their obstacle, and their direction (m, dim)."""
         n, dim = self.shape
         direction = rows @ np.tile(np.eye(dim), (n, 1))
         directions = np.zeros((rows.shape[0], len(self) * dim))

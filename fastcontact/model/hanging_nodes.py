@@ -1,6 +1,6 @@
-"""Nodes that lie on facets of their own body without belonging to them: there the body is torn.
+"""Hanging nodes: nodes that lie on facets of their own body without belonging to them, where the body is torn.
 
-Where a coarse and a fine mesh meet, only the nodes of both are joined; the others hang, and their side opens or overlaps.
+Where a coarse and a fine mesh meet, only common nodes are connected; the others hang, and gaps or overlaps arise.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from fastcontact.model.rigid_motions import node_at
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Nodes nearer to a facet than this, in facet lengths, lie on it; those as near to its nodes lie at them. Fine facets of an
-# arc leave a coarse one by more; there the facets at all corners of the coarse one tell that it is no slit.
+# Nodes nearer to a facet than this, in facet lengths, lie on it; nodes as near to its nodes coincide with these. Fine
+# facets of an arc deviate more from a coarse one; there the facets at all corners of the coarse one show that it is no slit.
 NEAR, ON_ARC = 0.02, 0.1
-# More facets than these face no node at such a distance.
+# Largest number of facets that face a node at such a distance.
 MOST = 8
 
 
 @dataclass(frozen=True, eq=False)
 class OuterFacets:
-    """Facets of the outside of all bodies as if flat: nodes (n, k), -1 for none; the rest (n, ...) [length], [-].
+    """Outer facets of all bodies, treated as flat: nodes (n, k), -1 for none; the other arrays (n, ...) [length], [-].
 
-    `rise` is how far nodes between the corners stand out of the plane, `size` the diagonal of the box around the corners;
-    `kind` (n,) is which of the `elements` they are.
+    `rise` is the distance of nodes between the corners from the plane, `size` the diagonal of the box around the corners;
+    `kind` (n,) is the index in `elements`.
     """
 
     nodes: Numbers
@@ -51,20 +51,20 @@ class OuterFacets:
 
 
 def hanging_nodes_warning(model: Model) -> str:
-    """Return a warning if nodes hang on facets of their own body and neither contact nor relations join them to it."""
+    """Return a warning if nodes hang on facets of their own body without a contact or constraint between them."""
     mesh = model.mesh
     node, facet, outer = hanging_nodes(mesh)
-    kept = np.ones(len(node), bool)
+    relevant = np.ones(len(node), bool)
     held = np.zeros(mesh.n_points, bool)
     held[model.holding_rows().indices // mesh.dim] = True
-    kept &= ~held[node]
+    relevant &= ~held[node]
     for pair in model.contact if len(node) else ():
         if pair.primary:
-            kept &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
-            kept &= ~_joined(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
-    if not kept.any():
+            relevant &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
+            relevant &= ~_joined(mesh, pair.primary, pair.secondary, node, outer.corners[facet])
+    if not relevant.any():
         return ""
-    node, facet = node[kept], facet[kept]
+    node, facet = node[relevant], facet[relevant]
     where = ", ".join(f"{x:.6g}" for x in outer.centre[facet[0]])
     return (
         f"{len(np.unique(node))} nodes lie on facets of their own body that they do not belong to (first: "
@@ -74,11 +74,11 @@ def hanging_nodes_warning(model: Model) -> str:
 
 
 def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
-    """Return whether nodes (m,) belong to one side of a contact, and facets (m, n_corners) to its other one."""
-    ours, theirs = np.zeros((2, mesh.n_points), bool)
-    ours[mesh.points_of(nodes_of)] = True
-    theirs[mesh.points_of(facets_of)] = True
-    return np.asarray(ours[node] & (theirs[corners] | (corners < 0)).all(axis=1))
+    """Return whether nodes (m,) belong to one side of a contact, and facets (m, n_corners) to the other side."""
+    on_side, on_opposite = np.zeros((2, mesh.n_points), bool)
+    on_side[mesh.points_of(nodes_of)] = True
+    on_opposite[mesh.points_of(facets_of)] = True
+    return np.asarray(on_side[node] & (on_opposite[corners] | (corners < 0)).all(axis=1))
 
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
@@ -104,8 +104,8 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     row, column = np.nonzero(facets >= 0)
     node, facet = nodes[row], facets[row, column]
     _, body = bodies(mesh)
-    kept = body[node] == body[outer.corners[facet, 0]]
-    node, facet = node[kept], facet[kept]
+    same_body = body[node] == body[outer.corners[facet, 0]]
+    node, facet = node[same_body], facet[same_body]
     on = _within(mesh.points, node, outer, facet)
     node, facet = node[on], facet[on]
     height = np.abs(_heights(mesh, node, outer, facet)) / outer.size[facet]
@@ -118,7 +118,7 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
 
 
 def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Array:
-    """Return how far nodes (m,) stand above facets (m,), of which the middles of curved ones bulge [length]."""
+    """Return the heights of nodes (m,) above facets (m,), including the bulge of curved ones [length]."""
     height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
     for kind, name in enumerate(outer.elements):
         element, rows = elements.get(name), np.flatnonzero(outer.kind[facet] == kind)
@@ -138,18 +138,18 @@ def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> A
 def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
     """Return whether nodes (m,) belong to the cells behind facets (m,), or to their neighbours.
 
-    So they do on the far side of a thin sheet, and not where meshes meet: cells of both have no facet in common, but for one
-    whose middle nodes only one of them has.
+    This is the case on the far side of a thin sheet, but not where meshes meet: their cells have no common facet, except
+    for one whose middle nodes belong to only one of them.
     """
     corners = outer.corners[facet]
-    asked = np.zeros(mesh.n_points, bool)
-    asked[node], asked[corners] = True, True
+    involved = np.zeros(mesh.n_points, bool)
+    involved[node], involved[corners] = True, True
     cells: dict[int, list[tuple[frozenset[int], str]]] = {}
     for name, block in mesh.solids.items() if len(node) else ():
-        for nodes in block[asked[block].any(axis=1)].tolist():
-            own = frozenset(nodes[: elements.get(name).n_corners]), name
+        for nodes in block[involved[block].any(axis=1)].tolist():
+            key = frozenset(nodes[: elements.get(name).n_corners]), name
             for number in nodes:
-                cells.setdefault(number, []).append(own)
+                cells.setdefault(number, []).append(key)
     across = np.zeros(len(node), bool)
     for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
         kind = outer.elements[outer.kind[facet[k]]]
@@ -160,20 +160,20 @@ def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Ma
 
 
 def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
-    """Return whether at every corner of facets (m,) another one looks the opposite way, as at both ends of a closed tear."""
+    """Return whether every corner of facets (m,) has another facet of opposite normal, as at both ends of a closed tear."""
     if not len(facet):
         return np.empty(0, bool)
     n, width = outer.corners.shape
     at = csr_array((np.ones(n * width), (outer.corners.ravel(), np.repeat(np.arange(n), width))))
-    # For each pair of a corner and a facet there, whether its normal is opposite to that of the facet asked about.
+    # For each pair of a corner and a facet there, whether its normal is opposite to that of the given facet.
     kinds, which = np.unique(facet, return_inverse=True)
     closed = np.ones(len(kinds), bool)
     for corner in outer.corners[kinds].T:
         rows = at[corner]
-        asked = np.repeat(np.arange(len(kinds)), np.diff(rows.indptr))
-        along = np.einsum("kd,kd->k", outer.normal[kinds[asked]], outer.normal[rows.indices])
+        row = np.repeat(np.arange(len(kinds)), np.diff(rows.indptr))
+        along = np.einsum("kd,kd->k", outer.normal[kinds[row]], outer.normal[rows.indices])
         opposite = np.zeros(len(kinds), bool)
-        opposite[asked[along < -0.5]] = True
+        opposite[row[along < -0.5]] = True
         closed &= opposite
     return np.asarray(closed[which.ravel()])
 
@@ -204,7 +204,7 @@ def _outer(mesh: Mesh) -> OuterFacets:
 
 
 def _rise(element: Element, x: Array) -> Array:
-    """Return how far the nodes of facets (n, n_nodes, dim) stand out of their flat shapes, (n,) [length]."""
+    """Return the largest distances (n,) of the nodes of facets (n, n_nodes, dim) from their flat shapes [length]."""
     if element.order == 1:
         return np.zeros(len(x))
     straight = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
@@ -212,16 +212,16 @@ def _rise(element: Element, x: Array) -> Array:
 
 
 def _middles(x: Array) -> Array:
-    """Return the mean corners (n, 3) of faces (n, 4, 3), of which triangles repeat the last."""
+    """Return the mean corners (n, 3) of faces (n, 4, 3), in which triangles repeat the last."""
     weight = np.where((x[:, 3] == x[:, 2]).all(axis=1), 0.0, 1.0)[:, None]
     return np.asarray((x[:, 0] + x[:, 1] + x[:, 2] + weight * x[:, 3]) / (3.0 + weight))
 
 
 def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
-    """Return whether nodes (m,) lie over the inside or an edge of facets (m,), away from all of their nodes."""
+    """Return whether nodes (m,) project on the inside or an edge of facets (m,), away from all of their nodes."""
     members, size = outer.nodes[facet], outer.size[facet]
-    apart = np.linalg.norm(points[members] - points[node][:, None], axis=2)
-    away = (np.where(members >= 0, apart, np.inf) > NEAR * size[:, None]).all(axis=1)
+    distance = np.linalg.norm(points[members] - points[node][:, None], axis=2)
+    away = (np.where(members >= 0, distance, np.inf) > NEAR * size[:, None]).all(axis=1)
     x, point = points[outer.corners[facet]], points[node]
     if points.shape[1] == 2:
         return np.asarray(away & _in_simplex(point, x))

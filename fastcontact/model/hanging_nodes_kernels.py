@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets that nodes lie close to without belonging to them, by a tree of boxes."""
+"""Facets close to nodes that do not belong to them, found by a tree of boxes."""
 
 import numpy as np
 

@@ -31,8 +31,8 @@ from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
-# What a user finds in a model beside `add_...`; the rest serves the analysis.
-# What acts in some load steps alone.
+# Public methods and attributes of a model other than `add_...`; the rest is for the analysis.
+# Items that may act in some load steps only.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
 PUBLIC = (
     "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
@@ -44,10 +44,11 @@ PUBLIC = (
 class Model(ModelSupports):
     """An elastic contact problem.
 
-    Methods check what they are given at once, and `check` the whole: a MeshError, ModelError or ContactError says in one
-    line what is wrong and how to mend it. Prescribed values are numbers, or functions from reference positions (n, dim)
-    [length] to numbers (n,). A `ramp` is a history of its own, as pairs (instant, multiplier) or a `Ramp`, whose table
-    counts; without one the history is that of the analysis. Normals and areas are those of the reference configuration.
+    Methods check their arguments, and `check` checks the whole model: a MeshError, ModelError or ContactError states
+    in one line the cause and the remedy. Prescribed values are numbers, or functions from reference positions (n, dim)
+    [length] to numbers (n,). A `ramp` is a separate history, as pairs (instant, multiplier) or a `Ramp`, whose table
+    is used; by default the history is that of the analysis. Normals and areas are those of the reference
+    configuration.
 
     Parameters
     ----------
@@ -58,15 +59,16 @@ class Model(ModelSupports):
     case_text : str
         Text kept in result files beside the numbers, usually the case file.
     strain : {"small", "finite"}
-        ``"finite"``: the bodies may stretch and turn (total Lagrangian): `NeoHookean` and its like, and `LinearElastic` as
-        Saint Venant-Kirchhoff's law, for small strains under large rotations. Pressures follow the deformed surface, other
-        loads keep their directions and reference areas; stresses are Cauchy's.
+        ``"finite"``: finite strains and rotations (total Lagrangian), with hyperelastic materials such as
+        `NeoHookean`, or with `LinearElastic` as the Saint Venant-Kirchhoff law for small strains and large rotations.
+        Pressures follow the deformed surface, other loads keep their directions and reference areas; stresses are
+        Cauchy stresses.
     reference_temperature : float
-        Where heat is conducted: of the bodies before any load, without thermal strain [temperature].
+        With heat conduction, the initial temperature of the bodies, without thermal strain [temperature].
     units : str or mapping of str to str
-        Names of the units of length, force and pressure that all numbers are in, ``"mm, N, MPa"``, or by ``"length"``,
-        ``"force"``, ``"pressure"``: tables, reports, pictures and result files show them, a warning tells if force / length^2
-        is no pressure. They change no number, and none need be given.
+        Names of the units of length, force and pressure, ``"mm, N, MPa"``, or by ``"length"``, ``"force"``,
+        ``"pressure"``. Tables, reports, pictures and result files show them, and a warning is given if force /
+        length^2 is not the unit of pressure. They are optional and change no number.
 
     Examples
     --------
@@ -89,12 +91,12 @@ class Model(ModelSupports):
 
     def _repr_html_(self) -> str:
         """Return `describe` as a table for notebooks."""
-        head, *parts = sentences(self)
-        rows = [sentence.split(": ", 1) for sentence in parts if ": " in sentence]
+        head, *lines = sentences(self)
+        rows = [sentence.split(": ", 1) for sentence in lines if ": " in sentence]
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
-        """Return a description of the model in words, one line each for kinematics, materials, supports, loads and contact.
+        """Return a description of the model, one line each for kinematics, materials, supports, loads and contact.
 
         Examples
         --------
@@ -138,7 +140,7 @@ class Model(ModelSupports):
         if self.initial_states:
             self.refuse_nonlinear("initial stresses and strains are")
         fixed, prescribed = self.prescribed_by_ramp()
-        self._tell_axis()
+        self._log_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
         for begin in self._changes():
@@ -180,16 +182,16 @@ class Model(ModelSupports):
                 raise _in_steps_after(begin, error) from None
 
     def _acting(self, begin: float) -> Model:
-        """Return the model with what acts in the load step that begins at an instant."""
+        """Return the model with the items that act in the load step that begins at an instant."""
         acting = copy.copy(self)
         acting.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
         acting.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
         return acting
 
     def _changes(self) -> list[float]:
-        """Return the instants at which temporary relations, temperatures or films begin or end, and 0."""
-        temporary = [own for own in (*self.relations, *self.heat_loads) if isinstance(own, TEMPORARY)]
-        return sorted({0.0, *(t for own in temporary for t in (own.begins, own.ends) if 0.0 < t < np.inf)})
+        """Return the instants at which temporary constraints, temperatures or films begin or end, and 0."""
+        temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
+        return sorted({0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)})
 
     def _check_relations(self, fixed: Mask, prescribed: Mapping[PartHistory, Array], ramp: Ramp) -> None:
         relations = [relation for relation in self.relations if not isinstance(relation, TemporaryConstraint)]
@@ -201,14 +203,14 @@ class Model(ModelSupports):
             motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in relations]))
 
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
-        """Refuse motions without deformation that no supports, relations, springs or loads against a contact stop."""
+        """Refuse rigid-body motions that no supports, constraints, springs or loads against a contact prevent."""
         driven = self.force_driven
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
         at_rest, still = Configuration.undeformed(self.mesh.points), np.zeros(self.mesh.dim)
-        parts = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
-        rows = [resisting(constraints)[0] @ motions.displacement for constraints in parts]
+        fixing = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
+        rows = [resisting(constraints)[0] @ motions.displacement for constraints in fixing]
         works = [generalised(motions, force.ravel()) for force in forces]
         k = len(motions)
         gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])

@@ -1,4 +1,4 @@
-"""The rotation of a rigid obstacle, or of a support, as a user gives it: checked, with its history."""
+"""Rotations of rigid obstacles and supports given by a user: checks and histories."""
 
 from __future__ import annotations
 
@@ -9,23 +9,22 @@ from typing import Any
 from fastcontact._tools.argument_types import finite_vector
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.elasticity.loads import check_number
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
 KEYS = ("angle", "centre", "axis", "ramp")
-# What slides may turn so far in a step [radian]: its path is then the arc that a point of the surface makes.
+# Largest rotation in a step with sliding [radian]: the path of a point is then approximated by an arc.
 LARGEST_TURN = 1.0
 
 
 def rotation_of(caption: str, given: Mapping[str, Any], kinematics: str) -> tuple[Rotation, Table | None]:
-    """Return the rotation that messages call `caption`, and its history, None for that of the motion.
+    """Return a rotation, called `caption` in messages, and its history, None for that of the motion.
 
-    ModelError if they are wrong.
+    Raises ModelError if they are not admissible.
     """
     for key in given:
-        if key not in KEYS:
-            raise ModelError(unknown(f"key of {caption}", key, KEYS))
+        check_known(f"key of {caption}", key, KEYS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
             f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: make a "
@@ -53,7 +52,7 @@ def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
 
 
 def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
-    """Return by how much the obstacle of a pair has turned at an instant [radian]."""
+    """Return the rotation of the obstacle of a pair at an instant [radian]."""
     if pair.rotation is None:
         return 0.0
     ramp_of_rotation = pair.ramp if pair.rotation_ramp is None else pair.rotation_ramp
@@ -61,7 +60,7 @@ def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
 
 
 def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
-    """Raise ModelError if an obstacle with friction turns so far in a load step that the path of sliding is not known."""
+    """Raise ModelError if an obstacle with friction rotates too far in a load step for the path of slip to be known."""
     for pair in pairs:
         if pair.rotation is None or not pair.options.get("friction"):
             continue

@@ -1,4 +1,4 @@
-"""The options of a contact pair that do not depend on its formulation, from what a user wrote to what surfaces need."""
+"""Conversion and checks of the user's options of a contact pair that do not depend on its formulation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.contact.overclosure import ExponentialLaw, OverclosureLaw, Tabu
 from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import check_number, check_value, evaluated
-from fastcontact.errors import ContactError, unknown
+from fastcontact.errors import ContactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table, table_of
 
@@ -24,9 +24,9 @@ from fastcontact.model.ramp import Table, table_of
 def pair_options(
     name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool
 ) -> PairOptions:
-    """Return the options of contact pair `name` with the secondary `side`, as formulations need them.
+    """Return the options of contact pair `name` with the secondary `side`, converted for formulations.
 
-    ContactError or ModelError if an option is wrong; the message names the pair.
+    Raises ContactError or ModelError if an option is wrong; the message names the pair.
     """
     if against_obstacle and "clearance_primary" in options:
         raise ContactError(
@@ -55,7 +55,7 @@ def pair_options(
     )
 
 
-# Of a cohesive layer and of adhesion: the numbers that must be given, and those that may be.
+# Required and optional numbers of a cohesive layer and of adhesion.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),
@@ -67,7 +67,7 @@ CHOICES = {"initiation": ("bk", "quadratic", "maximum"), "mixed_mode": ("bk", "p
 
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
-    """Return the law of what holds the sides together, None where nothing does."""
+    """Return the cohesive law of a pair, None without one."""
     chosen = [option for option in LAWS if option in options]
     if not chosen:
         return None
@@ -75,27 +75,25 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     excess = [option for option in beside if option in options and option != chosen[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
-        raise ContactError(f"contact '{name}' has {chosen[0]}, which knows no {other}: leave out one of both")
-    option, given = chosen[0], options[chosen[0]]
+        raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of both")
+    option, constants = chosen[0], options[chosen[0]]
     needed, allowed = LAWS[option]
-    if not isinstance(given, Mapping) or not set(needed) <= set(given):
+    if not isinstance(constants, Mapping) or not set(needed) <= set(constants):
         raise ContactError(
             f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name"
         )
-    for key, value in given.items():
-        if key not in needed + allowed:
-            raise ContactError(unknown(f"number of the {option} of contact '{name}'", str(key), needed + allowed))
+    for key, value in constants.items():
+        check_known(f"number of the {option} of contact '{name}'", key, needed + allowed, ContactError)
         if key in CHOICES:
-            if value not in CHOICES[key]:
-                raise ContactError(unknown(f"{key} in the {option} of contact '{name}'", str(value), CHOICES[key]))
+            check_known(f"{key} in the {option} of contact '{name}'", value, CHOICES[key], ContactError)
             continue
         check_number(f"the {key} in the {option} of contact '{name}'", value)
         if not value > 0:
             raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
     law = cohesive_law(
-        *(float(given[key]) for key in needed),
+        *(float(constants[key]) for key in needed),
         reversible=option == "adhesion",
-        **{key: value if key in CHOICES else float(value) for key, value in given.items() if key in allowed},
+        **{key: value if key in CHOICES else float(value) for key, value in constants.items() if key in allowed},
     )
     shares = np.linspace(0.0, 1.0, 65)
     onset, end = law.limits(np.sqrt(1.0 - shares), np.sqrt(shares))
@@ -108,12 +106,11 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
 
 
 def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
-    """Return the kind of contact, which other options must not contradict."""
+    """Return the kind of contact, after checks for contradicting options."""
     kind = options.get("kind", "unilateral")
-    if not isinstance(kind, str) or kind not in KINDS:
-        raise ContactError(unknown(f"kind of contact '{name}'", str(kind), KINDS))
+    check_known(f"kind of contact '{name}'", kind, KINDS, ContactError)
     if kind != "unilateral" and options.get("friction"):
-        raise ContactError(f"contact '{name}' is {kind}, which knows no friction: leave out 'friction' or 'kind'")
+        raise ContactError(f"contact '{name}' is {kind}, which excludes friction: leave out 'friction' or 'kind'")
     if options.get("tangential_penalty") is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a tangential_penalty, but no friction that it could soften")
     if kind == "gap_only" and "penalty" in options:
@@ -133,7 +130,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
 
 
 def _positive(name: str, option: str, options: Mapping[str, Any], without: str) -> float | None:
-    """Return the number of an option that must be positive, None where it is not given; `without` says what that means."""
+    """Return the positive number of an option, None if not given; `without` is the effect of leaving it out."""
     value = options.get(option)
     if value is None:
         return None
@@ -144,7 +141,7 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
 
 
 def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_obstacle: bool) -> None:
-    """Refuse heat that crosses to an obstacle of unknown temperature, and a temperature of what is none."""
+    """Refuse heat flow to an obstacle of unknown temperature, and a temperature without an obstacle."""
     temperature = options.get("obstacle_temperature")
     if temperature is None:
         if against_obstacle and {"conductance", "friction_heat"} & set(options):
@@ -160,7 +157,7 @@ def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_o
 
 
 def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
-    """Return what part of the work of friction becomes heat; zero where it is not given."""
+    """Return the fraction of the frictional work that becomes heat; zero if not given."""
     fraction = options.get("friction_heat", 0.0)
     check_number(f"the friction_heat of contact '{name}'", fraction)
     if not 0.0 <= fraction <= 1.0:
@@ -173,7 +170,7 @@ def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
 
 
 def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Array | None:
-    """Return the vector (dim,) that an option gives, None where it is not given."""
+    """Return the vector (dim,) of an option, None if not given."""
     value = options.get(option)
     if value is None:
         return None
@@ -201,7 +198,7 @@ def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | 
 
 
 def _tangential_penalty(name: str, value: Any) -> Field | None:
-    """Return a number or a function of position as a function; None for none."""
+    """Return a number or a function of position as a function; pass None through."""
     penalty = _function(f"the tangential_penalty of contact '{name}'", value)
     return None if penalty is None else partial(_all_positive, penalty, name)
 
@@ -217,7 +214,7 @@ def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
 
 
 def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
-    """Refuse a history of the coefficient of friction without one, and negative multipliers."""
+    """Refuse a history of friction without a coefficient of friction, and negative multipliers."""
     table = friction_ramp(name, options)
     if table is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_ramp, but no friction that it could multiply")
@@ -228,17 +225,17 @@ def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
 
 
 def friction_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the history of the coefficient of friction of contact pair `name`, None where it does not change."""
+    """Return the history of the coefficient of friction of contact pair `name`, None if it is constant."""
     return table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
 
 
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the history of the clearance of contact pair `name`, None where it does not change."""
+    """Return the history of the clearance of contact pair `name`, None if it is constant."""
     return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:
-    """Return a mask (n_points,) of the nodes of the groups that an option names; None for no groups."""
+    """Return a mask (n_points,) of the nodes of the groups named by an option; None without groups."""
     groups = options.get(option)
     if groups is None:
         return None

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.sparse import csr_array, kron, vstack
 from scipy.sparse.csgraph import connected_components
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.obstacles.rotation import Rotation
 from fastcontact.contact.projection import places
@@ -23,15 +24,15 @@ from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import less_first, matched
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# How far off the facets of the other end nodes may lie, and beyond their ends, in facet sizes: chords of curved ends.
+# Largest distance of nodes from the facets of the other end, and beyond their ends, in facet sizes: sag of curved ends.
 BESIDE = 0.02
 
 
 class PeriodicInterface(NamedTuple):
-    """Nodes of two groups that are one and the same place of a part that repeats itself: each (m,).
+    """Coincident nodes of two ends of a periodic part: each (m,).
 
-    Of the ends of one of several `sectors`, vectors at the second node are those at the first one times `turn` (dim, dim), a
-    `rotation`, which `relation` says; None where nothing turns.
+    At the ends of one of several `sectors`, vectors at the second node are those at the first one times `turn` (dim, dim), a
+    `rotation`, by the constraint `relation`; None without a rotation.
     """
 
     first: Indices
@@ -43,7 +44,7 @@ class PeriodicInterface(NamedTuple):
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
-    """Return for each node (n_points,) the first of those at its place; None without any."""
+    """Return the first of the coincident nodes for each node (n_points,); None without any."""
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))
@@ -57,7 +58,7 @@ def periodic(
     mesh: Mesh, ends: tuple[str, str], jump: Mapping[int, float], free: Sequence[int],
     translation: Sequence[float] | None, ramp: Table | None,
 ) -> tuple[list[MultiPointConstraint], PeriodicInterface]:  # fmt: skip
-    """Return the relations of two ends a period apart, and which nodes they tie.
+    """Return the constraints of two ends a period apart, and the nodes that they tie.
 
     Parameters
     ----------
@@ -65,11 +66,11 @@ def periodic(
     ends : (str, str)
         Groups.
     jump : mapping of int to float
-        By component, how much farther the second end moves than the first one at multiplier 1 [length].
+        Displacement of the second end relative to the first at multiplier 1, by component [length].
     free : sequence of int
-        Components in which this is the same for all nodes, but not known.
+        Components in which it is equal for all nodes, but unknown.
     translation : sequence of float (dim,), optional
-        From the first end to the second one; by default from middle to middle [length].
+        Vector from the first end to the second; by default between their centroids [length].
     ramp : Table, optional
         History of the jump.
 
@@ -96,7 +97,7 @@ def periodic(
 def cyclic(
     mesh: Mesh, ends: tuple[str, str], sectors: int, origin: Sequence[float], direction: Sequence[float]
 ) -> tuple[list[MultiPointConstraint], PeriodicInterface | None]:
-    """Return the relations of the two ends of a sector, and which nodes they tie: None where nodes follow facets.
+    """Return the constraints of the two ends of a sector, and the nodes that they tie, None if nodes follow facets.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def cyclic(
     ends : (str, str)
         Groups.
     sectors : int
-        How many make the whole.
+        Number of sectors in the ring.
     origin, direction : sequence of float
         A point of the axis (dim,) [length] and its direction (3,) [-].
 
@@ -130,14 +131,14 @@ def cyclic(
                 return [MultiPointConstraint(name, _without_zeros(rows_of))], None
     raise ModelError(
         f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
-        f"nearest node of '{ends[1]}', and the groups are no facets that lie upon each other: check axis and sectors"
+        f"nearest node of '{ends[1]}', and the groups are not facets that lie upon each other: check axis and sectors"
     )
 
 
 def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr_array:
-    """Return the rows (m, n_dofs) of ``u_second = phase Q u_first`` along the axes of the mesh, Q the turn of an interface.
+    """Return the rows (m, n_dofs) of ``u_second = phase Q u_first`` along the axes of the mesh, Q that of an interface.
 
-    None for what lies along the axis on it, without a phase.
+    On the axis, the component along it has no row without a phase.
     """
     assert interface.turn is not None
     back = -phase * interface.turn.T
@@ -146,9 +147,9 @@ def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr
 
 
 def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign: float) -> csr_array | None:
-    """Return rows by which the nodes of one end have the turned displacements of the facets of the other one that they face.
+    """Return rows that tie the nodes of one end to the rotated displacements of the opposite facets of the other end.
 
-    None where nodes, turned, do not lie on these. Linear fields meet them exactly.
+    None if rotated nodes do not lie on these facets. Linear fields satisfy the rows exactly.
     """
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
@@ -162,12 +163,12 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
     weights = csr_array(
         (on.shape.ravel(), (np.repeat(np.arange(m), on.nodes.shape[1]), on.nodes.ravel())), shape=(m, n)
     )
-    own = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
-    return csr_array(kron(own, turn) - kron(weights, np.eye(dim)))
+    identity = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
+    return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
 
 
 def _without_zeros(rows: csr_array) -> csr_array:
-    """Return rows without their round-off, and without those of nothing else: along the axis on it."""
+    """Return rows without round-off entries, and without rows that only consist of these, as on the axis along it."""
     rows.sum_duplicates()
     rows.data[np.abs(rows.data) < ROUND_OFF] = 0.0
     rows.eliminate_zeros()
@@ -177,18 +178,15 @@ def _without_zeros(rows: csr_array) -> csr_array:
 def _turned(
     mesh: Mesh, first: Indices, second: Indices, rotation: Rotation, sign: float
 ) -> tuple[Array, Indices, Array]:
-    """Return how far each node of the first end lies from the nearest one of the second [length], which, and the matrix."""
-    from scipy.spatial import cKDTree
-
+    """Return the distances of rotated first nodes to the nearest second nodes [length], these nodes, and the matrix."""
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
-    distance, match = cKDTree(mesh.points[second]).query((mesh.points[first] - centre) @ turn.T + centre)
-    return np.asarray(distance), np.asarray(match, np.intp), turn
+    return *nearest(mesh.points[second], (mesh.points[first] - centre) @ turn.T + centre), turn
 
 
 def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) -> csr_array:
     """Return rows (m, n_dofs): second nodes along the first column of `directions` (dim, 1 or 2), plus first nodes along the
-    last one; with one column less first nodes along it.
+    second; with one column, minus first nodes along it.
     """
-    theirs = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
+    direction = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
     nodes = np.column_stack([interface.second, interface.first])
-    return nodal_rows(nodes, np.tile([directions[:, 0], theirs], (len(nodes), 1, 1)), mesh.points.size)
+    return nodal_rows(nodes, np.tile([directions[:, 0], direction], (len(nodes), 1, 1)), mesh.points.size)

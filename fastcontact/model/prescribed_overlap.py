@@ -19,24 +19,24 @@ from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Pairs = Sequence[tuple[ContactPair, Formulation]]
-# A gap that changes with a displacement by less than this does not depend on it [-].
+# Coefficients of a gap below this are zero [-].
 STILL = 1e-6
-# Depths below this fraction of the largest prescribed displacement are no mistake.
+# Depths below this fraction of the largest prescribed displacement are admissible.
 SMALL = 1e-3
-# So many instants of a history are looked at.
+# Number of instants of a history that are checked.
 SOME = 20
 
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """What supports prescribe: which components (n_points, dim), by history their values at multiplier 1 [length], a ramp."""
+    """Prescribed displacements: components (n_points, dim), values at multiplier 1 by history [length], and the ramp."""
 
     fixed: Mask
     by_ramp: Mapping[PartHistory, Array]
     ramp: Ramp
 
     def instants(self) -> list[float]:
-        """Return some instants of the ramp, the first and the last among them."""
+        """Return a sample of the instants of the ramp, including the first and the last."""
         instants = list(self.ramp.instants)
         return [instants[k] for k in np.unique(np.linspace(0, len(instants) - 1, SOME).round().astype(int))]
 
@@ -47,7 +47,7 @@ class Supports:
 
 @dataclass(frozen=True)
 class Overlap:
-    """`count` of the `total` nodes that face the other side of a pair are off it by up to `depth` [length], at `point`."""
+    """`count` of the `total` nodes that face the other side of a pair penetrate by up to `depth` [length], at `point`."""
 
     count: int
     total: int
@@ -57,7 +57,7 @@ class Overlap:
 
 
 def check_prescribed(pairs: Pairs, supports: Supports) -> None:
-    """Raise ModelError if supports alone bring all nodes of a contact that face its other side into that side."""
+    """Raise ModelError if prescribed displacements make all facing nodes of a contact penetrate the other side."""
     for contact, formulation, worst in _overlaps(pairs, supports):
         if worst.count == worst.total:
             raise ModelError(
@@ -67,7 +67,7 @@ def check_prescribed(pairs: Pairs, supports: Supports) -> None:
 
 
 def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
-    """Return a warning for each contact with nodes that supports alone bring into its other side."""
+    """Return a warning for each contact with nodes whose prescribed displacements cause penetration."""
     return [
         f"{_described(contact, formulation, worst)}: contact forces cannot change what supports prescribe; leave these nodes "
         "out of the support, or out of the contact ('excluded')"
@@ -86,14 +86,14 @@ def _described(contact: ContactPair, formulation: Formulation, overlap: Overlap)
 
 
 def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, Formulation, Overlap]]:
-    """Return for each pair what supports do to its nodes at the worst instant, if that is wrong."""
+    """Yield the overlap of each pair at the worst instant, if it is inadmissible."""
     for contact, formulation in pairs:
         side = formulation.secondary
         usable = side.points[~formulation.options.excluded_nodes(side)]
         nodes = usable[supports.fixed[usable].any(axis=1)]
         if not len(nodes) or contact.force or formulation.options.penalty is not None:
             continue
-        # The others face the other side as well, as far as this matters.
+        # The other nodes count as facing the other side.
         others = len(usable) - len(nodes)
         overlaps = [_at(contact, formulation, nodes, supports, instant) for instant in supports.instants()]
         worst = max(overlaps, key=lambda overlap: overlap.depth)
@@ -102,7 +102,7 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
 
 
 def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports: Supports, instant: float) -> Overlap:
-    """Return what supports do to some secondary nodes at an instant."""
+    """Return the overlap of some secondary nodes at an instant."""
     displacement, ramp = supports.at(instant), supports.ramp
     still = np.zeros(displacement.shape[1])
     obstacle = still
@@ -122,9 +122,9 @@ def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports
 
 
 def _depth(formulation: Formulation, candidates: Candidates, at: Configuration, fixed: Mask) -> tuple[Array, Mask]:
-    """Return how deep supports bring nodes (m,) into the other side [length], and which face it.
+    """Return the depths of nodes (m,) in the other side due to supports [length], and which nodes face it.
 
-    Zero where the gap depends on anything that no support prescribes. What overlaps before any load does not count.
+    Zero where the gap depends on unsupported components. Initial overlaps are subtracted.
     """
     before, rows, paired = _gaps(formulation, candidates, Configuration.undeformed(formulation.points), bare=True)
     gap, rows, paired = _gaps(formulation, candidates, at)
@@ -149,7 +149,7 @@ def _gaps(
 
 
 def _torn(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
-    """Return how far supports move tied nodes (m,) off their places on the other side [length], and which face it."""
+    """Return the relative displacements of tied nodes (m,) due to supports [length], and which nodes face the other side."""
     pairing = formulation.facing(candidates, Configuration.undeformed(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):
@@ -160,7 +160,7 @@ def _torn(formulation: Formulation, candidates: Candidates, displacement: Array,
 
 
 def _decided(rows: csr_array, fixed: Mask) -> Mask:
-    """Return whether each of the rows (m, n_dofs) depends on supported components alone."""
+    """Return whether each of the rows (m, n_dofs) only depends on supported components."""
     free = np.abs(rows.data) > STILL
     free &= ~fixed.ravel()[rows.indices]
     return np.asarray(np.diff(np.concatenate([[0], np.cumsum(free)])[rows.indptr]) == 0)

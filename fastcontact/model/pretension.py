@@ -19,7 +19,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.relation_rows import along, less_first, matched, normals_of
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# A bolt whose direction is farther from the normal of its section than this cosine tells is a mistake [-].
+# Smallest cosine of the angle between the direction of a bolt and the normal of its section [-].
 ALONG = 0.7
 
 
@@ -30,17 +30,17 @@ class Pretension:
     Attributes
     ----------
     label : str
-        What results call it.
+        Name in results.
     nodes, opposite : ndarray of int (m,)
-        Points of both sides, one upon the other.
+        Coincident points of both sides.
     normal : ndarray (dim,)
         Unit vector from the first side to the opposite one, along the bolt [-].
     force : float
-        That pulls the sides together, at multiplier 1 [force].
+        Force that pulls the sides together, at multiplier 1 [force].
     shortening : float or None
-        By which they approach, at multiplier 1 [length]; None where the force decides.
+        Relative approach of the sides, at multiplier 1 [length]; None if the force is given.
     locked_from : float or None
-        Instant from which the shortening stays as it is.
+        Instant from which the shortening is kept.
     ramp : tuple, optional
         History of force or shortening.
     """
@@ -56,12 +56,12 @@ class Pretension:
 
     @property
     def name(self) -> str:
-        """What it is, for messages."""
+        """Description for messages."""
         return f"pretension '{self.label}'"
 
     @property
     def prescribed(self) -> str:
-        """What the relation is called that prescribes its shortening."""
+        """Name of the constraint that prescribes the shortening."""
         return f"the shortening of {self.name}"
 
     def row(self, n_dofs: int) -> csr_array:
@@ -70,12 +70,12 @@ class Pretension:
         return csr_array(csr_array(np.full((1, m), 1.0 / m)) @ self._approach(self.normal, n_dofs))
 
     def _approach(self, direction: Array, n_dofs: int) -> csr_array:
-        """Return rows (m, n_dofs): by how much each node approaches the opposite one along a unit vector (dim,) [-]."""
+        """Return rows (m, n_dofs) of the approach of each node to the opposite one along a unit vector (dim,) [-]."""
         each = np.tile(direction, (len(self.nodes), 1))
         return csr_array(along(self.nodes, each, n_dofs) - along(self.opposite, each, n_dofs))
 
     def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
-        """Return the relations that hold at all times: no shear, one shortening of all nodes, the prescribed one if any."""
+        """Return the permanent constraints: no shear, equal shortening of all nodes, the prescribed shortening if any."""
         rows = [self._approach(direction, n_dofs) for direction in _across(self.normal)]
         approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
@@ -88,11 +88,11 @@ class Pretension:
         return constraints
 
     def shortened(self, displacement: Array) -> float:
-        """Return by how much the sides approach in displacements (n_points, dim) [length]."""
+        """Return the approach of the sides at displacements (n_points, dim) [length]."""
         return float((self.row(displacement.size) @ displacement.ravel())[0])
 
     def locked(self, n_dofs: int, reached: float) -> MultiPointConstraint:
-        """Return the relation that keeps a shortening [length]."""
+        """Return the constraint that keeps a shortening [length]."""
         return MultiPointConstraint(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
 
 
@@ -168,7 +168,7 @@ def pretension(
 
 
 def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Indices, Indices]:
-    """Return the points of both sides of a section, one upon the other."""
+    """Return the coincident points of both sides of a section."""
     other = section + OPPOSITE if opposite is None else opposite
     nodes = mesh.points_of(section).astype(np.intp)
     if opposite is None and other not in mesh.group_names:
@@ -187,7 +187,7 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
 
 
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
-    """Return the unit normal (dim,) of a section, of its plane where none is given."""
+    """Return the unit normal (dim,) of a section, by default that of its plane."""
     if normal is not None:
         vector = finite_vector(normal, mesh.dim)
         if vector is None or not vector.any():
@@ -202,7 +202,7 @@ def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | Non
 
 
 def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
-    """Return a direction (dim,) along a bolt so that it points out of the body that has the section, to the other side."""
+    """Return a direction (dim,) along a bolt, oriented out of the body of the section, to the other side."""
     if section not in mesh.cell_groups or not mesh.cells_of(section, mesh.dim - 1):
         return direction
     mean = normals_of(mesh, section)[1].mean(axis=0)
@@ -226,17 +226,17 @@ def _across(normal: Array) -> Array:
 def locked_lengths(
     sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return by name the shortenings of the sections that are locked at an instant [length].
+    """Return the shortenings of the sections that are locked at an instant, by name [length].
 
-    Those `kept` from when they were locked, those of displacements (n_points, dim) [length] of the others: what a solution
-    keeps of a shortening is round-off beside it.
+    Values `kept` from the time of locking are used; those of newly locked sections follow from displacements (n_points, dim)
+    [length]. In later solutions the shortening is only reproduced up to round-off.
     """
     locked = [bolt for bolt in sections if bolt.locked_from is not None and begin >= bolt.locked_from]
     return {bolt.label: kept[bolt.label] if bolt.label in kept else bolt.shortened(displacement) for bolt in locked}
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
-    """Raise ModelError if a section is locked inside of a load step, or from the beginning."""
+    """Raise ModelError if a section is locked inside a load step, or from the beginning."""
     for bolt in sections:
         at = bolt.locked_from
         if at is not None and at <= 0.0:
@@ -259,9 +259,9 @@ def section_results(
     ----------
     sections : sequence of Pretension
     displacement, reaction : ndarray (n_points, dim)
-        Of a step [length], [force]; reactions include the forces of relations.
+        Displacements [length] and reactions [force] of a step; reactions include the forces of constraints.
     factors : sequence of float
-        What the force of each section is multiplied with [-].
+        Factor on the force of each section [-].
     """
     results = {}
     for section, factor in zip(sections, factors, strict=True):

@@ -21,14 +21,14 @@ Table = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Harmonic:
-    """The history of the sine of an angle, or of one minus its cosine: what a rotation is linear in.
+    """The history of the sine of an angle, or of one minus its cosine, in which a rotation is linear.
 
     Attributes
     ----------
     ramp : Table, optional
         History of the angle; None: that of the analysis.
     angle : float
-        At multiplier 1 [radian].
+        Angle at multiplier 1 [radian].
     versine : bool
         Whether it is one minus the cosine.
     """
@@ -43,16 +43,16 @@ class Harmonic:
         return 2.0 * math.sin(0.5 * angle) ** 2 if self.versine else math.sin(angle)
 
 
-# By what parts of the prescribed displacements are multiplied.
+# Histories of parts of the prescribed displacements.
 PartHistory = Table | Harmonic | None
 # Largest number of equal steps; more are probably a typing error.
 MOST_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") -> Table:
-    """Return the points (instant, multiplier) of a piecewise linear function of time; messages call it `caption`.
+    """Return the points (instant, multiplier) of a piecewise linear function of time, called `caption` in messages.
 
-    ModelError if there are fewer than two, their instants do not ascend, or a number is not finite.
+    Raises ModelError if there are fewer than two, their instants do not ascend, or a number is not finite.
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
@@ -69,7 +69,7 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
 
 
 def table_of(ramp: History, caption: str) -> Table | None:
-    """Return the table of a history, None for none; errors as for `checked_table`."""
+    """Return the table of a history, pass None through; errors as for `checked_table`."""
     if ramp is None:
         return None
     return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, caption)
@@ -91,9 +91,9 @@ class Ramp:
     Parameters
     ----------
     instants : sequence or array of float
-        Load factors (pseudo-times) at which a step ends, ascending.
+        Ascending load factors (pseudo-times) at the ends of the steps.
     table : sequence of (float, float)
-        Points (instant, multiplier of the loads) of the function, ascending instants.
+        Points (instant, multiplier of the loads) of the function, with ascending instants.
 
     Examples
     --------
@@ -133,7 +133,7 @@ class Ramp:
         return table_value(self.table, instant)
 
 
-# A history of a single load: a ramp, whose table counts, or pairs (instant, multiplier).
+# History of a single load: a ramp, of which the table is used, or pairs (instant, multiplier).
 History = Ramp | Iterable[Iterable[float]] | None
 
 
@@ -141,7 +141,7 @@ History = Ramp | Iterable[Iterable[float]] | None
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """Return a ramp of equal steps from zero load to full load at `end`.
 
-    ModelError if `steps` is not a whole number from 1 to a million or `end` is not positive.
+    ModelError if `steps` is not an integer from 1 to a million or `end` is not positive.
 
     Examples
     --------
@@ -162,10 +162,10 @@ RampLike = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
 
 
 def ramp_of(steps: RampLike | None) -> Ramp:
-    """Return the ramp that a user means: a `Ramp` itself, a number of equal steps, or an array; None: 20 equal steps.
+    """Return the ramp of a `Ramp`, a number of equal steps, or an array; None: 20 equal steps.
 
-    Load factors (n,) are the ends of the steps, with loads in proportion to them, also beyond 1. Pairs (instant, multiplier)
-    (n, 2) are the points of the load function, and each but the first ends a step.
+    Load factors (n,) are the ends of the steps, with loads proportional to them, also beyond 1. Pairs (instant, multiplier)
+    (n, 2) are the points of the load function, and all except the first end a step.
     """
     if steps is None:
         return linear_ramp()
@@ -189,7 +189,7 @@ def ramp_of(steps: RampLike | None) -> Ramp:
 
 
 def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
-    """Return the multiplier of a load at `instant`: that of its own history, or else of the ramp."""
+    """Return the multiplier of a load at `instant`: that of its own history, or that of the ramp."""
     if isinstance(table, Harmonic):
         return table.value(multiplier(table.ramp, ramp, instant))
     return ramp.value(instant) if table is None else table_value(table, instant)

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.argument_types import finite_vector
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -36,7 +37,7 @@ def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
 
 
 def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices, Array]]:
-    """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components that a name stands for.
+    """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components in a name.
 
     The name is ``"normal"``, or some of the letters x, y, z.
     """
@@ -52,24 +53,22 @@ def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
 
 
 def less_first(rows: csr_array) -> csr_array:
-    """Return all rows (m, n) but the first one, less the first one."""
+    """Return the differences of all rows (m, n) except the first and the first one."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
 def matched(
     mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], translation: Sequence[float] | None
 ) -> Indices:
-    """Return, for each node of the first group, the place among the nodes of the second where it lies after `translation`.
+    """Return, for each node of the first group, the index of the coincident node of the second after `translation`.
 
-    Without one, groups are moved middle upon middle.
+    By default the centroid of the first group is moved to that of the second.
 
     Raises
     ------
     ModelError
-        If the groups have other numbers of nodes, or do not lie upon each other.
+        If the groups have different numbers of nodes, or do not coincide.
     """
-    from scipy.spatial import cKDTree
-
     (name, nodes), (other, opposite) = first, second
     if len(nodes) != len(opposite):
         raise ModelError(
@@ -83,7 +82,7 @@ def matched(
         if given is None:
             raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
         shift = given
-    distance, match = cKDTree(theirs).query(ours + shift)
+    distance, match = nearest(theirs, ours + shift)
     size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
     far = int(np.argmax(distance))
     if distance[far] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
@@ -91,4 +90,4 @@ def matched(
             f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
             "groups are joined nodes upon nodes; give the translation that brings them there, or another mesh"
         )
-    return np.asarray(match, np.intp)
+    return match

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -20,9 +20,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs join the same facets, in whichever roles, or press them on the same obstacle.
+    """Raise ContactError if two pairs have the same facets, in any roles, or press them on the same obstacle.
 
-    One side may meet several others: each pair then has an opposite side of its own.
+    One side may face several others: each pair then has a different opposite side.
     """
     if pair.obstacle is not None or other.obstacle is not None:
         _check_obstacles(mesh, pair, other)
@@ -32,24 +32,24 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
             "already: leave out one of the two"
         )
     else:
-        for ours, theirs in ((other.secondary, other.primary), (other.primary, other.secondary)):
-            _check_sides(mesh, pair, other, ours, theirs)
+        for facing, opposite in ((other.secondary, other.primary), (other.primary, other.secondary)):
+            _check_sides(mesh, pair, other, facing, opposite)
 
 
-def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, ours: str, theirs: str) -> None:
-    """Compare the secondary side of `pair` with the side `ours` of `other`, the primary one with `theirs`."""
-    secondary = shared_facets(mesh, pair.secondary, ours)
-    if len(secondary) and len(shared_facets(mesh, pair.primary, theirs)):
+def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, facing: str, opposite: str) -> None:
+    """Compare the secondary side of `pair` with the side `facing` of `other`, the primary one with `opposite`."""
+    secondary = shared_facets(mesh, pair.secondary, facing)
+    if len(secondary) and len(shared_facets(mesh, pair.primary, opposite)):
         raise ContactError(
             f"contact '{pair.name}' joins facets of '{pair.secondary}' and '{pair.primary}' that contact '{other.name}' "
-            f"joins already: '{pair.secondary}' and '{ours}' share facets with {len(secondary)} nodes (first: point "
-            f"{secondary[0]}), '{pair.primary}' and '{theirs}' share facets, too. Leave out one of the two contacts, or make "
-            "their groups apart"
+            f"joins already: '{pair.secondary}' and '{facing}' share facets with {len(secondary)} nodes (first: point "
+            f"{secondary[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the two contacts, or "
+            "make their groups apart"
         )
 
 
 def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
-    """Return whether a contact with another body joins facets of two groups, in whichever roles."""
+    """Return whether a contact with another body has facets of both groups, in any roles."""
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
@@ -79,14 +79,13 @@ def _moved(pair: ContactPair) -> tuple[Any, ...]:
     return pair.motion, pair.ramp, pair.rotation, pair.rotation_ramp
 
 
-def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> list[str]:
-    """Return a warning for each two pairs whose sides go on in each other at common nodes, on both bodies.
+def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
+    """Yield a warning for each two pairs whose sides continue each other at common nodes, on both bodies.
 
-    Each pair has a pressure of its own at such a node, and only the sum of both follows from the gap: it is spread over
-    the neighbours in a way that means nothing. Node-to-segment shares the force of a node by areas, which is right where
-    both pairs have the same primary side; where that is cut, too, each pair faces a part of it alone.
+    Each pair has its own pressure at such a node, but only the sum of both follows from the gap: its division, also over the
+    neighbours, is arbitrary. Node-to-segment contact divides the force of a node by areas, which is correct if both
+    pairs have the same primary side; if that is divided, too, each pair faces a part of it only.
     """
-    texts = []
     for (one, ours), (other, theirs) in combinations(pairs, 2):
         if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):
             continue
@@ -96,12 +95,11 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> lis
         for secondary, primary in roles:
             nodes = _common(ours.points, ours.secondary, secondary)
             if len(nodes) and len(_common(ours.points, ours.primary, primary)):
-                texts.append(
+                yield (
                     f"contacts '{one.name}' and '{other.name}' go on in each other at {len(nodes)} common nodes of their "
                     f"sides (first: point {nodes[0]}): the pressure near these is not unique; make one contact of both, "
                     "with one group for each side"
                 )
-    return texts
 
 
 def _common(points: Array, side: Surface, other: Surface) -> Numbers:
@@ -114,6 +112,6 @@ def _common(points: Array, side: Surface, other: Surface) -> Numbers:
 
 
 def _places(side: Surface, nodes: Numbers) -> Indices:
-    """Return the places of nodes among the points of a side."""
+    """Return the positions of nodes among the points of a side."""
     order = np.argsort(side.points)
     return np.asarray(order[np.searchsorted(side.points, nodes, sorter=order)])

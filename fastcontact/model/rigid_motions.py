@@ -1,7 +1,7 @@
 """Rigid-body modes left free by supports and multi-point constraints, and whether contact can stop them.
 
-A body in contact stays in equilibrium if no motion that opens gaps, or leaves them, is driven by the loads: the loads
-then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).
+A body in contact is in equilibrium if the loads do no positive work on motions that open gaps or leave them unchanged: the
+loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).
 """
 
 from __future__ import annotations
@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
@@ -27,25 +26,26 @@ MODE_NAMES = {
     "plane_stress": ("translation along x", "translation along y", "rotation"),
     "3d": tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"),
 }
-# Relative to the motions, whose largest displacement is about 1.
+# Tolerance relative to the motions, whose largest displacement is about 1.
 ZERO = 1e-8
-# A motion that contact does not stop within this multiple of the size of the model is not stopped at all.
+# A motion that contact does not stop within this multiple of the size of the model is unbounded.
 FAR = 1e3
-# Of the pyramid that stands for Coulomb's cone in space: forces up to 8 % outside of the cone are left to the solution.
+# Number of edges of the pyramid that approximates Coulomb's cone in space: forces up to 8 % outside the cone are
+# accepted here.
 EDGES = 8
-# A coefficient of friction larger by this factor counts as none that could hold a body.
+# Largest factor on the coefficient of friction that is considered to hold a body.
 MOST_FRICTION = 100.0
-# A mesh of more motions of parts between hinges is no structure that anybody meant.
+# Largest number of motions of parts between hinges; a mesh with more is defective.
 MANY = 1500
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """Independent motions without deformation that supports and relations allow.
+    """Independent rigid-body motions that supports and constraints allow.
 
     The `displacement` (n_dofs, k) of all points has about 1 as largest entry of a column; `parts` (p, k) are the same motions
-    as combinations of elementary ones, and `labels` body and name of each of those. `hinges` (m,) are the nodes at which
-    parts of bodies hang together, one or several in line.
+    as combinations of elementary ones, and `labels` body and name of each of those. `hinges` (m,) are the nodes that connect
+    parts of bodies, one or several in line.
     """
 
     displacement: Array
@@ -61,11 +61,11 @@ class FreeMotions:
         return replace(self, displacement=self.displacement @ coefficients, parts=self.parts @ coefficients)
 
     def names(self) -> list[str]:
-        """Return a description of each motion: bodies and elementary motions that it mixes."""
+        """Return a description of each motion: the bodies and elementary motions that it combines."""
         return ["; ".join(f"{body}: {motion}" for body, motion in self._mixed(column)) for column in self.parts.T]
 
     def by_body(self) -> dict[str, list[str]]:
-        """Return the names of the motions of each body, each once: joint motions may hold alike ones of one body."""
+        """Return the names of the motions of each body, each once, even if joint motions contain it repeatedly."""
         by_body: dict[str, list[str]] = {}
         for column in self.parts.T:
             for body, motion in self._mixed(column):
@@ -80,7 +80,7 @@ class FreeMotions:
         return [(body, " with ".join(motions)) for body, motions in mixed.items()]
 
 
-def body_name(mesh: Mesh, body: NDArray[np.integer], number: int) -> str:
+def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
     """Return a name for a body, given that of each point: a cell group whose solid cells are all of it, or its number."""
     members = np.flatnonzero(body == number)
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
@@ -96,39 +96,39 @@ def _group_of(mesh: Mesh, members: Indices) -> str:
 
 
 def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array | None = None) -> FreeMotions:
-    """Return the motions without deformation that the supports `fixed` (n_points, dim) and the relations allow.
+    """Return the rigid-body motions that the supports `fixed` (n_points, dim) and the constraints allow.
 
-    Bodies move as a whole; parts of a body that hang together at single nodes turn about those. `relations` (m, n_dofs) are
-    rows R with ``R u = 0``; points of no body move freely where relations name them.
+    Bodies move as a whole; parts of a body that are connected at single nodes rotate about these. `relations` (m, n_dofs) are
+    rows R with ``R u = 0``; points without a body move freely if constraints contain them.
     """
     dofs = mesh.n_points * mesh.dim
     motions = _of_bodies(mesh, kinematics, fixed)
-    columns, parts, labels = [motions.displacement], [motions.parts], list(motions.labels)
+    columns, matrices, labels = [motions.displacement], [motions.parts], list(motions.labels)
     if relations is not None:
-        lone = bodies(mesh)[1][relations.indices // mesh.dim] < 0
-        for dof in np.unique(relations.indices[lone & ~fixed.ravel()[relations.indices]]):
+        reference = bodies(mesh)[1][relations.indices // mesh.dim] < 0
+        for dof in np.unique(relations.indices[reference & ~fixed.ravel()[relations.indices]]):
             columns.append(np.eye(dofs, 1, -int(dof)))
-            parts.append(np.ones((1, 1)))
+            matrices.append(np.ones((1, 1)))
             labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
-    motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*parts), float), labels, motions.hinges)
+    motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*matrices), float), labels, motions.hinges)
     if relations is None or not relations.shape[0] or not len(motions):
         return motions
     return motions.combined(_null_space(relations @ motions.displacement))
 
 
 def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
-    """Return the motions that the supports `fixed` (n_points, dim) leave to bodies, and to parts of them at hinges."""
+    """Return the motions of bodies, and of their parts at hinges, that the supports `fixed` (n_points, dim) leave free."""
     rigid = _parts_of(mesh, kinematics)
     moving: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
-    parts, labels = [np.empty((0, 0))], []
+    matrices, labels = [np.empty((0, 0))], []
     for number in range(rigid.count):
         members = rigid.nodes_of(number)
         modes = rigid_modes(mesh.points[members], kinematics)
         modes = modes / np.abs(modes).max(axis=0)
-        free = _null_space(modes[fixed[members].ravel()])  # combinations of the part's modes that no support stops
+        free = _null_space(modes[fixed[members].ravel()])  # combinations of the part's modes without support
         moving.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
         if free.shape[1]:
-            parts.append(free)
+            matrices.append(free)
             labels += [(_part_name(mesh, rigid, number), name) for name in MODE_NAMES[kinematics]]
     kept = _turning_about(mesh, rigid, moving)
     spans = np.split(kept, np.cumsum([motion.shape[2] for _, motion in moving]))
@@ -137,22 +137,22 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         members_of_body = rigid.part[members] == number
         displacement[members[members_of_body]] = motion[members_of_body] @ span
     return FreeMotions(
-        displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*parts), float) @ kept, labels,
+        displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*matrices), float) @ kept, labels,
         np.unique(rigid.hinge_node),
     )  # fmt: skip
 
 
 def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
-    """Return what moves as a whole: bodies, or parts of them between hinges."""
+    """Return the rigid parts: bodies, or parts of them between hinges."""
     if kinematics != "axisymmetric":
         return rigid_parts(mesh)
-    # Rings have no motion but along the axis, and one common node passes that on.
+    # Rings only move along the axis, and one common node transmits this motion.
     count, body = bodies(mesh)
     return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
 
 
 def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Array]]) -> Array:
-    """Return the combinations (k, j) of the motions of all parts under which nodes at hinges stay together."""
+    """Return the combinations (k, j) of the motions of all parts for which nodes at hinges stay together."""
     width = sum(motion.shape[2] for _, motion in moving)
     if not len(rigid.hinge_node):
         return np.eye(width)
@@ -171,7 +171,7 @@ def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Ar
 
 
 def node_at(mesh: Mesh, node: int) -> str:
-    """Return the number and the place of a node for messages."""
+    """Return the number and the position of a node for messages."""
     return f"point {node} at ({', '.join(f'{x:.6g}' for x in mesh.points[node])})"
 
 
@@ -182,8 +182,8 @@ def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"
     if not len(hinges):
         return name
-    part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
-    return f"{name}, the part {part} that hangs at {node_at(mesh, hinges[0])}"
+    place = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
+    return f"{name}, the part {place} that hangs at {node_at(mesh, hinges[0])}"
 
 
 def _null_space(A: Array) -> Array:
@@ -194,10 +194,10 @@ def _null_space(A: Array) -> Array:
 
 
 def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
-    """Return rows and gaps at u = 0 that must stay >= 0 if nothing slides: gaps, and edges of the friction cone.
+    """Return rows and gaps at u = 0 that must stay >= 0 without slip: gaps, and edges of the friction cone.
 
     A contact force lies in the cone of the rows: normal, with friction in the plane ``n + mu t`` and ``n - mu t``, in space
-    in the pyramid of EDGES that is circumscribed to Coulomb's cone. Equations resist both ways.
+    the pyramid with EDGES circumscribed to Coulomb's cone. Equations act in both directions.
     """
     rows, gap0 = _edges(constraints)
     if constraints.equality is None:
@@ -231,19 +231,23 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 
-def generalised(motions: FreeMotions, force: Array) -> Array:
-    """Return the work (k,) that nodal forces (n_dofs,) do on each motion; round-off counts as zero [force]."""
+def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
+    """Return the work (k,) that nodal forces (n_dofs,) do on each motion; round-off counts as zero [force].
+
+    That of these forces, or of the `largest` works before, of which they may be what is left.
+    """
     work = motions.displacement.T @ force
-    work[np.abs(work) <= 1e-10 * (np.abs(motions.displacement).T @ np.abs(force))] = 0.0
+    scale = np.maximum(np.abs(motions.displacement).T @ np.abs(force), largest)
+    work[np.abs(work) <= 1e-10 * scale] = 0.0
     return work
 
 
 def unstopped(gaps: Array, works: Array) -> Array:
     """Return motions (k, j) that neither contact nor contact and loads together can stop.
 
-    From the change of the `gaps` (m, k) and the `works` (l, k) of the loads under each motion, whose largest displacement is
-    about 1. A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the load drives it
-    against the contact, or away from it, shows in the solution.
+    `gaps` (m, k) are the changes of the gaps and `works` (l, k) the works of the loads for each motion, whose largest
+    displacement is about 1. A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the
+    load drives it towards the contact, or away from it, is decided by the solution.
     """
     k = gaps.shape[1]
     gaps = np.where(np.abs(gaps) > ZERO, gaps, 0.0)
@@ -263,8 +267,8 @@ def unstopped(gaps: Array, works: Array) -> Array:
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
     """Return the amplitudes (k,) at which rigid bodies under the loads come to rest in contact, None if they never do.
 
-    From the change of the `gaps` (m, k) under each motion, every `gap` (m,) now, of which penetration counts as closed
-    [length], the `work` (k,) of the loads on each motion, and the `size` of the model [length].
+    `gaps` (m, k) are the changes of the gaps for each motion, `gap` (m,) the current gaps, of which penetration counts
+    as closed [length], `work` (k,) the work of the loads on each motion, and `size` that of the model [length].
     """
     if not work.any():
         return np.zeros(len(work))
@@ -277,9 +281,9 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
 def needed_friction(
     constraints: Constraints, motions: Array, u: Array, work: Array, size: float
 ) -> tuple[float, float] | None:
-    """Return the coefficient of friction that would stop rigid bodies, and the largest that there is [-]; None if none would.
+    """Return the coefficient of friction that would stop rigid bodies, and the largest given one [-]; None if none would.
 
-    `motions` (n_dofs, k) of the bodies, displacements `u` (n_dofs,) [length]; `work` and `size` as in `stopped_at`.
+    `motions` (n_dofs, k) are those of the bodies, `u` (n_dofs,) displacements [length]; `work` and `size` as in `stopped_at`.
     """
     if not constraints.coefficients.any():
         return None

@@ -9,11 +9,11 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, Traction, check_number
-from fastcontact.errors import MeshError, ModelError, unknown
+from fastcontact.errors import MeshError, ModelError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import ROUND_OFF, TINY
 
-# Weights by the distance over the radius, from 1 at the place to 0 at the radius.
+# Weights as functions of the distance over the radius, from 1 at the centre to 0 at the radius.
 WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
     "uniform": np.ones_like,
     "linear": lambda s: 1.0 - s,
@@ -24,7 +24,7 @@ WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
 
 @dataclass(frozen=True)
 class Spread:
-    """How shares of a group depend on the distance from a place.
+    """Weighting of a group by the distance from a point.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Spread:
     weighting : str
         ``"uniform"``, ``"linear"``, ``"quadratic"`` or ``"cubic"``.
     radius : float or None
-        Beyond which shares are zero [length]; None: the distance of the farthest node.
+        Distance beyond which weights are zero [length]; None: that of the farthest node.
     """
 
     place: tuple[float, ...]
@@ -41,13 +41,12 @@ class Spread:
     radius: float | None = None
 
     def check(self, name: str, dim: int) -> None:
-        """Raise ModelError if it cannot be; `name` tells whose it is."""
+        """Raise ModelError, with the `name` of the load, if it is not admissible."""
         if len(self.place) != dim:
             raise ModelError(f"{name}: the place {self.place} it is spread about must be {dim} numbers")
         for number in self.place:
             check_number(f"a coordinate of the place of {name}", number)
-        if self.weighting not in WEIGHTINGS:
-            raise ModelError(f"{name}: {unknown('weighting', self.weighting, WEIGHTINGS)}")
+        check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
         if self.radius is not None:
             check_number(f"the radius of {name}", self.radius)
             if not self.radius > 0.0:
@@ -60,9 +59,10 @@ class Spread:
 
 
 def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Indices, Array]:
-    """Return the points (n,) of a group, and their shares (n,) of what is spread over it [-].
+    """Return the points (n,) of a group, and their shares (n,) of a distributed load [-].
 
-    By area, where the group has facets, times the weights of `spread`. ModelError if nothing lies inside its radius.
+    Shares are proportional to area, if the group has facets, times the weights of `spread`. Raises ModelError if nothing lies
+    inside its radius.
     """
     points, radius = mesh.points_of(group).astype(np.intp), 0.0
     if spread is not None and len(points):
@@ -85,18 +85,18 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
 
 
 def turned(weight: Array, places: Array, moment: Array) -> Array:
-    """Return the forces (n, dim) [force] at points that have a `moment` (1,) or (3,) and no resultant.
+    """Return forces (n, dim) [force] at points with a `moment` (1,) or (3,) and no resultant.
 
-    In proportion to `weight` (n,) [-] and the arms of `places` (n, dim) [length]; see `mean_rotation`.
+    They are proportional to `weight` (n,) [-] and the arms of `places` (n, dim) [length]; see `mean_rotation`.
     """
     return np.asarray(np.einsum("k,knd->nd", moment, mean_rotation(weight, places - weight @ places)))
 
 
 def mean_rotation(weight: Array, arms: Array) -> Array:
-    """Return how displacements of n points make the mean rotation (n_rotations, n, dim) [1 / length].
+    """Return the coefficients (n_rotations, n, dim) of the displacements of n points in their mean rotation [1 / length].
 
-    Of `weight` (n,) [-] and `arms` (n, dim) from their middle [length]. Its products with moments are forces at the points
-    that have this moment, and no resultant.
+    The points have `weight` (n,) [-] and `arms` (n, dim) from their centroid [length]. Products with moments are forces
+    at the points with this moment, and no resultant.
     """
     x, y = arms[:, 0], arms[:, 1]
     zero = np.zeros_like(x)
@@ -118,7 +118,7 @@ def mean_rotation(weight: Array, arms: Array) -> Array:
 
 @dataclass(frozen=True)
 class SpreadForce(Load):
-    """Components of a force [force], spread over a group by the distance from the place through which it acts."""
+    """Components of a force [force], distributed over a group by the distance from its point of application."""
 
     KIND = "the force"
     CONSTANT = True
@@ -156,7 +156,7 @@ class SpreadForce(Load):
 
 
 def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
-    """Return how something is spread about a place, None without one; ModelError if only weighting or radius are given."""
+    """Return the weighting about a point, None without one; ModelError if only weighting or radius are given."""
     if point is None:
         if weighting != "uniform" or radius is not None:
             raise ModelError(

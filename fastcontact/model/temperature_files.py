@@ -14,7 +14,7 @@ from fastcontact.mesh.files.file_fields import read_file_field
 from fastcontact.mesh.files.mesh_fields import at_points_of
 from fastcontact.mesh.mesh import Mesh
 
-# How far a time of a file may lie from the one that is wanted, relative to the latest.
+# Tolerance of the times of a file, relative to the latest.
 SAME_TIME = 1e-9
 
 
@@ -33,7 +33,7 @@ def read_temperatures(
     files = [file] if isinstance(file, (str, os.PathLike)) else list(file)
     if not files:
         raise ModelError("no file is given for the temperature")
-    parts, times = [], []
+    fields, times = [], []
     for path in files:
         field_of_file = read_file_field(path, field, "points")
         values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
@@ -41,9 +41,9 @@ def read_temperatures(
             raise ModelError(
                 f"'{path}' has {len(values)} instants: one of several files has one, or give one file alone"
             )
-        parts.append(values)
+        fields.append(values)
         times.append(field_of_file.times)
-    values, time = np.concatenate(parts), times[0] if len(files) == 1 else None
+    values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
     if instant is None:
         return values, time
     if time is None:

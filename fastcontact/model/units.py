@@ -1,12 +1,12 @@
-"""Units of a model by name: how a text tells them, and whether they fit each other."""
+"""Named units of a model: parsing, and consistency checks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 
-# What units that are known by name measure, in SI.
+# Known units in SI.
 KNOWN: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222},
@@ -18,8 +18,8 @@ KNOWN: dict[str, dict[str, float]] = {
 EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MPa'"
 
 
-def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units by what they measure, given as a text in the order of `KNOWN` or already by that.
+def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
+    """Return the names of units by quantity, given as a text in the order of `KNOWN` or as a mapping.
 
     Raises ModelError for anything else, and for a unit in the place of another kind.
 
@@ -28,27 +28,26 @@ def named_units(given: str | Mapping[str, str]) -> dict[str, str]:
     >>> named_units("mm, N, MPa")
     {'length': 'mm', 'force': 'N', 'pressure': 'MPa'}
     """
-    if isinstance(given, str):
-        names = [name.strip() for name in given.split(",")]
+    if isinstance(units, str):
+        names = [name.strip() for name in units.split(",")]
         if len(names) != len(KNOWN) or not all(names):
-            raise ModelError(f"units = '{given}' must be the {EXAMPLE}")
-        given = dict(zip(KNOWN, names, strict=True))
-    for kind, name in given.items():
-        if kind not in KNOWN:
-            raise ModelError(unknown("kind of unit", kind, KNOWN))
+            raise ModelError(f"units = '{units}' must be the {EXAMPLE}")
+        units = dict(zip(KNOWN, names, strict=True))
+    for kind, name in units.items():
+        check_known("kind of unit", kind, KNOWN, ModelError)
         for other, names_of in KNOWN.items():
             if name in names_of and other != kind:
                 raise ModelError(f"'{name}' is a unit of {other}, not of {kind}: give the {EXAMPLE}")
-    return dict(given)
+    return dict(units)
 
 
 def in_si(units: Mapping[str, str], kind: str) -> float | None:
-    """Return what the unit of a kind measures in SI; None where it has no name, or one that is not known."""
+    """Return the unit of a quantity in SI; None if it has no name, or an unknown one."""
     return KNOWN[kind].get(units.get(kind, ""))
 
 
 def misfit(units: Mapping[str, str]) -> str:
-    """Return in words that force / length^2 is not the unit of pressure; empty where it is, or a unit is not known."""
+    """Return a message if force / length^2 is not the unit of pressure; empty if it is, or a unit is unknown."""
     metre, newton, pascal = (in_si(units, kind) for kind in KNOWN)
     if metre is None or newton is None or pascal is None or 0.99 < (ratio := newton / metre**2 / pascal) < 1.01:
         return ""

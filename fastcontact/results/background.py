@@ -9,20 +9,20 @@ from fastcontact.results.committed_file import uninterrupted
 
 
 class Background:
-    """Runs one task while its caller goes on; signals, such as Ctrl-C, wait while a task is waited for."""
+    """Runner of one task at a time in a thread; signals, such as Ctrl-C, are deferred during `wait`."""
 
     def __init__(self) -> None:
         self._thread: threading.Thread | None = None
         self._failure: BaseException | None = None
 
     def start(self, task: Callable[[], None]) -> None:
-        """Run `task` once the one before it has ended; raise the error of that one instead, if it had any."""
+        """Run `task` once the previous one has ended; if that failed, raise its error instead."""
         self.wait()
         self._thread = threading.Thread(target=self._run, args=(task,), name="fastcontact-writer")
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait until nothing is being done; raise the error of the last task, once."""
+        """Wait until no task is running; raise the error of the last task, once."""
         if self._thread is None:
             return
         with uninterrupted():
@@ -35,5 +35,5 @@ class Background:
     def _run(self, task: Callable[[], None]) -> None:
         try:
             task()
-        except BaseException as error:  # also what no handler of a thread would tell
+        except BaseException as error:  # including those that threads would swallow
             self._failure = error

@@ -1,16 +1,17 @@
 """An HDF5 file that can be opened after every single write.
 
 HDF5 writes the records of its indices in no particular order. A process that is killed between two writes may leave an index
-that leads beyond the end of the file or has lost entries, and with them steps that were complete. Here writes are kept in
-memory until HDF5 flushes, and then done in an order in which each is harmless: first new places, to which nothing leads yet;
-the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node before
-they leave the old one; all else; tables of names last (HDF5 File Format Specification 3.0, sections II.A and III.A).
+that points beyond the end of the file or has lost entries, and with them completed steps. Here writes are buffered in memory
+until HDF5 flushes, and then executed in an order in which each is harmless: first new blocks, to which nothing refers
+yet; the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node
+before they leave the old one; everything else; name tables last (HDF5 File Format Specification 3.0, sections II.A and
+III.A).
 
-HDF5 writes a node of an index or a part of a table as a whole, of which a step changes a few bytes: only what differs from
-the file is written, from the first such byte to the last.
+HDF5 writes whole nodes of indices and parts of tables, of which a step changes a few bytes: only the range from the first to
+the last changed byte is written.
 
-That helps when a process ends, not when the power does: a disk keeps no order. `synchronised` writes are kept in a journal
-until they are done.
+This protects against the end of a process, not against a power loss: disks reorder writes. `synchronised` writes are
+therefore kept in a journal until they are executed.
 """
 
 from __future__ import annotations
@@ -29,25 +30,25 @@ import numpy as np
 from fastcontact._tools.hdf5_driver import DriverFile
 from fastcontact.results import journal
 
-# Where HDF5 begins its superblock, the nodes of its indices and its tables of names.
+# Signatures of the superblock, the nodes of indices and the name tables of HDF5.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
-# Longest write that is compared with the file [bytes]: longer ones are data that change throughout.
+# Longest write that is compared with the file [bytes]: longer ones are data of which everything changes.
 COMPARED = 1 << 16
 
 
 class CommittedFile(DriverFile):
     """An existing HDF5 file, with the methods that `h5py.File` calls; writes wait for `flush`.
 
-    After an error nothing is written: the file stays as the last good write has left it. Nor is anything written once `ours`
-    is False, because another program has written to the file. `end` is where the contents end; the file may take more room.
-    While `synchronised` is True, what is flushed is on the disk, whole or not at all; in several turns, each of which is,
-    beyond `journal.LARGEST` bytes of changes.
+    After an error nothing is written: the file stays as after the last successful write. Nothing is written either once
+    `ours` is False, because another program has written to the file. `end` is the end of the contents; the file may be
+    longer. While `synchronised` is True, flushes are atomic on the disk; beyond `journal.LARGEST` bytes of changes they
+    are divided into several atomic turns.
     """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.synchronised = False
-        repeated = journal.found(self._file)  # of a writer that the power or a kill has stopped
+        repeated = journal.found(self._file)  # left by a writer stopped by a power loss or a kill
         for offset, data in repeated:
             self._put(offset, data)
         self._pending: dict[int, bytes] = {}
@@ -57,10 +58,10 @@ class CommittedFile(DriverFile):
         if repeated:
             os.fsync(self.fileno())
             self._cut(self.end)
-        self._starts, self._ends = [0], [self.end]  # of what has been written, in order and apart
+        self._starts, self._ends = [0], [self.end]  # disjoint written ranges, ascending
 
     def _contents(self) -> int:
-        """Return where the contents of the file end."""
+        """Return the end of the contents of the file."""
         head, size = self._head, self._file.seek(0, os.SEEK_END)
         known = head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8  # version 0, addresses of eight bytes
         return min(int.from_bytes(head[40:48], "little"), size) if known else size
@@ -70,14 +71,14 @@ class CommittedFile(DriverFile):
         return self._file.read(48)
 
     def intact(self) -> bool:
-        """Return whether the superblock, which changes with every flush, is as it was written, and nothing is cut off."""
+        """Return whether the superblock, which changes with every flush, is unchanged, and the file is not truncated."""
         cut = os.fstat(self.fileno()).st_size < self._ends[-1]
         self.ours = self.ours and not cut and self._read_head() == self._head
         return self.ours
 
     @property
     def writable(self) -> bool:
-        """Whether nothing has gone wrong and nobody else has written to the file."""
+        """Whether there was no error, and no other program has written to the file."""
         return self.ours and self.failure is None
 
     def _size(self) -> int:
@@ -89,7 +90,7 @@ class CommittedFile(DriverFile):
         journal.overlay(self._pending.items(), start, data)
 
     def write(self, data: bytes) -> int:
-        """Keep data for the position; later data replace earlier ones."""
+        """Buffer data for the current position; later data replace earlier ones."""
         data, start = bytes(data), self._position
         end = start + len(data)
         for offset in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
@@ -103,7 +104,7 @@ class CommittedFile(DriverFile):
         return len(data)
 
     def truncate(self, size: int) -> int:
-        """Set where the contents end; the file is cut when it is closed."""
+        """Set the end of the contents; the file is truncated when it is closed."""
         self.end = size
         return size
 
@@ -115,7 +116,7 @@ class CommittedFile(DriverFile):
         except BaseException as error:
             self._fail(error)
             with contextlib.suppress(OSError):
-                self._head = self._read_head()  # it may be among what was written
+                self._head = self._read_head()  # may have been written
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
@@ -148,7 +149,7 @@ class CommittedFile(DriverFile):
         return offset + int(differs[0]), data[differs[0] : differs[-1] + 1]
 
     def _synchronise(self, new: list[journal.Write], changes: list[journal.Write]) -> None:
-        """Have new places on the disk, and a journal of what changes old ones."""
+        """Synchronise new blocks, and a journal of the changes to old ones."""
         end = max([self.end, self._ends[-1], *(offset + len(data) for offset, data in new)])
         log = journal.packed(new, changes)
         self._put(end, log)
@@ -159,7 +160,7 @@ class CommittedFile(DriverFile):
         self._file.truncate(size)
 
     def _turn(self, offset: int, data: bytes) -> tuple[int, int, int]:
-        """Return by what writes are sorted: new places, superblock, nodes from the root down, all else, names."""
+        """Return the sort key of writes: new blocks, superblock, nodes from the root down, everything else, names."""
         if not self._overlaps(offset, offset + len(data)):
             return 0, 0, offset
         if offset == 0:
@@ -173,18 +174,18 @@ class CommittedFile(DriverFile):
         return number < len(self._starts) and self._starts[number] < end
 
     def _note(self, start: int, end: int) -> None:
-        """Remember that something has been written there."""
+        """Record a written range."""
         first, last = bisect.bisect_left(self._ends, start), bisect.bisect_right(self._starts, end)
         if first < last:
             start, end = min(start, self._starts[first]), max(end, self._ends[last - 1])
         self._starts[first:last], self._ends[first:last] = [start], [end]
 
     def close(self) -> None:
-        """Cut the file behind its contents and wait until it is on the disk; a second call does nothing."""
+        """Truncate the file after its contents and wait until it is on the disk; a second call does nothing."""
         if self._file.closed:
             return
         try:
-            if self.failure is not None:  # the last end that HDF5 set may not be in the file
+            if self.failure is not None:  # the last end set by HDF5 may not be in the file
                 self._head = self._read_head()
                 self.end = self._contents()
             if self.ours:
@@ -196,9 +197,9 @@ class CommittedFile(DriverFile):
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Let signals, such as Ctrl-C, wait until the block has ended: an exception in a call back from HDF5 may crash it.
+    """Defer signals, such as Ctrl-C, to the end of the block: an exception in a callback from HDF5 may crash it.
 
-    Python handles signals in its main thread only: in other threads there is nothing to do.
+    Python handles signals in its main thread only: in other threads this has no effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -206,7 +207,7 @@ def uninterrupted() -> Iterator[None]:
     arrived: list[tuple[int, FrameType | None]] = []
     handlers = {int(number): signal.getsignal(number) for number in signal.valid_signals()}
     try:
-        with contextlib.ExitStack() as restored:  # which goes on restoring when something is raised meanwhile
+        with contextlib.ExitStack() as restored:  # restores all handlers even after an error
             for number, handler in handlers.items():
                 if callable(handler):
                     restored.callback(signal.signal, number, handler)

@@ -1,4 +1,4 @@
-"""Results for other libraries: PyVista, pandas, xarray, each imported when it is asked for."""
+"""Conversion of results for other libraries: PyVista, pandas, xarray, each imported at first use."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from fastcontact.results.units import column_units
 if TYPE_CHECKING:
     import pandas
 
-# Columns before those of contact tables.
+# Additional leading columns of contact tables.
 LEADING = ("step", "load_factor", "contact")
 
 
 def library(name: str, title: str, install: str) -> Any:
-    """Return a library; raises FileError that says how to install it where it is missing."""
+    """Return a library; FileError, with the installation command, if it is missing."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -38,7 +38,7 @@ def grid(mesh: Mesh, step: StepResult) -> Any:
     """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells with fields and groups."""
     pyvista = _pyvista()
     cells = layout.solid_cells(mesh)
-    # VTK's older flat layout, which every PyVista takes: each cell's size before its nodes.
+    # VTK's older flat layout, which every version of PyVista supports: each cell's size before its nodes.
     flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
     made = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
     for name, values in (layout.point_fields(mesh, step) | layout.point_flags(mesh)).items():
@@ -53,7 +53,7 @@ def grid(mesh: Mesh, step: StepResult) -> Any:
 
 
 def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
-    """Return steps as a ``pyvista.MultiBlock``, a block each, named by its number, ``"step 1"`` first."""
+    """Return steps as a ``pyvista.MultiBlock`` with a block for each, named ``"step 1"`` and so on."""
     blocks = _pyvista().MultiBlock()
     for step in steps:
         blocks.append(grid(mesh, step), f"step {step.index}")
@@ -61,7 +61,7 @@ def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
 
 
 def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | None = None) -> pandas.DataFrame:
-    """Return a table as a ``pandas.DataFrame``, whose ``attrs["units"]`` are the units by column that have a name."""
+    """Return a table as a ``pandas.DataFrame``, whose ``attrs["units"]`` are the known units by column."""
     frame = library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
     if named := {name: text for name, text in units.items() if text}:
         frame.attrs["units"] = named
@@ -69,7 +69,7 @@ def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | No
 
 
 def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pandas.DataFrame:
-    """Return the contact tables of steps as one ``pandas.DataFrame``; columns as in `contact_table`, before them the step."""
+    """Return the contact tables of steps as one ``pandas.DataFrame``; columns as in `contact_table`, preceded by the step."""
     concat = library("pandas", "pandas", "'fastcontact[table]'").concat
     frames = []
     for step in steps:
@@ -125,5 +125,5 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
 
 
 def _unit(units: dict[str, str], quantity: str) -> dict[str, str]:
-    """Return the attributes of a field: its unit where it is known."""
+    """Return the attributes of a field: its unit, if known."""
     return {"units": units[quantity]} if units.get(quantity) else {}

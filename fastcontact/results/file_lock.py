@@ -30,7 +30,7 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
 
 
 def left_at(path: Path) -> tuple[int, ...] | None:
-    """Return device, number, size and time of change of the file at a path, by which it is known again; None without one."""
+    """Return device, inode, size and modification time, which identify the file at a path; None without a file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -39,16 +39,16 @@ def left_at(path: Path) -> tuple[int, ...] | None:
 
 
 class PathLock:
-    """Exclusive right to write one path, through a locked file beside it; viewers may lock the result file itself.
+    """Exclusive right to write one path, through a locked file next to it; viewers may lock the result file itself.
 
-    The operating system ends the lock with its process, however that ends, so that no lock is left over, and its file goes
-    with the last reference at the latest. FileError is raised where another writer, in this process or in another one,
-    holds the path.
+    The operating system releases the lock at the end of its process, so that no lock is left over, and its file is
+    removed with the last reference at the latest. Raises FileError if another writer, in this or another process, holds
+    the path.
 
     Attributes
     ----------
     release : callable
-        Gives the right back; a second call does nothing.
+        Releases the lock; a second call does nothing.
     """
 
     def __init__(self, target: Path) -> None:
@@ -67,10 +67,10 @@ class PathLock:
             if self._is_current(file):
                 break
             file.close()  # its holder removed it between our open and our lock
-        with contextlib.suppress(OSError):  # for others to read, if the disk has room for it
+        with contextlib.suppress(OSError):  # information for others, if the disk has room for it
             file.truncate(0)
             file.write(str(os.getpid()).encode("ascii"))
-        # An interruption may come before the caller can release it.
+        # An interrupt may come before the caller can release it.
         self.release = weakref.finalize(self, _release, file, self.path, os.getpid())
 
     def _is_current(self, file: IO[Any]) -> bool:
@@ -81,9 +81,11 @@ class PathLock:
 
 
 def _release(file: IO[Any], path: Path, holder: int) -> None:
-    """Remove the file of a lock, and end the lock; a process that `holder` has forked leaves the file alone."""
+    """Remove the file of a lock, and release the lock; a process forked from `holder` leaves the file alone."""
     if os.getpid() == holder:
-        with contextlib.suppress(OSError):  # Windows keeps open files: the empty lock file stays, harmless
+        with contextlib.suppress(
+            OSError
+        ):  # Windows does not remove open files: an empty lock file remains, which is harmless
             path.unlink()
     file.close()
 
@@ -99,7 +101,7 @@ def is_being_written(target: Path) -> bool:
 
 
 def _own_file(path: Path) -> IO[Any]:
-    """Open a file, made if there is none; raises FileError for a link or another's file, which writing would change."""
+    """Open or create a file; FileError for a link or another user's file, which writing would modify."""
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     except OSError as error:
@@ -118,7 +120,7 @@ def _own_file(path: Path) -> IO[Any]:
 
 
 def _lock(file: IO[Any]) -> bool:
-    """Lock an open file without waiting; True also where the file system knows no locks."""
+    """Lock an open file without waiting; also True if the file system does not support locks."""
     if sys.platform == "win32":
         import msvcrt
 

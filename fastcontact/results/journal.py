@@ -1,9 +1,10 @@
 """Write-ahead journal: writes with a checksum at the end of the file, replayed after a power loss.
 
-A disk may do what was written since the last synchronisation in any order, in part, or not at all. New data hurt nobody,
-since nothing leads to them yet; records of HDF5 that are changed in place do. So these are first written behind the contents
-of the file, where no reader of HDF5 looks, with a checksum of the new data. Once both are on the disk the changes are made,
-and whoever opens the file after a power loss makes them again (write-ahead logging: Mohan et al., 1992).
+A disk may execute the writes since the last synchronisation in any order, in part, or not at all. New data are harmless,
+since nothing refers to them yet; records of HDF5 that are changed in place are not. They are therefore first written
+after the contents of the file, where no reader of HDF5 looks, with a checksum of the new data. Once both are on the disk
+the changes are executed, and are repeated when the file is opened after a power loss (write-ahead logging: Mohan et al.,
+1992).
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-HEADER = struct.Struct("<QQ?")  # place and length of one; whether its checksum stands for it
+HEADER = struct.Struct("<QQ?")  # position and length of a write; whether it is represented by its checksum
 DIGEST = hashlib.sha256().digest_size
-# Bytes of changes in a journal: more are made in several turns, so that whoever replays one has it in memory.
+# Largest size of the changes in a journal [bytes]: more are divided into turns, so that a journal fits in memory.
 LARGEST = 1 << 28
 PIECE = 1 << 20
 
 
 def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
-    """Return, as the last bytes of a file, the changes of what was there and the checksums of new data that they lead to."""
+    """Return the journal, the last bytes of a file: the changes, and the checksums of the new data they refer to."""
     body = b"".join(
         [
             *(HEADER.pack(offset, len(data), True) + hashlib.sha256(data).digest() for offset, data in new),
@@ -38,7 +39,7 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
 
 
 def turns(changes: Iterable[Write]) -> Iterator[list[Write]]:
-    """Yield changes in their order, at most LARGEST bytes in a turn, longer ones in pieces; the last turn may be empty."""
+    """Yield changes in order, at most LARGEST bytes in a turn, longer ones in pieces; the last turn may be empty."""
     turn, size = [], 0  # type: tuple[list[Write], int]
     for offset, data in changes:
         for start in range(0, len(data), LARGEST):
@@ -52,9 +53,9 @@ def turns(changes: Iterable[Write]) -> Iterator[list[Write]]:
 
 
 def found(file: IO[bytes]) -> list[Write]:
-    """Return the changes that the end of a file holds; none where there are none, or not all of them and their data.
+    """Return the changes in the journal of a file; none without a journal, or if it or its data are incomplete.
 
-    Raises FileError for a journal that no writer makes: nothing is read of it before its bounds are checked.
+    Raises FileError for an invalid journal, whose bounds are checked before anything is read.
     """
     size = file.seek(0, io.SEEK_END)
     if size < FOOTER.size:
@@ -63,8 +64,8 @@ def found(file: IO[bytes]) -> list[Write]:
     length, digest, magic = FOOTER.unpack(file.read(FOOTER.size))
     if magic != MAGIC or length > size - FOOTER.size:
         return []
-    end = size - FOOTER.size - length  # of what was there before
-    if length > 2 * LARGEST:  # changes, where they stand, and checksums of new data
+    end = size - FOOTER.size - length  # end of the contents before the journal
+    if length > 2 * LARGEST:  # changes, their positions, and checksums of new data
         raise _forged(file, f"declares {length:.3g} bytes")
     file.seek(end)
     body = file.read(length)
@@ -82,7 +83,7 @@ def found(file: IO[bytes]) -> list[Write]:
 
 
 def _records(file: IO[bytes], body: bytes) -> Iterator[tuple[int, int, bool, bytes]]:
-    """Yield place, length and kind of each write of a journal, and its data or its checksum."""
+    """Yield position, length and kind of each write of a journal, and its data or its checksum."""
     at = 0
     while at < len(body):
         if at + HEADER.size > len(body):
@@ -110,7 +111,7 @@ def _forged(file: IO[bytes], reason: str) -> FileError:
 
 
 class Repeated(io.RawIOBase):
-    """A file as it is when the writes of its journal are done; the file itself is only read."""
+    """A read-only view of a file with the writes of its journal applied."""
 
     def __init__(self, file: IO[bytes], writes: Sequence[Write]) -> None:
         self._file, self._writes = file, writes
@@ -132,7 +133,7 @@ class Repeated(io.RawIOBase):
         return self._file.tell()
 
     def readinto(self, buffer: Any) -> int:
-        """Fill a buffer from the position on; return how many bytes there were."""
+        """Fill a buffer from the position on; return the number of bytes."""
         start, view = self._file.tell(), memoryview(buffer).cast("B")
         data = self._file.read(len(view))
         view[: len(data)] = data
@@ -146,7 +147,7 @@ class Repeated(io.RawIOBase):
 
 
 def overlay(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:
-    """Put into `view`, which holds a file from `start` on, what writes change there."""
+    """Apply writes to `view`, which contains a file from `start` on."""
     end = start + len(view)
     for offset, data in writes:
         first, last = max(offset, start), min(offset + len(data), end)

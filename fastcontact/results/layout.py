@@ -6,16 +6,16 @@ A result file is an HDF5 file with two groups. Viewers read the first, whose lay
     VTKHDF/PointData, CellData                      fields; those of all steps follow one another in one data set
     VTKHDF/Steps                                    load factors, where the fields of each step begin; NSteps, their number
 
-The second holds what VTK has no place for:
+The second contains everything that VTK does not support:
 
     fastcontact/mesh                                points, cells of all dimensions, groups
     fastcontact/kinematics, case, versions, units   texts as JSON; units where the model names them
-    fastcontact/steps                               a row for each step (STEP_ROW), with the place of its notes
+    fastcontact/steps                               a row for each step (STEP_ROW), with the position of its notes
     fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step;
                                                     forces on the primary side, a row for each of its nodes and step
-    fastcontact/materials                           where materials meet: of every cell; stress by material; a row a step
+    fastcontact/materials                           at interfaces: material of cells, stress by material, a row for each step
     fastcontact/notes                               JSON, one text after the other: iterations, warnings, how runs ended
-    fastcontact/runs                                a row for each run (RUN_ROW), with the place of its notes
+    fastcontact/runs                                a row for each run (RUN_ROW), with the position of its notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
 A new array at the nodes: an attribute of `step.StepResult`, filled in `analysis.step_result`, named in POINT_FIELDS, checked
@@ -61,15 +61,15 @@ POINT_FIELDS = {
 }
 # Further ones of models that conduct heat.
 HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
-# Columns of contact tables that only some pairs have.
+# Optional columns of contact tables.
 OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure")
 
-# Cell data of models in which materials meet: the nodal stress on each cell's own side, averaged over its nodes.
+# Cell data of models with material interfaces: the nodal stress on each cell's own side, averaged over its nodes.
 CELL_STRESS = "stress_in_cell"
 CELL_VON_MISES = "von_mises_in_cell"
 MATERIAL_FIELDS = {CELL_STRESS: 6, CELL_VON_MISES: 1}
 
-# Element codes of the XDMF format by VTK cell type. Its readers take the nodes of all of them in VTK's order.
+# Element codes of the XDMF format by VTK cell type. XDMF readers use VTK's node order for all of them.
 XDMF_TYPES = {
     **{5: 0x4, 9: 0x5, 22: 0x24, 23: 0x25, 28: 0x23},  # triangles and quadrangles
     **{10: 0x6, 14: 0x7, 13: 0x8, 12: 0x9},  # tet4, pyramid5, wedge6, hex8
@@ -78,17 +78,17 @@ XDMF_TYPES = {
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
-# Where the rows of a contact pair for a step stand.
+# Position of the rows of a contact pair for a step.
 PLACES = ("first", "count", "primary_first", "primary_count")
 
-# Where the rows of nodal stress by material of a step stand.
+# Position of the rows of nodal stress by material of a step.
 SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 
-# How a run ended: the steps that were complete then, and where its record stands among the notes.
+# End of a run: number of completed steps, and the position of its record among the notes.
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
 
 
-# What a file must hold beside its steps to be written on.
+# Required objects of a file, in addition to its steps, for resuming.
 CONTINUED = (
     "fastcontact/runs", "fastcontact/notes", "fastcontact/contact", "VTKHDF/CellData", "VTKHDF/Types", "VTKHDF/Steps/Values",
     "VTKHDF/Steps/PointDataOffsets", "VTKHDF/Steps/CellDataOffsets",
@@ -96,17 +96,17 @@ CONTINUED = (
 
 
 def restart_table(number: int) -> str:
-    """Return the name of the table for the restart state of a step: two take turns, so that the last one stays whole."""
+    """Return the name of the table for the restart state of a step: two alternate, so that the last one stays complete."""
     return f"restart{number % 2}"
 
 
 def further_columns(contact: ContactResult) -> tuple[str, ...]:
-    """Return the `OPTIONAL_COLUMNS` that a pair has."""
+    """Return the `OPTIONAL_COLUMNS` of a pair."""
     return tuple(name for name in OPTIONAL_COLUMNS if getattr(contact, name) is not None)
 
 
 def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
-    """Return the type of one row of a contact table: one secondary node in one step; with `further_columns` of the pair."""
+    """Return the type of a row of a contact table: one secondary node in one step; with the pair's `further_columns`."""
     names = ("abscissa", "place", "gap", "pressure", "multiplier", *further)
     scalars = [(name, "<f8") for name in names]
     vectors = [
@@ -121,20 +121,20 @@ def primary_row(dim: int) -> np.dtype[Any]:
 
 
 def contact_step(dim: int) -> np.dtype[Any]:
-    """Return the type of the row that a contact pair has for each step: its rows, resultant, radius, work, obstacle.
+    """Return the type of the row of a contact pair for each step: position of its rows, resultant, radius, work, obstacle.
 
-    All but the `PLACES` are attributes of a `step.ContactResult`, NaN for None. Files of schema 2 from before `primary_row`
-    have neither that table nor its place.
+    All except the `PLACES` are attributes of a `step.ContactResult`, NaN for None. Older files of schema 2 have neither the
+    table of `primary_row` nor its position.
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
-    sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN where nothing turns
+    sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN without a rotation
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
     return np.dtype([*((name, "<i8") for name in PLACES), *sums])
 
 
 def material_row(dim: int) -> np.dtype[Any]:
-    """Return the type of a row of nodal stress on one side of a border of materials, for one step."""
+    """Return the type of a row of nodal stress on one side of a material interface, for one step."""
     return np.dtype([("points", "<i4"), ("material", "<i4"), ("stress", "<f8", (4 if dim == 2 else 6,))])
 
 
@@ -145,7 +145,7 @@ def material_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
 
 
 class SolidCells(NamedTuple):
-    """The solid cells in the layout of VTK: all their nodes in sequence, where each begins (and the end), VTK's types."""
+    """The solid cells in the layout of VTK: all their nodes in sequence, offsets, and VTK's types."""
 
     connectivity: NDArray[np.int64]
     offsets: NDArray[np.int64]
@@ -176,7 +176,7 @@ def xdmf_topology(mesh: Mesh) -> Numbers | None:
 
 
 def padded(values: Array, width: int) -> Array:
-    """Return `values` (n, k) with zero columns up to `width`; a width of 1 leaves a vector (n,) as it is."""
+    """Return `values` (n, k) padded with zero columns to `width`; a width of 1 leaves a vector (n,) unchanged."""
     values = np.asarray(values, np.float64)
     if width == 1 or values.shape[1] == width:
         return values
@@ -184,7 +184,7 @@ def padded(values: Array, width: int) -> Array:
 
 
 def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
-    """Return the contact pressure at every point (n_points,), 0 off the contact [pressure]."""
+    """Return the contact pressure at every point (n_points,), 0 outside the contact [pressure]."""
     pressure = np.zeros(mesh.n_points)
     for contact in step.contact.values():
         np.maximum.at(pressure, contact.points, contact.pressure)
@@ -236,7 +236,7 @@ def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
 
 
 def _plain(name: str) -> str:
-    """Return an ASCII name, as old viewers want it, without slashes, which HDF5 takes for folders."""
+    """Return an ASCII name, as old viewers require, without slashes, which separate groups in HDF5."""
     letters = unicodedata.normalize("NFKD", name.replace("/", "_"))
     return "".join(c if c.isascii() else "_" for c in letters if not unicodedata.combining(c))
 
@@ -253,7 +253,7 @@ def _flags(members: dict[str, AnyArray], count: int) -> dict[str, Flags]:
 
 
 def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None:
-    """Refuse a step whose arrays do not fit the mesh, or that lacks one of the `cell_fields` that were announced."""
+    """Refuse a step whose arrays do not fit the mesh, or that lacks one of the announced `cell_fields`."""
     n, dim = mesh.n_points, mesh.dim
     expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
     for name, shape in {**expected, **dict.fromkeys(("von_mises", "von_mises_signed", *HEAT_FIELDS), (n,))}.items():
@@ -278,7 +278,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 
 def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
-    """Refuse the state of a pair whose arrays do not fit one another or name points that are not in the mesh."""
+    """Refuse the state of a pair whose arrays are inconsistent or contain points that are not in the mesh."""
     row = contact_row(mesh.dim, further_columns(contact))
     for name in row.names or ():
         shape_given, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)

@@ -13,15 +13,15 @@ from fastcontact.elasticity.material_sides import MaterialSides
 
 @dataclass(frozen=True, eq=False)
 class MaterialStress:
-    """Stress at the nodes where materials meet, on the side of each.
+    """Stress of each material at the nodes where materials meet.
 
     Attributes
     ----------
     cells : ndarray of int (n_solids,)
-        Material of every solid cell, in the order of ``mesh.solids``: its number in the order in which materials were added
-        to the model, from 0; equal materials have the first one's.
+        Material number of every solid cell, in the order of ``mesh.solids``. Materials are numbered from 0 in the
+        order in which they were added to the model; equal materials have the number of the first.
     points, material : ndarray of int (k,)
-        Where materials meet, a row for each node and each of its materials, ordered by node.
+        Nodes where materials meet, with a row for each of their materials, ordered by node.
     stress : ndarray (k, 4) or (k, 6)
         Average over the cells of that material at the node, components as of `StepResult.stress` [pressure].
     """
@@ -32,14 +32,14 @@ class MaterialStress:
     stress: Array
 
     def at(self, point: int) -> dict[int, Array]:
-        """Return the stress (4,) or (6,) at a node by material [pressure]; empty where it has only one."""
+        """Return the stress (4,) or (6,) of each material at a node [pressure]; empty if the node has only one."""
         return {int(self.material[row]): self.stress[row] for row in np.flatnonzero(self.points == point)}
 
 
 def by_largest_von_mises(
     sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
 ) -> tuple[Array, MaterialStress | None]:
-    """Return the nodal stress (n_points, n_components), and that of each side where materials meet [pressure].
+    """Return the nodal stress (n_points, n_components), and that of each side of material interfaces [pressure].
 
     Parameters
     ----------
@@ -47,10 +47,10 @@ def by_largest_von_mises(
     cells : ndarray of int (n_solids,)
         Material of every solid cell.
     at_places : ndarray (n_places, n_components)
-        Stress at the places of `sides` [pressure].
+        Stress at the slots of `sides` [pressure].
     n_points : int
 
-    Where materials meet, the nodal stress is that of the side with the largest von Mises stress.
+    At interfaces the nodal stress is that of the side with the largest von Mises stress.
     """
     stress = at_places[:n_points].copy() if len(sides.points) else at_places
     if not len(sides.points):

@@ -15,7 +15,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult
 
-# Where each component stands in ours, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
+# Position of each component in our order, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
 
 
@@ -36,7 +36,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     path : path-like
     mesh : Mesh
     steps : iterable of StepResult
-        Taken one after the other, so a generator will do.
+        Consumed one by one, so that a generator is possible.
     mesh_name : str
         Name of the mesh in the file, at most 64 bytes.
 

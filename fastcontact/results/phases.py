@@ -20,4 +20,5 @@ def _times(shape: StepResult, index: int, phase: float, factor: float) -> StepRe
     return replace(
         shape, index=index, load_factor=phase, displacement=factor * shape.displacement, stress=factor * shape.stress,
         von_mises=abs(factor) * shape.von_mises, von_mises_signed=factor * shape.von_mises_signed, restart=None,
+        iterations={"parameter": "phase"},
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Read a result file back: nothing but the file is needed, neither the model nor the mesh file."""
+"""Reader of result files, which need neither the model nor the mesh file."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from fastcontact.results.units import units_of_results
 if TYPE_CHECKING:
     import pandas
 
-# Resultants of contact that are None where files have NaN.
+# Contact resultants that are None for NaN in files.
 OR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
@@ -44,7 +44,7 @@ def open_results(path: PathLike) -> Results:
     Parameters
     ----------
     path : path-like
-        A file that ``ResultWriter`` wrote, or is still writing: then the steps complete by now are seen.
+        A file that ``ResultWriter`` wrote or is still writing, in which case all complete steps are visible.
 
     Returns
     -------
@@ -64,9 +64,9 @@ def open_results(path: PathLike) -> Results:
 
 
 class Results(Sequence[StepResult]):
-    """The steps of a result file, each read when it is used, and what the file says beside them.
+    """The steps of a result file, read on access, and further data of the file.
 
-    Steps are plain NumPy data: they stay valid when the file is closed.
+    Steps are plain NumPy data and remain valid when the file is closed.
 
     Attributes
     ----------
@@ -77,34 +77,35 @@ class Results(Sequence[StepResult]):
     mesh : Mesh
         The mesh with its groups.
     kinematics, case_text : str
-        Kinematics of the analysis and the case file, empty if there was none; that of the last steps if it changed.
+        Kinematics of the analysis, and text of the case file, empty if there was none; that of the last steps if it
+        changed.
     versions : dict of str to str
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
         Pseudo-time of each step [-].
     units : dict of str to str
-        Names of units where the model or the case file names them, as of a `StepResult`; else empty.
+        Names of units from the model or the case file, as in `StepResult`; otherwise empty.
     warnings : tuple of str
-        Every warning of the run and its steps, once.
+        All distinct warnings of the run and its steps.
     log : object
         Log of the run, None if there is none; ``{"failed_step": history}``, the iterations of the step (or the part of
         it) that failed, if the run did not converge.
     complete : bool
-        Whether the run came to its end: False after a crash, and while it goes on.
+        Whether the run has finished: False after a crash and during the run.
     error : str
-        What stopped the run, empty if nothing did or nobody could write it down.
+        Error that stopped the run; empty if there was none or it could not be written.
     """
 
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
-        """`repeat`: whether to see writes that a power loss has kept from being done; not while a writer does them."""
+        """Open the file; `repeat` applies journalled writes after a power loss, which is not allowed beside a writer."""
         import h5py
 
         self.path: Path = existing_file(path)
         if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
             raise FileError(f"'{path}' may not be read: ask its owner for the permission")
         if not h5py.is_hdf5(self.path):
-            raise FileError(f"'{path}' is no HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
-        # A file object of our own: by its name HDF5 would return a file that this process has open, as it was then.
+            raise FileError(f"'{path}' is not an HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
+        # A separate file object: by name HDF5 would return a file already open in this process, in its former state.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
@@ -119,7 +120,7 @@ class Results(Sequence[StepResult]):
             raise
 
     def _checked(self) -> Any:
-        """Return our group in the file, if it is one of ours and of a known schema."""
+        """Return the group of fastcontact in the file, after a check of its schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
             raise ValueError("its addresses are not ours")
         check_contents(self._file, self.path)
@@ -142,7 +143,7 @@ class Results(Sequence[StepResult]):
         if len(self._rows) != self._n_steps or self._rows.ndim != 1:
             raise ValueError(f"only {len(self._rows)} of {self._n_steps} steps")
         if not isinstance(self.kinematics, str) or not isinstance(self.case_text, str):
-            raise ValueError("its kinematics or its case is no text")
+            raise ValueError("its kinematics or its case is not text")
         self.load_factors: Array = np.ascontiguousarray(self._rows["load_factor"])
         run = self._run_record(group)
         self.log: Any = (run or {}).get("log")
@@ -153,12 +154,12 @@ class Results(Sequence[StepResult]):
         of_steps = [text for note in notes for text in note["warnings"]]
         named = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
         if not isinstance(named, dict) or not all(isinstance(text, str) for text in named.values()):
-            raise ValueError("its units are no names")
+            raise ValueError("its units are not names")
         self.units: dict[str, str] = units_of_results(named, self.kinematics) if named else {}
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
-        """Return how the run ended; None while it goes on, after a crash, and when steps have been added since."""
+        """Return the record of the end of the run; None during the run, after a crash, and if steps were added since."""
         if "runs" not in group:  # schema 1
             return _read_json(group["run"], self._raw) if "run" in group else None
         rows = group["runs"][-1:]
@@ -194,7 +195,7 @@ class Results(Sequence[StepResult]):
             ) from None
 
     def lacks(self, names: Sequence[str]) -> list[str]:
-        """Return which objects of HDF5, by their paths, the file does not hold."""
+        """Return the paths of HDF5 objects that are missing in the file."""
         return [name for name in names if name not in self._file]
 
     def __enter__(self) -> Results:
@@ -210,7 +211,7 @@ class Results(Sequence[StepResult]):
         return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"
 
     def _repr_html_(self) -> str:
-        """Return a table of what the file holds, and the last step, for notebooks."""
+        """Return a table of the contents, and the last step, for notebooks."""
         reached = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
         rows = [
             ("steps", reached),
@@ -227,7 +228,7 @@ class Results(Sequence[StepResult]):
         return html_table(rows, (), str(self.path)) + last
 
     def close(self) -> None:
-        """Close the file; the steps already read stay valid, no further ones can be read."""
+        """Close the file; steps already read remain valid, further ones cannot be read."""
         if self._file is not None:
             self._file.close()
         self._raw.close()
@@ -255,8 +256,8 @@ class Results(Sequence[StepResult]):
     def to_pandas(self) -> pandas.DataFrame:
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
 
-        A row is a secondary node of a contact pair in a step: columns ``step``, ``load_factor``, ``contact``, then those of
-        `contact_table`; ``attrs["units"]`` names the units of columns that have one.
+        There is a row for each secondary node, contact pair and step, with the columns ``step``, ``load_factor``,
+        ``contact`` and those of `contact_table`; ``attrs["units"]`` holds units by column.
 
         Raises
         ------
@@ -281,7 +282,7 @@ class Results(Sequence[StepResult]):
         return conversions.dataset(self.mesh, self, self.units)
 
     def _units_of_case(self) -> dict[str, str]:
-        """Return the names of units that the case text gives: where files of earlier versions have them."""
+        """Return the names of units in the case text, for files of earlier versions."""
         try:
             named = toml_text.parsed(self.case_text or "").get("units", {})
         except ValueError:
@@ -319,7 +320,7 @@ class Results(Sequence[StepResult]):
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
-        """Return the restart data of the last step; None where there are none, or steps were written since we opened."""
+        """Return the restart data of the last step; None without any, or if steps were written since the file was opened."""
         group, name = self._file["fastcontact"], layout.restart_table(number)
         try:
             kept = unpacked(group[name][()]) if name in group else {}
@@ -328,7 +329,7 @@ class Results(Sequence[StepResult]):
         return kept["restart"] if kept.get("step") == number else None
 
     def _material_stress(self, number: int) -> MaterialStress | None:
-        """Return the stress of each side where materials meet; None for a step or file without."""
+        """Return the stress of each side of material interfaces; None for a step or file without."""
         group = self._file["fastcontact"]
         if "materials" not in group:
             return None
@@ -345,12 +346,12 @@ class Results(Sequence[StepResult]):
 
     @property
     def point_field_names(self) -> list[str]:
-        """Names of the point fields that change from step to step: earlier versions wrote fewer."""
+        """Names of the point fields stored for each step; earlier versions wrote fewer."""
         return [name for name in (*layout.POINT_FIELDS, *layout.HEAT_FIELDS) if name in self._file["VTKHDF/PointData"]]
 
     @property
     def cell_field_names(self) -> list[str]:
-        """Names of the cell fields that change from step to step."""
+        """Names of the cell fields stored for each step."""
         static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in static]
 
@@ -383,12 +384,12 @@ class Results(Sequence[StepResult]):
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:
-        """Turn whatever HDF5 and our own reading raise on a broken file into one sentence."""
+        """Convert errors of HDF5 and of reading a damaged file to one message."""
         try:
             yield
         except (FileError, Warning):
             raise
-        except Exception as error:  # what HDF5, and numbers that make no sense, can raise has no end
+        except Exception as error:  # HDF5 and invalid numbers may raise errors of any kind
             lines = str(error).splitlines()
             reason = lines[0][:200] if lines else type(error).__name__
             raise FileError(
@@ -398,7 +399,7 @@ class Results(Sequence[StepResult]):
 
 def _integer(group: Any, name: str) -> int:
     if group.attrs.get_id(name).dtype.kind not in "iu":
-        raise ValueError(f"'{name}' of '{group.name}' is no whole number")
+        raise ValueError(f"'{name}' of '{group.name}' is not a whole number")
     return int(group.attrs[name])
 
 
@@ -424,7 +425,7 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
 
 
 def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
-    """Return the rows of a table that a row of steps counts by ``first`` and ``count``; ValueError if some are missing."""
+    """Return the rows of a table given by ``first`` and ``count`` of a step; ValueError if some are missing."""
     first, count = int(step[f"{prefix}first"]), int(step[f"{prefix}count"])
     rows = table[first : first + count]
     if len(rows) != count or first < 0:
@@ -438,7 +439,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     columns: dict[str, Any] = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
-    # Earlier files have fewer of these, and no forces on the primary side: defaults of a ContactResult stand for them.
+    # Earlier files lack some of these, and forces on the primary side: the defaults of ContactResult replace them.
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.PLACES):
         value = step[column]

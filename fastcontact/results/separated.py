@@ -1,4 +1,4 @@
-"""The mesh of a step cut along the borders of materials, so that nodal stress has one value at every point."""
+"""The mesh of a step cut along material interfaces, so that nodal stress has one value at every point."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fastcontact.results.step import StepResult
 
 
 def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
-    """Return the mesh cut along borders of materials, the node (m,) of each of its points, and the stress (m, ...) there.
+    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress (m, ...) there.
 
-    The points of `mesh` come first. Stress [pressure] has the components of `StepResult.stress`. The mesh has solid cells
-    only and no groups; where no materials meet it is `mesh` itself.
+    The points of `mesh` come first. Stress [pressure] has the components of `StepResult.stress`. The mesh has only solid
+    cells and no groups; without interfaces it is `mesh` itself.
     """
     material_stress = step.material_stress
     if material_stress is None:
@@ -26,7 +26,7 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
 
 
 def cells_by_element(mesh: Mesh, values: Numbers) -> dict[str, Numbers]:
-    """Return numbers of all solid cells (n_solids,) by element."""
+    """Return values of all solid cells (n_solids,) by element."""
     ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
     return dict(zip(mesh.solids, np.split(values, ends), strict=True))
 

@@ -14,22 +14,22 @@ from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
-# Part of the normal forces below which their resultant tells nothing.
+# Fraction of the normal forces below which their resultant is negligible.
 CANCELLED = 1e-3
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
     """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
 
-    From `place` (n,) from the middle, with a sign where they lie on both sides of it [length], and which are `closed`: half
-    the width up to the outermost closed places, and up to the next ones beyond, measured in `across` (n,), by default the
-    places themselves [length]. Where all places lie on one side, the other half is the mirror image.
+    `place` (n,) are coordinates of nodes relative to the middle, signed if they lie on both sides of it [length]. The
+    bracket is half the width of the outermost `closed` nodes, and that of the next ones beyond, measured in `across`
+    (n,), by default `place` [length]. If all nodes lie on one side, the other half is the mirror image.
     """
     if not closed.any():
         return float("nan"), float("nan")
     across, one_sided = place if across is None else across, bool(place.min() >= 0.0)
     beyond = place == place[place > place[closed].max()].min(initial=np.inf)
-    if not one_sided:  # where the surface ends on one side, it is no wider there
+    if not one_sided:  # the contact cannot extend beyond an end of the surface
         beyond |= place == place[place < place[closed].min()].max(initial=-np.inf)
 
     def half(nodes: Mask) -> float:
@@ -56,15 +56,15 @@ class ContactResult:
         [length].
     gap : ndarray (m,)
         Gap function, clearance included: positive where open, zero where closed, negative where a penalty admits
-        penetration; infinite at nodes without an opposite point, as at the edge of a hole, even where the facets around
-        them carry pressure [length].
+        penetration; infinite at nodes without an opposite point, such as at the edge of a hole, even if the facets
+        around them carry pressure [length].
     pressure : ndarray (m,)
         Contact pressure, positive in compression, per reference area; negative only in tied or bilateral contact under
         tension. Interpolated by the shape functions of the facets, it integrates to the sum of the normal forces. In finite
         strain it refers to the deformed area (in plane stress of unit thickness), as `multiplier` and `shear` do [pressure].
     multiplier : ndarray (m,)
-        Nodal pressure of the formulation itself, before that of open nodes and tension are redistributed to the closed
-        nodes [pressure].
+        Nodal pressure of the formulation itself, before that of open nodes and in tension is redistributed to the
+        closed nodes [pressure].
     force_vectors : ndarray (m, dim)
         Contact force on each secondary node; axisymmetric: over the full circle [force].
     normal : ndarray (m, dim)
@@ -118,8 +118,8 @@ class ContactResult:
         Contact force on each of them; axisymmetric: over the full circle [force]. Forces on a node of both sides are
         included here alone.
     units : mapping of str to str
-        Names of the units of ``length``, ``force`` and ``pressure`` where the model names them, in plane models with forces
-        per thickness; shown by reprs, pictures and tables.
+        Names of the units of ``length``, ``force`` and ``pressure``, if the model names them, in plane models with
+        forces per thickness; shown by reprs, pictures and tables.
 
     Examples
     --------
@@ -174,7 +174,7 @@ class ContactResult:
                 f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
             )
         dim = self.coordinates.shape[1]
-        defaults = {  # places are those of a file from before they were measured from the middle
+        defaults = {  # for files of versions that did not measure from the middle
             "middle": lambda: np.zeros(dim),
             "place": lambda: np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
             "primary_points": lambda: np.empty(0, np.int32),
@@ -189,7 +189,7 @@ class ContactResult:
 
     @property
     def shown(self) -> dict[str, str]:
-        """What reprs and tables tell, as texts: force, largest pressure, closed nodes, contact radius."""
+        """Texts for reprs and tables: force, largest pressure, closed nodes, contact radius."""
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
@@ -214,13 +214,13 @@ class ContactResult:
 
     @property
     def measured_from_axis(self) -> bool:
-        """Whether places are radii, in axisymmetry, rather than lengths along a surface or distances in space."""
+        """Whether `place` holds radii, in axisymmetry, rather than arc lengths or distances."""
         flat = self.coordinates.shape[1] == 2 and self.tangent is None  # plane problems have one, but for rings
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property
     def per_thickness(self) -> bool:
-        """Whether forces are seen to be those of a plane model: not of a solid, nor of a circle, where radial ones cancel."""
+        """Whether forces are per thickness, as in a plane model."""
         if self.coordinates.shape[1] == 3 or self.measured_from_axis:
             return False
         across, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
@@ -228,12 +228,12 @@ class ContactResult:
 
     @property
     def stick_radius(self) -> tuple[float, float]:
-        """Bracket of the stick zone, as `radius`: the outermost node that sticks, and the next one; NaN if none does."""
+        """Bracket of the stick radius, like `radius`: outermost sticking node and the next one; NaN if none sticks."""
         return half_width(self.place, self.active & self.sticking, self.across)
 
     @property
     def across(self) -> Array:
-        """How far from the middle each node (m,) lies, seen along the normal there: radii and half-widths [length]."""
+        """Distance (m,) of each node from the middle, perpendicular to the normal there: radii and half-widths [length]."""
         return self.place if self.tangent is None else (self.coordinates - self.middle) @ self.tangent
 
     @property
@@ -243,23 +243,23 @@ class ContactResult:
 
     @property
     def normal_force(self) -> float:
-        """Sum of the nodal forces along the normals, whatever their directions, positive where they press [force]."""
+        """Sum of the nodal forces, each along its own normal, positive in compression [force]."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
         return float(np.einsum("nd,nd->", self.force_vectors, normal))
 
     @property
     def cancels(self) -> bool:
-        """Whether the resultant is negligible beside the normal forces, as in a press fit."""
+        """Whether the resultant is negligible compared with the normal forces, as in a press fit."""
         return bool(np.linalg.norm(self.force) < CANCELLED * self.normal_force)
 
     @property
     def penetration(self) -> float:
-        """Largest depth of closed nodes inside the other side [length]: of a penalty, or between nodes of weighted gaps."""
+        """Largest penetration of closed nodes [length], due to a penalty or to weighted gaps."""
         return float(-self.gap[self.active].min(initial=0.0))
 
 
 class ContactsByName(dict[str, ContactResult]):
-    """Contact pairs by name, which tell the names that are there when asked for another one."""
+    """Contact pairs by name; the error for an unknown name lists the known ones."""
 
     def __missing__(self, name: object) -> ContactResult:
         raise KeyError(unknown("contact pair", str(name), self))
@@ -278,37 +278,40 @@ class StepResult:
     displacement : ndarray (n_points, dim)
         [length].
     stress : ndarray (n_points, 4) or (n_points, 6)
-        Nodal stress, averaged over the elements of one material at each node, where materials meet that of the side with
-        the largest von Mises stress; components xx, yy, zz, xy (then yz, xz in 3D), in axisymmetry rr, yy, hoop, ry
-        [pressure].
+        Nodal stress, averaged over the elements of one material at each node; where materials meet, that of the side
+        with the largest von Mises stress. Components are xx, yy, zz, xy (then yz, xz in 3D), in axisymmetry rr, yy,
+        hoop, ry [pressure].
     von_mises, von_mises_signed : ndarray (n_points,)
         Equivalent stress of `stress`; the same with the sign of its trace [pressure].
     reaction : ndarray (n_points, dim)
-        Forces of supports, linear relations and springs to the ground, zero elsewhere; axisymmetric: over the full
-        circle [force].
+        Forces of supports, multi-point constraints and springs to the ground, zero elsewhere; axisymmetric: over the
+        full circle [force].
     contact : dict of str to ContactResult
         By contact pair.
     iterations : dict
-        ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). If contact
-        alone holds bodies, ``regularised``: their springs and the forces in them. If round-off kept the contact geometry
-        from settling to the criterion, ``scatter``: by how much ``displacement`` and contact ``force`` still vary [-].
-        With temperatures, ``temperature_factors``: what each of them is multiplied with; with initial
-        stresses and strains ``initial_factors``, with pressures at finite strains ``pressure_factors`` [-]. ``work``
-        and, with pretension sections, ``pretension``: see the properties of these names.
+        ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). With
+        floating bodies, ``regularised``: their springs and the forces in them. If round-off prevents the contact
+        geometry from meeting the criterion, ``scatter``: the variation of ``displacement`` and contact ``force`` [-].
+        With temperatures, ``temperature_factors``, their multipliers; likewise ``initial_factors`` with initial
+        stresses and strains, and ``pressure_factors`` with pressures in finite strain [-]. ``work`` and, with
+        pretension sections, ``pretension``: see the properties of these names. ``parameter`` of modes and their phases:
+        what their load factor is, ``frequency`` or ``phase``.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
-        Further numbers of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the field].
+        Further values of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the
+        field].
     material_stress : MaterialStress, optional
-        The stress of each side at the nodes where materials meet; None where none do.
+        The stress of each side at nodes where materials meet; None if there are none.
     temperature : ndarray (n_points,), optional
-        Where heat is conducted [temperature]; None where it is not.
+        Nodal temperature [temperature]; None without heat conduction.
     heat_reaction : ndarray (n_points,), optional
-        Heat that prescribed temperatures put into the nodes, zero elsewhere; axisymmetric: over the full circle [power].
+        Heat flow into the nodes with a prescribed temperature, zero elsewhere; axisymmetric: over the full circle
+        [power].
     restart : dict, optional
         Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
     units : mapping of str to str
-        As of its `ContactResult`.
+        As in `ContactResult`.
 
     Examples
     --------
@@ -347,11 +350,16 @@ class StepResult:
         object.__setattr__(self, "contact", ContactsByName(named or self.contact))
 
     @property
+    def instant(self) -> str:
+        """Load factor, or the frequency of a mode, as text."""
+        return f"{self.iterations.get('parameter', 'load factor')} {self.load_factor:.6g}"
+
+    @property
     def shown(self) -> dict[str, str]:
-        """What reprs and tables tell, as texts: load factor, largest displacement and stress, iterations."""
+        """Texts for reprs and tables: load factor, largest displacement and stress, iterations."""
         moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
-            "load factor": f"{self.load_factor:.6g}",
+            self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
             "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),
             "largest von Mises stress": with_unit(f"{stressed:.6g}", self.units, "pressure"),
         }
@@ -364,7 +372,7 @@ class StepResult:
             for c in self.contact.values()
         ]
         texts = [f"largest displacement {self.shown['largest displacement']}", *pairs]
-        return f"StepResult({self.index}, load factor {self.load_factor:.6g}; {'; '.join(texts)})"
+        return f"StepResult({self.index}, {self.instant}; {'; '.join(texts)})"
 
     def _repr_html_(self) -> str:
         """Return tables of the step and of its contact pairs for notebooks."""
@@ -374,43 +382,43 @@ class StepResult:
 
     @property
     def pretension(self) -> dict[str, dict[str, float]]:
-        """By pretension section its ``force``, positive in tension [force], and its ``shortening`` [length]."""
+        """``force``, positive in tension [force], and ``shortening`` [length] of each pretension section."""
         return dict(self.iterations.get("pretension", {}))
 
     @property
     def work(self) -> dict[str, float]:
-        """Energies at the end of the step, and works of all steps so far [energy].
+        """Energies at the end of the step, and work accumulated over all steps [energy].
 
-        ``strain_energy``, of springs of the model, too, and of temperatures as if they were forces, but the elastic energy
-        of nonlinear bodies; ``plastic_work``; ``external_work``, of loads, supports, obstacles and heat; ``friction_work``;
-        ``friction_while_touching``, what of it nodes do in the step in which they close, which is too large in long steps;
-        ``penalty_energy``, of springs at contacts and of layers that are stretched; ``energy_released``, what breaking
-        these has taken, as their law has it; ``imbalance``, the external work less all others. Empty in files from before
-        it was told, and behind steps of these.
+        ``strain_energy``: springs included, with temperatures treated as forces; for nonlinear bodies the elastic
+        energy. ``plastic_work``. ``external_work``: of loads, supports, obstacles and thermal expansion.
+        ``friction_work``. ``friction_while_touching``: its part at nodes in the step in which they close, which is too
+        large in long steps. ``penalty_energy``: of penalties and cohesive layers. ``energy_released``: dissipated by
+        damage of cohesive layers. ``imbalance``: external work minus all others. Empty in files of versions without
+        it, and in steps resumed from these.
         """
         return dict(self.iterations.get("work", {}))
 
     @property
     def heat(self) -> dict[str, Any]:
-        """The balance of heat at the end of the step, positive into the bodies [power]; empty without conduction.
+        """Heat balance at the end of the step, positive into the bodies [power]; empty without heat conduction.
 
-        ``supports``, of prescribed temperatures; ``loads``, of fluxes, sources and heat at nodes; ``films``; ``friction``;
-        ``imbalance``, the largest power of a node that nothing balances; ``contacts``, what crosses each pair to its primary
-        side; ``exchanges``, how many times heat and contact were solved in turn [-].
+        ``supports``: of prescribed temperatures; ``loads``: of fluxes, sources and nodal heat; ``films``;
+        ``friction``; ``imbalance``: largest residual of a node; ``contacts``: heat flow of each pair to its primary
+        side; ``exchanges``: number of alternations between heat and contact [-].
         """
         return dict(self.iterations.get("heat", {}))
 
     @property
     def heat_flux(self) -> Array | None:
-        """Mean heat flux (n_solids, dim) of every solid cell [power / area]; None where heat is not conducted."""
+        """Mean heat flux (n_solids, dim) of every solid cell [power / area]; None without heat conduction."""
         fluxes = [values for name, values in sorted(self.cell_fields.items()) if name.startswith("heat_flux_")]
         return np.column_stack(fluxes) if fluxes else None
 
     def stress_of_material(self, number: int) -> Array:
-        """Return the nodal stress (n_points, 4) or (n_points, 6) with the side of one material where several meet [pressure].
+        """Return the nodal stress (n_points, 4) or (n_points, 6) with that of a given material where several meet [pressure].
 
-        Materials count from 0, in the order in which they were added to the model; at nodes that the material does not have
-        the stress is that of the others.
+        Materials are numbered from 0, in the order in which they were added to the model; at nodes of other materials
+        the stress is that of `stress`.
         """
         stress = self.stress.copy()
         if self.material_stress is not None:

@@ -1,4 +1,4 @@
-"""The steps of an analysis as a list that says in a few lines what is in it."""
+"""The steps of an analysis as a list with a concise representation."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import SupportsIndex, overload
 from fastcontact._tools.html_table import html_table
 from fastcontact.results.step import StepResult
 
-# Longest list whose steps are all shown.
+# Length of the longest list whose steps are all shown.
 SHOWN = 30
 
 
@@ -20,7 +20,7 @@ class Steps(list[StepResult]):
     @overload
     def __getitem__(self, index: slice) -> Steps: ...
     def __getitem__(self, index: SupportsIndex | slice) -> StepResult | Steps:
-        """Return a step, or for a slice again such a list."""
+        """Return a step, or `Steps` for a slice."""
         if isinstance(index, slice):
             return Steps(super().__getitem__(index))
         return super().__getitem__(index)
@@ -45,7 +45,7 @@ def _shown(steps: Steps) -> Iterable[StepResult]:
 
 
 def rows_of(step: StepResult) -> list[tuple[str, ...]]:
-    """Return a row of texts for each contact pair of a step, under `HEAD`; one without where there is none."""
+    """Return a row of texts for each contact pair of a step, under `HEAD`; one row without pairs."""
     begin = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
     pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]
     return [(*begin, *pair) for pair in pairs] or [(*begin, *[""] * (len(HEAD) - len(begin)))]

@@ -1,4 +1,4 @@
-"""The steps of a result file that is resumed: read one by one, so that a long run is resumed in the memory of a short one."""
+"""The steps of a resumed result file, read one by one, so that resuming a long run takes little memory."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fastcontact.results.step import StepResult
 
 
 class StoredSteps(Sequence[StepResult]):
-    """The steps that a file held when it was opened, each read when it is used; the last one, with its `restart`, is kept.
+    """The steps of a file at the time of opening, each read when used; the last one, with its `restart`, is kept.
 
-    Whoever changes the file calls `release` before: what HDF5 knows of an open file is not renewed. It is opened again when
-    a step is used.
+    `release` must be called before the file is changed, because HDF5 does not update its view of an open file. The file is
+    reopened when a step is used.
     """
 
     def __init__(self, results: Results) -> None:

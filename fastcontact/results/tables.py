@@ -30,7 +30,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
     ----------
     contact : ContactResult
     step : StepResult, optional
-        The step that the contact belongs to, for the fields at its nodes.
+        The step of the contact, which adds the fields at its nodes.
 
     Returns
     -------
@@ -38,9 +38,9 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
         ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the middle of the contact), ``place`` (the
         same with a sign, see `ContactResult`), ``gap`` [length]; ``pressure`` [pressure]; ``multiplier`` [force or
         pressure]; ``force_x`` ... [force]; ``shear_x`` ... [pressure]; ``slip_x`` ..., ``slip_total_x`` ... [length];
-        where heat crosses ``heat_flux`` [power / area];
-        ``active``, ``sticking`` (true or false). With `step` also ``displacement_x`` ... [length], ``stress_xx`` ...,
-        ``normal_stress``, ``von_mises``, ``von_mises_signed`` [pressure].
+        with a conductance ``heat_flux`` [power / area]; ``active``, ``sticking`` (true or false). With `step` also
+        ``displacement_x`` ... [length], ``stress_xx`` ..., ``normal_stress``, ``von_mises``, ``von_mises_signed``
+        [pressure].
 
     Examples
     --------
@@ -86,8 +86,8 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
 def normal_stress(contact: ContactResult, step: StepResult) -> Array:
     """Return the normal stress ``n . sigma . n`` (m,) at the secondary nodes of a contact [pressure].
 
-    `step` is the one that the contact belongs to, n the normal of the opposite facet. In contact it is minus the pressure, up
-    to the discretisation error; NaN at nodes without an opposite facet.
+    `step` is the step of the contact, n the normal of the opposite facet. In contact it is minus the pressure, up to
+    the discretisation error; NaN at nodes without an opposite facet.
 
     Examples
     --------
@@ -122,7 +122,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     group : str
         A group of line cells that form one open line.
     start : str or int, optional
-        The end to start from, as for ``topology.ordered_line``; by default the one nearest to x = 0.
+        The first end, as in ``topology.ordered_line``; by default the one nearest to x = 0.
 
     Returns
     -------
@@ -134,7 +134,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     Raises
     ------
     MeshError
-        If there is no such group, or it is no open line.
+        If there is no such group, or it is not an open line.
 
     Examples
     --------
@@ -156,7 +156,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
 
 
 def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
-    """Return a table (m,) with one column more, `values` (m,) under `name`."""
+    """Return a table (m,) with an additional column `name` of `values` (m,)."""
     return structured({**_columns(table), name: values})
 
 
@@ -172,12 +172,12 @@ def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None =
         File to write, replaced if it exists.
     table : structured ndarray (m,)
     units : mapping of str to str, optional
-        Units by column, which the header then shows in brackets.
+        Units by column, shown in brackets in the header.
 
     Raises
     ------
     CaseError
-        If `units` names a column that is not there.
+        If `units` names an unknown column.
     FileError
         If the file cannot be written.
 
@@ -210,12 +210,12 @@ def _text(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float):
         text = f"{value:.17g}"
-        return text if text.strip("-0123456789") else text + ".0"  # so that it stays a float
+        return text if text.strip("-0123456789") else text + ".0"  # keeps it recognisable as a float
     return str(value)
 
 
 def structured(columns: Mapping[str, AnyArray | Sequence[Any]]) -> AnyArray:
-    """Return columns (m,) of equal length by name, in their units, as one structured array (m,)."""
+    """Return columns (m,) of equal length, by name, as one structured array (m,)."""
     arrays = {name: np.asarray(column) for name, column in columns.items()}
     table = np.empty(len(next(iter(arrays.values()))), dtype=[(name, array.dtype) for name, array in arrays.items()])
     for name, array in arrays.items():

@@ -1,7 +1,7 @@
-"""Texts of variable length in a result file, read without HDF5, which never returns from some damaged files.
+"""Texts of variable length in a result file, read without HDF5, which does not return from some damaged files.
 
-Such a text stands in a "global heap collection": a head of 16 bytes with the size of the collection, then objects one after
-the other, each with a head of 16 bytes, its number and its size (HDF5 File Format Specification 3.0, section III.E).
+Such a text is stored in a "global heap collection": a header of 16 bytes with the size of the collection, then objects one
+after the other, each with a header of 16 bytes, its number and its size (HDF5 File Format Specification 3.0, section III.E).
 """
 
 from __future__ import annotations
@@ -11,21 +11,21 @@ import struct
 from typing import Any
 
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
-HEAD = struct.Struct("<8sQ")  # of a collection: signature, size
-OBJECT = struct.Struct("<H6xQ")  # of an object: number, size; the free room at the end has the number 0
-REFERENCE = struct.Struct("<IQI")  # in a data set: length of the text, place of the collection, number of the object
+HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
+OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
+REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the text, position of the collection, object number
 
 
 def read_text(dataset: Any, raw: Any) -> str:
     """Return the text in a data set of one text; `raw` is its open file, with addresses of eight bytes.
 
-    Raises ValueError if it is no such data set, or damaged.
+    Raises ValueError if it is another kind of data set, or damaged.
     """
     import h5py
 
     kind, start = h5py.check_string_dtype(dataset.dtype), dataset.id.get_offset()
     if dataset.shape != () or start is None or kind is None or kind.length is not None:
-        raise ValueError(f"'{dataset.name}' is no text")
+        raise ValueError(f"'{dataset.name}' is not a text")
     file_size = raw.seek(0, os.SEEK_END)
     length, offset, wanted = _unpacked(REFERENCE, raw, start, file_size)
     signature, size = _unpacked(HEAD, raw, offset, file_size)
@@ -43,6 +43,6 @@ def read_text(dataset: Any, raw: Any) -> str:
 
 def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
     if offset + kind.size > end:
-        raise ValueError(f"its texts are damaged: they stand at byte {offset} of {end}")
+        raise ValueError(f"its texts are damaged: they are at byte {offset} of {end}")
     raw.seek(offset)
     return kind.unpack(raw.read(kind.size))

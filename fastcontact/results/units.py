@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-# What columns of tables hold, by the beginning of their names.
+# Quantity of the columns of tables, by the beginning of their names.
 COLUMNS = {
     **dict.fromkeys(("abscissa", "radius", "place", "gap", "displacement_", "slip_", "wear"), "length"),
     **dict.fromkeys(("pressure", "stress_", "normal_stress", "von_mises", "shear_", "fluid_pressure"), "pressure"),
@@ -13,7 +13,7 @@ COLUMNS = {
 
 
 def known_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of the units of length, force and pressure; empty where nobody named one, or named it by a dash.
+    """Return the names of the units of length, force and pressure; empty for unknown ones, or those given as a dash.
 
     Examples
     --------
@@ -64,7 +64,7 @@ def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, 
 
 
 def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return the label of an axis or a column, with the unit of its quantity where that is known."""
+    """Return the label of an axis or a column, with the unit of its quantity if known."""
     unit = units.get(quantity, "")
     return f"{text} [{unit}]" if unit and unit != "-" else text
 
@@ -82,5 +82,5 @@ def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 
 
 
 def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return one or several values, a text already, with their unit, where that is known."""
+    """Return one or several values, given as a text, with their unit if known."""
     return f"{text} {units.get(quantity, '')}".removesuffix(" -").rstrip()

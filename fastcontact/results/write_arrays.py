@@ -1,6 +1,6 @@
-"""What is written into a result file: its groups and empty tables at the beginning, then the data of each step.
+"""Writing the arrays of a result file: its groups and empty tables at the beginning, then the data of each step.
 
-What a step adds counts only when the number of steps is raised, which the writer does last.
+The data of a step only become valid when the number of steps is raised, which the writer does last.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fastcontact.results import layout
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 
-# Rows of a growing table, and bytes of a growing text, that are allocated together.
+# Numbers of rows of a growing table, and of bytes of a growing text, that are allocated together.
 ROWS, BYTES = 64, 4096
 # Small fields of several steps are allocated together, up to this size [bytes].
 SHARED = 4096
@@ -28,14 +28,14 @@ SHARED = 4096
 def write_geometry(
     file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None, heat: bool = False
 ) -> None:
-    """Write /VTKHDF with the solid cells, the static arrays, and room for the steps and their `growing` cell fields.
+    """Write /VTKHDF with the solid cells, the static arrays, and empty tables for the steps and their `growing` cell fields.
 
-    Steps have `layout.HEAT_FIELDS` with `heat`. Where materials meet, `material` (n_solids,) are those of the cells, and each
-    step gets their stress.
+    With `heat`, steps have `layout.HEAT_FIELDS`. With material interfaces, `material` (n_solids,) are the materials of the
+    cells, and each step gets their stress.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
-    root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # readers want a fixed-length ASCII string
+    root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # readers require a fixed-length ASCII string
     cells = layout.solid_cells(mesh)
     root["NumberOfPoints"] = np.array([mesh.n_points], np.int64)
     root["NumberOfCells"] = np.array([len(cells.types)], np.int64)
@@ -89,7 +89,7 @@ def _write_steps_group(
 
 
 def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
-    """Write /fastcontact: the mesh with all its cells and groups, the case, and room for the steps."""
+    """Write /fastcontact: the mesh with all its cells and groups, the case, and empty tables for the steps."""
     import h5py
 
     group = file.create_group("fastcontact")
@@ -130,7 +130,7 @@ def _write_groups(parent: Any, name: str, groups: Any) -> None:
 
 
 def _packed(parent: Any, name: str, values: AnyArray) -> None:
-    """Write a fixed array, compressed with the one filter that all readers know."""
+    """Write a fixed array, compressed with the only filter that all readers support."""
     if values.size:
         parent.create_dataset(name, data=values, compression="gzip", compression_opts=1, chunks=values.shape)
     else:
@@ -138,9 +138,9 @@ def _packed(parent: Any, name: str, values: AnyArray) -> None:
 
 
 def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
-    """Create an empty field; small ones of several steps share a chunk, so that the index of chunks does not outweigh them.
+    """Create an empty field; small fields of several steps share a chunk, so that the chunk index does not outweigh them.
 
-    Only a chunk of a single step is compressed: a compressed chunk moves when more is written to it.
+    Only chunks of a single step are compressed: a compressed chunk moves when more is written to it.
     """
     tail, rows = () if width == 1 else (width,), max(length, 1)
     steps = SHARED // (8 * rows * width)
@@ -151,7 +151,7 @@ def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
 
 
 def growing_table(parent: Any, name: str, dtype: Any, width: int = 0, rows: int = ROWS) -> Any:
-    """Create an empty table; uncompressed, so that growing never moves the rows that are there."""
+    """Create an empty table; uncompressed, so that existing rows never move as it grows."""
     tail = (width,) if width else ()
     return parent.create_dataset(name, shape=(0, *tail), maxshape=(None, *tail), chunks=(rows, *tail), dtype=dtype)
 
@@ -168,20 +168,20 @@ def _plain(value: Any) -> Any:
 
 
 def append_fields(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
-    """Write point and cell fields as those of step `number`, over what a dead writer may have left of it."""
+    """Write the point and cell fields of step `number`, overwriting remains of a writer that was stopped."""
     points, cells = file["VTKHDF/PointData"], file["VTKHDF/CellData"]
     by_cell = {name: step.cell_fields[name] for name in cell_fields}
     by_cell |= layout.material_fields(mesh, step) if layout.CELL_STRESS in cells else {}
     for group, fields in ((points, layout.point_fields(mesh, step)), (cells, by_cell)):
         for name, values in fields.items():
-            if name in group:  # earlier versions began files with fewer
+            if name in group:  # earlier versions created fewer
                 _extend(group[name], values, number * len(values))
 
 
 def append_tables(
     file: Any, mesh: Mesh, number: int, step: StepResult, pairs: dict[str, Any], notes: Mapping[str, Any]
 ) -> None:
-    """Write contact tables, iterations, warnings and further `notes`; pairs that are new are added to `pairs`, by name."""
+    """Write contact tables, iterations, warnings and further `notes`; new pairs are added to `pairs`, by name."""
     group = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
@@ -192,13 +192,14 @@ def append_tables(
         _append_sides(group, mesh, number, step.material_stress)
     contact = [[name, contact.formulation] for name, contact in step.contact.items()]
     text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
-    row = (step.index, step.load_factor, len(group["notes"]), len(text))
-    _extend(group["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    table = group["notes"]
+    row = (step.index, step.load_factor, len(table), len(text))
+    _extend(table, np.frombuffer(text.encode("ascii"), np.uint8))
     _set_row(group["steps"], number, np.array(row, layout.STEP_ROW))
 
 
 def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
-    """Write where viewers find the fields of step `number`."""
+    """Write the positions of the fields of step `number` for viewers."""
     steps = file["VTKHDF/Steps"]
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
@@ -209,7 +210,7 @@ def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_field
 
 
 def append_run(file: Any, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
-    """Write how a run ended after `n_steps` steps: whatever JSON can hold; `flush` sees it to the file."""
+    """Write the record of a run that ended after `n_steps` steps, as JSON; `flush` flushes the file."""
     group, text = file["fastcontact"], as_json(run)
     row = np.array((n_steps, len(group["notes"]), len(text)), layout.RUN_ROW)
     _extend(group["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
@@ -219,7 +220,7 @@ def append_run(file: Any, n_steps: int, run: Any, flush: Callable[[], None]) -> 
 
 
 def set_restart(file: Any, number: int, state: NDArray[np.uint8]) -> None:
-    """Write the packed restart state of step `number`; the table never shrinks: HDF5 would give the room away."""
+    """Write the packed restart state of step `number`; the table never shrinks, because HDF5 would reuse the space."""
     table = file["fastcontact"][layout.restart_table(number)]
     if len(table) < len(state):
         table.resize(len(state), axis=0)
@@ -227,14 +228,14 @@ def set_restart(file: Any, number: int, state: NDArray[np.uint8]) -> None:
 
 
 def header_size(mesh: Mesh) -> int:
-    """Return an upper bound for what a file without steps takes [bytes]."""
+    """Return an upper bound of the size of a file without steps [bytes]."""
     n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
     arrays = [mesh.points, *mesh.cells.values(), *mesh.cell_groups.values(), *mesh.point_groups.values()]
     return 6 * sum(array.nbytes for array in arrays) + n_groups * (mesh.n_cells + mesh.n_points + BYTES)
 
 
 def step_size(mesh: Mesh, step: StepResult) -> int:
-    """Return an upper bound for what a step takes in the file, but for its restart state [bytes]."""
+    """Return an upper bound of the size of a step in the file, without its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
     faced = layout.primary_row(mesh.dim).itemsize
     contact = sum(
@@ -251,7 +252,7 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
 
 
 def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> Any:
-    pair = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
+    pair = parent.create_group(None)  # unnamed until complete, in case of an interrupt
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim, further))
     growing_table(pair, "primary", layout.primary_row(dim))
@@ -262,28 +263,30 @@ def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> Any:
 
 def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> None:
     """Append a pair's state; a step without it gets a row of zeros."""
-    row = np.zeros((), pair["steps"].dtype)
+    rows, steps = pair["rows"], pair["steps"]
+    row = np.zeros((), steps.dtype)
     if contact is not None:
-        table = np.zeros(len(contact.points), pair["rows"].dtype)
+        table = np.zeros(len(contact.points), rows.dtype)
         for name in table.dtype.names or ():
             table[name] = getattr(contact, name)
-        row["first"], row["count"] = len(pair["rows"]), len(table)
+        row["first"], row["count"] = len(rows), len(table)
         for name in set(row.dtype.names or ()).difference(layout.PLACES):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
-        _extend(pair["rows"], table)
-        if "primary" in pair:  # not in files begun before there was such a table
-            faced = np.zeros(len(contact.primary_points), pair["primary"].dtype)
+        _extend(rows, table)
+        if "primary" in pair:  # missing in older files
+            primary = pair["primary"]
+            faced = np.zeros(len(contact.primary_points), primary.dtype)
             faced["points"], faced["force_vectors"] = contact.primary_points, contact.primary_force_vectors
-            row["primary_first"], row["primary_count"] = len(pair["primary"]), len(faced)
-            _extend(pair["primary"], faced)
-    _set_row(pair["steps"], number, row)
+            row["primary_first"], row["primary_count"] = len(primary), len(faced)
+            _extend(primary, faced)
+    _set_row(steps, number, row)
 
 
 def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
-    """Append the stress of each side where materials meet; the tables are made with the first one."""
+    """Append the stress of each side of material interfaces; the tables are created with the first one."""
     if "materials" not in parent:
-        group = parent.create_group(None)  # without a name until it is whole: the program may be interrupted
+        group = parent.create_group(None)  # unnamed until complete, in case of an interrupt
         _packed(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.SIDES_STEP)
@@ -297,7 +300,7 @@ def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -
 
 
 def _extend(table: Any, values: AnyArray, first: int | None = None) -> None:
-    """Write values from a row on, by default behind all rows."""
+    """Write values from a row on, by default after all rows."""
     first = len(table) if first is None else first
     table.resize(first + len(values), axis=0)
     table[first:] = values

@@ -1,8 +1,8 @@
 """Crash-safe writer of result files: no completed step is lost.
 
 Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables and
-small fields grow in place, larger fields are a chunk of their own for each step, so that nothing of a finished step moves.
-Room on the disk is reserved before, because HDF5 loses the whole file when one of its writes fails.
+small fields grow in place, larger fields have a separate chunk for each step, so that data of a completed step never move.
+Disk space is reserved beforehand, because HDF5 loses the whole file when one of its writes fails.
 """
 
 from __future__ import annotations
@@ -37,47 +37,48 @@ from fastcontact.results.step import StepResult
 from fastcontact.results.stored_steps import StoredSteps
 from fastcontact.results.texts import read_text
 
-# A run that is shorter loses little with the power [s].
+# Time after which steps are synchronised with the disk: shorter runs lose little in a power loss [s].
 SHORT = 10.0
-# Room for HDF5's own records [bytes].
+# Reserve for HDF5's own records [bytes].
 MARGIN = 1 << 19
-# Size in the file of the indices that HDF5 keeps in memory [bytes].
+# Size in the file of the indices that HDF5 caches in memory [bytes].
 INDICES = 1 << 18
 
 
 @typed(FileError)
 class ResultWriter:
-    """A result file to which one step after the other is written.
+    """A result file to which steps are appended.
 
-    The file is begun at once: errors show before any step is computed. From then on it can be opened at any time, by viewers
-    too, and shows all steps so far, even after an exception or a crash. Several threads may share a writer: its methods
-    wait for each other.
+    The file is created at once, so that errors appear before any step is computed. It can then be opened at any time,
+    also by viewers, and contains all steps so far, even after an exception or a crash. Several threads may share a
+    writer.
 
     Parameters
     ----------
     path : path-like
-        File to write; the suffix ``.vtkhdf`` is the one that viewers know.
+        File to write; viewers recognise the suffix ``.vtkhdf``.
     mesh : Mesh or model
-        The mesh, or any object with `mesh` and `kinematics`, and maybe `case_text`, such as a ``Model``.
+        A mesh, or any object with `mesh` and `kinematics`, and optionally `case_text`, such as a ``Model``.
     kinematics : str
         Kinematics of a bare mesh; a model brings its own.
     case_text : str
-        The case file, kept as it is.
+        Text of the case file to store.
     overwrite : bool
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
-        Names of further `StepResult.cell_fields` of every step, beside those of the model; viewers show them, the XDMF
-        sidecar does not.
+        Names of further `StepResult.cell_fields` of every step, in addition to those of the model; viewers show them,
+        the XDMF sidecar does not.
     resume : bool
-        Whether to keep the steps of an existing file of this mesh and write after them. A file that is missing or holds no
-        complete step is begun. The file is not changed before there is something to add.
+        Whether to keep the steps of an existing file of this mesh and append to them. A file that is missing or has no
+        complete step is created. An existing file is not changed before a step is added.
     synchronise : bool, optional
         Whether each step is on the disk when `write` returns, so that it survives a loss of power; by default from ten
-        seconds after the file was begun, so that short runs are not slowed. Steps always survive the end of the process.
+        seconds after the creation of the file, so that short runs are not slowed. Steps always survive the end of the
+        process.
     background : bool
-        Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or `close`
-        returns, which also raise what went wrong with it; `n_steps` counts those that are. A copy of the step is in memory
-        until then, so that the arrays of the caller may change.
+        Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or
+        `close` returns, which also raise the errors of the previous write; `n_steps` counts complete steps. A copy of
+        the step is kept in memory until then, so that the caller's arrays may change.
 
     Attributes
     ----------
@@ -86,13 +87,12 @@ class ResultWriter:
     n_steps : int
         Number of steps in the file.
     done : sequence of StepResult
-        The steps that the file held at first, each read when it is used, for ``solve(..., resume=out.done)``; none without
-        `resume`.
+        The steps of the existing file, read on access, for ``solve(..., resume=out.done)``; empty without `resume`.
 
     Raises
     ------
     FileError
-        If the file cannot be written, exists and must not be replaced, is no result file, has another writer, or is
+        If the file cannot be written, exists and must not be replaced, is not a result file, has another writer, or is
         to be resumed but belongs to another mesh.
     ModelError
         If `mesh` is neither a mesh nor a model.
@@ -121,7 +121,7 @@ class ResultWriter:
         cell_fields = dict.fromkeys((*getattr(mesh, "cell_fields", ()), *cell_fields))
         if not isinstance(mesh, Mesh):
             if not isinstance(getattr(mesh, "mesh", None), Mesh) or not hasattr(mesh, "kinematics"):
-                raise ModelError(f"results need a mesh or a model to stand on, not {type(mesh).__name__}")
+                raise ModelError(f"results need a mesh or a model as a basis, not {type(mesh).__name__}")
             kinematics, self._material = mesh.kinematics, _materials_that_meet(mesh)
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
@@ -138,7 +138,7 @@ class ResultWriter:
         self._background = Background() if background else None
         self._turn = threading.RLock()
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
-        self._notes: dict[str, str] = {}  # of the next step: the case file, if another one is resumed
+        self._notes: dict[str, str] = {}  # notes of the next step: the case file, if another one is resumed
         self._left: tuple[int, ...] | None = None
         with self._explained("begun"):
             self._lock = PathLock(self.path)
@@ -153,7 +153,7 @@ class ResultWriter:
                 raise
 
     def _take_up(self, kinematics: str, case_text: str) -> None:
-        """Look whether the file holds steps to write after."""
+        """Check whether the file contains steps to append to."""
         left = left_at(self.path)
         self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
         self.n_steps = len(self.done)
@@ -175,22 +175,22 @@ class ResultWriter:
         except FileError as failure:
             error.add_note(str(failure))
         if self._file is None and not isinstance(error, ConvergenceError):
-            self._give_up()  # nothing was added: whatever went wrong says nothing about the steps that are there
+            self._give_up()  # nothing was added: the error does not concern the existing steps
             return
-        with contextlib.suppress(FileError):  # the first error is the one to tell
+        with contextlib.suppress(FileError):  # the first error is the relevant one
             run: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
             if isinstance(error, ConvergenceError):
                 run["log"] = {"failed_step": error.history}
             self._finish(run)
 
     def write(self, step: StepResult) -> None:
-        """Append a step; when this returns the step is safe from a crash of the process, unless it is in the background.
+        """Append a step. When this returns, the step survives a crash of the process, unless `background` is set.
 
         Raises
         ------
         FileError
-            If the file is closed, the step does not follow those before it, belongs to another case or does not fit the
-            mesh, or the disk takes no more.
+            If the file is closed, the step does not follow the previous one, belongs to another case or does not fit
+            the mesh, or if the disk is full or fails.
         """
         with self._turn:
             self.wait()
@@ -210,7 +210,7 @@ class ResultWriter:
         Raises
         ------
         FileError
-            If the disk took no more.
+            If the disk was full or failed.
         """
         if self._background is not None:
             with self._turn:
@@ -224,7 +224,7 @@ class ResultWriter:
             restart = packed({"step": self.n_steps, "restart": step.restart})
             room = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * room if self._committed.synchronised else room)
-            # The parts of a step are flushed in the order in which they count, unless one journal holds them all.
+            # The parts of a step are flushed in their order of dependence, unless one journal contains them all.
             in_parts = not self._committed.synchronised or room > journal.LARGEST
             write_arrays.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
@@ -240,7 +240,7 @@ class ResultWriter:
             self._last = step.index, _case_of(step)
 
     def _check_next(self, step: StepResult) -> None:
-        """Refuse a step that is there already, comes too late, or was computed for another case than those before."""
+        """Refuse a step that is already there, out of order, or computed for another case than the earlier ones."""
         index, case = self._last
         if step.index <= index:
             raise FileError(f"step {step.index} cannot be written after step {index}: write each step once, in order")
@@ -255,14 +255,14 @@ class ResultWriter:
         Parameters
         ----------
         log : str, list or dict, optional
-            Log of the whole run: whatever JSON can hold.
+            Log of the whole run, as JSON data.
         warnings : iterable of str
             Warnings of the run that belong to no step.
 
         Raises
         ------
         FileError
-            If the disk takes no more.
+            If the disk is full or fails.
         """
         try:
             self.wait()
@@ -278,7 +278,7 @@ class ResultWriter:
 
     def _finish_once(self, run: dict[str, Any]) -> None:
         if self._file is None and self._ended and "error" not in run:
-            self._give_up()  # a complete file stays as it is
+            self._give_up()  # a complete file is not changed
             return
         self._release_done()
         try:
@@ -309,7 +309,7 @@ class ResultWriter:
             self.done.release()
 
     def _open(self) -> None:
-        """Open a file that is resumed, once there is something to add to it."""
+        """Open a resumed file before the first addition."""
         import h5py
 
         if self._file is None:
@@ -335,7 +335,7 @@ class ResultWriter:
         raise FileError(self._gone())
 
     def _check_ours(self) -> None:
-        """Refuse to write into a file that another program has written to."""
+        """Refuse to write to a file that another program has changed."""
         if not self._committed.intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
@@ -362,11 +362,11 @@ class ResultWriter:
 
     @contextlib.contextmanager
     def _explained(self, action: str) -> Iterator[None]:
-        """Turn errors of HDF5 and of the system into one sentence with a remedy; meanwhile signals wait."""
+        """Convert errors of HDF5 and of the system to one message with a remedy, and defer signals meanwhile."""
         with uninterrupted():
             try:
                 yield
-            except Exception as error:  # a failed read shows as errors of many kinds
+            except Exception as error:  # a failed read causes errors of many kinds
                 failure = self._committed.failure if self._committed is not None else None
                 if isinstance(error, (FastcontactError, MemoryError)):
                     raise
@@ -382,7 +382,7 @@ class ResultWriter:
                 ) from error
 
     def _begin(self, kinematics: str, case_text: str) -> None:
-        """Write all but the steps under another name, then put it in the place of the old file."""
+        """Write everything except the steps under another name, then replace the old file."""
         with replacing(self.path) as temporary:
             with open(temporary, "r+b") as probe:
                 size = write_arrays.header_size(self._mesh) + len(case_text) + MARGIN
@@ -390,12 +390,12 @@ class ResultWriter:
             with new_hdf5(temporary) as file:
                 write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._heat)
                 write_arrays.write_own(file, self._mesh, kinematics, case_text, self._units)
-        # Closed in between because Windows renames no open file; without locks viewers may follow.
+        # Closed in between because Windows does not rename open files; without locks viewers may read along.
         self._open()
 
 
 def _limit_index_memory(file: Any) -> None:
-    """Let HDF5 forget nodes of indices: in memory they take ten times their size in the file, and grow with the steps."""
+    """Limit HDF5's cache of index nodes: in memory they take ten times their size in the file, and grow with the steps."""
     settings = file.id.get_mdc_config()
     settings.set_initial_size = True
     settings.initial_size = settings.min_size = settings.max_size = INDICES
@@ -403,7 +403,7 @@ def _limit_index_memory(file: Any) -> None:
 
 
 def _materials_that_meet(model: Any) -> Any:
-    """Return the materials of all solid cells (n_solids,) of a model where some meet; None where none do."""
+    """Return the materials of all solid cells (n_solids,) of a model with material interfaces, else None."""
     if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
         return None
     material = model.material_field().distinct
@@ -415,9 +415,9 @@ def _materials_that_meet(model: Any) -> Any:
 def _steps_to_resume(
     path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]
 ) -> tuple[Sequence[StepResult], bool, str]:
-    """Return the steps of the file at `path`, if there is one, whether its run came to its end, and its case file.
+    """Return the steps of the file at `path`, if there is one, whether its run is complete, and its case file.
 
-    Raises FileError if its steps cannot be followed by steps of this mesh.
+    Raises FileError if steps of this mesh cannot be appended.
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
@@ -428,7 +428,7 @@ def _steps_to_resume(
         begin_anew = "or start anew without resuming, which replaces the file"
         if old.schema < layout.RESUMABLE:
             raise FileError(
-                f"'{path}' was written by an earlier fastcontact, which kept nothing to go on from: name another file "
+                f"'{path}' was written by an earlier fastcontact, which stored no data to resume from: name another file "
                 f"{begin_anew}"
             )
         if lost := old.lacks(layout.CONTINUED):
@@ -448,12 +448,12 @@ def _steps_to_resume(
 
 
 def _case_of(step: StepResult) -> Any:
-    """Return what tells the parts of the case that a step was computed for; None where it does not say."""
+    """Return the identity of the case for which a step was computed; None if unknown."""
     return (step.restart or {}).get("case", {}).get("parts")
 
 
 def _same_mesh(old: Mesh, other: Mesh) -> bool:
-    """Return whether points, cells and groups of two meshes are the same."""
+    """Return whether points, cells and groups of two meshes are equal."""
     if not np.array_equal(old.points, other.points):
         return False
     for kind in ("cells", "cell_groups", "point_groups"):
@@ -464,7 +464,7 @@ def _same_mesh(old: Mesh, other: Mesh) -> bool:
 
 
 def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
-    """Return the names of cell fields, if all of them can be written."""
+    """Return the names of cell fields, after a check that all can be written."""
     names = tuple(cell_fields)
     for name in names:
         taken = {*layout.cell_fields(mesh), *layout.MATERIAL_FIELDS, "material"}
@@ -476,7 +476,7 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
 
 
 def _check_replaceable(path: Any, overwrite: bool) -> None:
-    """Refuse to replace a file without `overwrite`, or one that is no result file."""
+    """Refuse to replace a file without `overwrite`, or a file that is no result file."""
     import h5py
 
     if not path.exists() or not path.stat().st_size:
@@ -486,7 +486,7 @@ def _check_replaceable(path: Any, overwrite: bool) -> None:
     is_result = h5py.is_hdf5(path)
     if is_result:
         with contextlib.suppress(OSError), h5py.File(path, "r", locking=False) as file:
-            # Not `in`, which follows links, also to other files.
+            # Not `in`, which follows links, even to other files.
             is_result = isinstance(file.get("VTKHDF", getlink=True), h5py.HardLink)
     if not is_result:
-        raise FileError(f"'{path}' exists and is no result file: name another file or remove it first")
+        raise FileError(f"'{path}' exists and is not a result file: name another file or remove it first")

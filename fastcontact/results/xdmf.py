@@ -1,4 +1,4 @@
-"""An XDMF file beside a result file: viewers that know no steps in VTKHDF read the same data through it."""
+"""XDMF sidecar of a result file, for viewers that do not support steps in VTKHDF."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ TAIL = "</Grid></Domain></Xdmf>\n"
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     """Write an XDMF file that refers to the steps of a result file, for ParaView before 5.12.
 
-    The XDMF file holds no numbers, only their places in the result file: move the two together. It shows the steps that
-    were complete when it was written.
+    The XDMF file only refers to the data in the result file: keep the two together. It shows the steps that were
+    complete when it was written.
 
     Parameters
     ----------
     result_path : path-like
         File of ``ResultWriter``.
     xdmf_path : path-like
-        File to write, suffix ``.xdmf``; replaced at once if it exists.
+        File to write, suffix ``.xdmf``; replaced atomically if it exists.
 
     Raises
     ------
@@ -85,18 +85,18 @@ def _attribute(name: str, kind: str, center: str, item: str) -> str:
 
 
 def _static(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
-    """Yield the arrays that are the same in all steps."""
+    """Yield the arrays that are constant over the steps."""
     for name, values in arrays.items():
         address, kind = f"{reference}:/VTKHDF/{group}/{name}", "Char" if values.itemsize == 1 else "Int"
         yield _attribute(name, "Scalar", center, _data(address, values.shape, kind, values.itemsize))
 
 
 def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
-    """Yield a field at the points in one step: parts of the data set of all steps."""
+    """Yield a field at the points in one step, as a part of the data set of all steps."""
     name = address.rpartition("/")[2]
     width = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name]
     parts = [(name, 0, width)]  # label, first column and number of columns of each
-    if name == "stress":  # XDMF orders the components of a symmetric tensor otherwise than VTK: each is a field
+    if name == "stress":  # XDMF and VTK order the components of a symmetric tensor differently: each is a field
         parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
     dims = 1 if width == 1 else 2
     for label, column, count in parts:

@@ -1,4 +1,4 @@
-"""Curves as a project file of Grace (xmgrace 5.1), ready to look at: round axes, legend, titles."""
+"""Curves as a project file of Grace (xmgrace 5.1), with round axis limits, legend and titles."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ class Curve:
     Parameters
     ----------
     x, y : array_like (n,)
-        Coordinates, in the units of the axes; points with a value that is not finite are left out.
+        Coordinates, in the units of the axes; points that are not finite are omitted.
     legend : str
         Text in the legend; empty for none.
     style : {"line", "symbols", "line+symbols"}
-        A line for theory, symbols for what was computed at nodes.
+        A line for theory, symbols for nodal values.
 
     Raises
     ------
@@ -72,14 +72,14 @@ def write_agr(
     path : path-like
         File to write, suffix ``.agr``; replaced if it exists.
     curves : sequence of Curve
-        Drawn in this order, the last on top.
+        Curves in drawing order, the last on top.
     title, subtitle, xlabel, ylabel : str
-        Plain text: Grace's own markup in it is shown as it stands; Greek letters come out as such.
+        Plain text; markup of Grace in it is escaped, and Greek letters are supported.
 
     Raises
     ------
     CaseError
-        If no curve has a point to show.
+        If no curve has a finite point.
     FileError
         If the file cannot be written.
 
@@ -116,7 +116,7 @@ def write_agr(
 
 
 def round_axis(values: ArrayLike) -> tuple[float, float, float]:
-    """Return first tick, last tick and tick distance of an axis that holds all finite `values` (n,) between round numbers.
+    """Return first tick, last tick and tick distance of an axis for all finite `values` (n,), with round limits.
 
     The distance is 1, 2 or 5 times a power of ten; there are 4 to 10 intervals.
 
@@ -128,13 +128,13 @@ def round_axis(values: ArrayLike) -> tuple[float, float, float]:
     numbers = np.asarray(values, np.float64)
     low, high = float(numbers.min()), float(numbers.max())
     size = max(abs(low), abs(high))
-    if high - low <= 1e-9 * size or size < 1e-300:  # one value only: show it in the middle of something
+    if high - low <= 1e-9 * size or size < 1e-300:  # one value only: show it in the middle of an interval
         half = 0.5 * size if size >= 1e-300 else 1.0
         low, high = low - half, high + half
     raw = (high - low) / 8.0
     power = 10.0 ** math.floor(math.log10(raw))
     distance = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1 - 1e-9))
-    # A hair of tolerance, so that 0.3 = 3 x 0.1 needs no further tick.
+    # A small tolerance, so that 0.3 = 3 x 0.1 needs no further tick.
     first, last = math.floor(low / distance + 1e-9), math.ceil(high / distance - 1e-9)
     return first * distance, last * distance, distance
 
@@ -146,7 +146,7 @@ def escaped(text: str) -> str:
 
 
 def _known(letter: str) -> str:
-    """Return the letter if Grace has it, or else what comes nearest."""
+    """Return the letter if Grace has it, or a similar one."""
     if letter in _GREEK or (letter.isprintable() and ord(letter) < 256):
         return letter
     near = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode("ascii")

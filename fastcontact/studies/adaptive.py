@@ -27,9 +27,9 @@ from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 
-# Cells that carry this part of the error are refined: a larger part makes fewer, larger steps (Doerfler, 1996).
+# Fraction of the error whose cells are refined: a larger fraction makes fewer, larger steps (Doerfler, 1996).
 BULK = 0.7
-# From round to round differences shrink by at least this factor where refinement converges.
+# If refinement converges, differences shrink by at least this factor from round to round.
 SHRINKING = 3.0
 
 
@@ -46,27 +46,28 @@ def adaptive_study(
     on_round: Callable[[Round], None] | None = None,
     progress: bool = False,
 ) -> AdaptiveStudy:
-    """Refine the mesh of a case where its error is large, until a quantity is accurate enough.
+    """Refine the mesh of a case adaptively until a quantity is accurate enough.
 
-    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it with its influence on the
-    quantity, and divides the cells that carry most of it in four. The error of the quantity is estimated from its changes.
+    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it with its influence on
+    the quantity, and divides the cells with the largest contributions in four. The error of the quantity is estimated
+    from its changes.
 
     Parameters
     ----------
     case : Case or path-like
-        In two dimensions, of triangles and quadrangles. The first mesh is level 0 of its ``[study]``, otherwise its own.
+        A case in two dimensions, with triangles and quadrangles. The first mesh is level 0 of its ``[study]``,
+        otherwise its own mesh.
     quantity : str
-        What must be accurate, e.g. ``"force"``, ``"pressure_max"``, ``"C1.stress.yy"``.
+        The quantity of interest, e.g. ``"force"``, ``"pressure_max"``, ``"C1.stress.yy"``.
     tolerance : float
-        Relative error wanted [-].
+        Target relative error [-].
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or the case's own.
-    max_dofs, max_rounds : int
-        Limits at which refinement stops in any case.
+        By default the last of ``study.combinations``, or those of the case. max_dofs, max_rounds : int Limits at which
+        the refinement stops.
     on_round : callable, optional
         Called with every `Round`.
     progress : bool
-        Write a line on standard error that is drawn anew after every round, on terminals and in notebooks.
+        Show the progress on standard error, updated after every round, on terminals and in notebooks.
 
     Returns
     -------
@@ -118,7 +119,7 @@ def _checked(case: Case | str | Path, tolerance: float) -> Case:
 
 
 def _first_mesh(case: Case, chosen: Settings, member: Combination) -> tuple[Forest, list[Any]]:
-    """Return the first mesh, of linear cells that can be divided, and the curves of its boundary."""
+    """Return the first mesh, of divisible linear cells, and the curves of its boundary."""
     mesh = case.mesh
     if chosen.by_shape and member.element is not None:
         mesh = make_mesh(recipe(chosen, member.element, 0), None)
@@ -127,7 +128,7 @@ def _first_mesh(case: Case, chosen: Settings, member: Combination) -> tuple[Fore
 
 
 def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, member: Combination) -> Case:
-    """Return the case on another mesh of linear cells, made quadratic where the element is."""
+    """Return the case on another mesh of linear cells, which become quadratic if the element is."""
     element = member.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
@@ -137,7 +138,7 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, 
 def _solved(
     case: Case, quantity: str, pair: str | None, before: Sequence[Round], started: float
 ) -> tuple[StepResult, ErrorEstimate, Round]:
-    """Solve a case, estimate its error, measure its quantities; its warnings are given in the first round only."""
+    """Solve a case, estimate its error, measure its quantities; warnings are issued in the first round only."""
     with warnings.catch_warnings():
         if before:
             warnings.simplefilter("ignore", FastcontactWarning)
@@ -164,8 +165,8 @@ def _solved(
 def _estimate(values: Sequence[float]) -> float:
     """Return the estimated relative error of the last of a quantity's values; NaN before there are three meshes.
 
-    The last change bounds what is left where changes shrink by a factor of two or more; the one before guards against a
-    change that is small by chance.
+    The last change bounds the remaining error if changes shrink by a factor of two or more; the change before it guards
+    against one that is small by chance.
     """
     if len(values) < 3 or not values[-1]:
         return float("nan")
@@ -174,7 +175,7 @@ def _estimate(values: Sequence[float]) -> float:
 
 
 def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str, pair: str | None) -> Array:
-    """Return the share (n_solids,) of each cell in the error of a quantity, up to a factor.
+    """Return the contribution (n_solids,) of each cell to the error of a quantity, up to a common factor.
 
     The error of a functional is at most the sum over all cells of the solution's error times that of the dual solution, the
     solution under a load where the quantity is measured (Becker and Rannacher, 2001). For a force that is the solution.
@@ -197,7 +198,7 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
 
 
 def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Array | None:
-    """Return the point (dim,) where a quantity is measured [length]; None for those of the whole solution."""
+    """Return the point (dim,) where a quantity is measured [length]; None for global quantities."""
     probe = quantity.split(".")[0]
     if probe in case.probes:
         return case.mesh.points[case.probes[probe]]
@@ -211,7 +212,7 @@ def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Arr
 
 
 def _marked(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
-    """Return which leaves (n_leaves,) to divide: the fewest cells that carry the part `BULK` of an indicator (n_solids,)."""
+    """Mark leaves (n_leaves,) to divide: the fewest cells that hold the fraction `BULK` of an indicator (n_solids,)."""
     order = np.argsort(-indicator, kind="stable")
     carried = np.cumsum(indicator[order])
     count = int(np.searchsorted(carried, BULK * carried[-1])) + 1

@@ -30,11 +30,11 @@ class Round:
     ----------
     n_dofs, n_cells : int
     values, theory, reference : dict of str to float
-        By quantity, in the case's units: its value, the theory at equal approach, the mesh-converged solution.
+        Value, theory at equal approach and mesh-converged solution of each quantity, in the units of the case.
     energy_error : float
         Estimated error of the whole solution in the energy norm, relative [-].
     estimate : float
-        Estimated error of the wanted quantity, relative [-]; NaN on the first two meshes.
+        Estimated relative error of the quantity of interest [-]; NaN on the first two meshes.
     seconds : float
         Time of solution and estimate [s].
     """
@@ -49,7 +49,7 @@ class Round:
     seconds: float
 
     def true_error(self, quantity: str) -> float:
-        """Return the difference from the case's mesh-converged solution, relative [-]; NaN without one."""
+        """Return the relative difference from the mesh-converged solution of the case [-]; NaN without one."""
         exact = self.reference.get(quantity)
         return abs(self.values[quantity] / exact - 1.0) if exact else math.nan
 
@@ -64,16 +64,16 @@ class AdaptiveStudy(Report):
         Element and formulation.
     quantity : str
     tolerance : float
-        Relative error asked for [-].
+        Target relative error [-].
     reached : bool
-        Whether the estimate fell below it.
+        Whether the estimate has reached the tolerance.
     rounds : list of Round
     case : Case
-        That of the last mesh.
+        The case on the last mesh.
     last : StepResult
-        Its solution.
+        Solution on the last mesh.
     error : ErrorEstimate
-        Its error, cell by cell.
+        Error of each cell of the last mesh.
     """
 
     kind = "Adaptive meshes"
@@ -89,7 +89,7 @@ class AdaptiveStudy(Report):
     error: ErrorEstimate
 
     def effectivity(self, number: int = -1) -> float:
-        """Return estimated over true error of the quantity in a round [-]; NaN without a reference."""
+        """Return the effectivity index of a round, estimated over true error [-]; NaN without a reference."""
         round_ = self.rounds[number]
         true = round_.true_error(self.quantity)
         return round_.estimate / true if true > 0 else math.nan
@@ -114,8 +114,8 @@ class AdaptiveStudy(Report):
     def table(self) -> AnyArray:
         """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
 
-        Fields ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``, ``true_error`` (against
-        the case's mesh-converged solution) and ``effectivity`` [-].
+        Fields are ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``,
+        ``true_error`` (relative to the mesh-converged solution of the case) and ``effectivity`` [-].
         """
         counts = {name: [getattr(round_, name) for round_ in self.rounds] for name in ("n_dofs", "n_cells")}
         values = [round_.values[self.quantity] for round_ in self.rounds]

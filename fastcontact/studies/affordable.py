@@ -13,12 +13,12 @@ from fastcontact.studies.settings import Combination, Settings
 
 log = logging.getLogger("fastcontact")
 MOST_RUNS = 100_000
-# Peak memory of a multigrid analysis of linear hexahedra [bytes], the leanest there is: `fastcontact bench contact`.
+# Peak memory per unknown of a multigrid analysis of linear hexahedra, the cheapest case [bytes]: `fastcontact bench contact`.
 BYTES_PER_UNKNOWN = 2500
 
 
 def check_runs(count: int) -> None:
-    """Raise CaseError for a study of more runs than anybody could wait for."""
+    """Raise CaseError for a study with an excessive number of runs."""
     if count > MOST_RUNS:
         raise CaseError(f"a study of {count} runs would not end: give at most {MOST_RUNS}, or fewer values")
     log.info("%d runs", count)
@@ -41,7 +41,7 @@ def check_levels(case: Case, chosen: Settings, members: Sequence[Combination], l
 
 
 def _memory() -> float:
-    """Return the memory of this machine [bytes]; infinite where it cannot be asked."""
+    """Return the memory of this machine [bytes]; infinity if it is unknown."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):

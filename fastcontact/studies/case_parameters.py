@@ -1,4 +1,4 @@
-"""Setting scalars of a parsed case file by their path, such as ``support[1].y`` or ``theory.hertz.approach``."""
+"""Substitution of values in a parsed case file by path, such as ``support[1].y`` or ``theory.hertz.approach``."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*
 
 
 def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of a parsed case file with a parameter set: a path, or a name of `linked`.
+    """Return a copy of a parsed case file with a new value of a parameter: a path, or a name in `linked`.
 
-    `linked` is ``[study.parameters]``: names that stand for several paths, each set to a law ``"a*value^p"`` of the value.
-    Raises CaseError if there is no such place or name, or a law is wrong.
+    `linked` is ``[study.parameters]``: each name sets several paths, each by a law ``"a*value^p"`` of the value.
+    Raises CaseError if there is no such path or name, or a law is wrong.
     """
     case: dict[str, Any] = copy.deepcopy(dict(data))
     if parameter not in linked:
@@ -31,7 +31,7 @@ def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Map
 
 
 def by_law(law: Any, value: Any, where: str) -> Any:
-    """Return ``a value^p``."""
+    """Return ``a value^p`` for a law ``"a*value^p"``."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:
         raise CaseError(f"{where} = {law!r} must be 'value', 'a*value' or 'a*value^p' with numbers a and p")
@@ -72,7 +72,7 @@ def _keys(path: str) -> list[str | int]:
     for key in path.split("."):
         match = _PART.match(key)
         if match is None:
-            raise CaseError(f"'{path}' is no path into a case file: write for example support[1].y")
+            raise CaseError(f"'{path}' is not a path into a case file: write for example support[1].y")
         keys.append(match[1])
         keys += [int(number) for number in re.findall(r"\d+", match[2])]
     return keys
@@ -82,7 +82,7 @@ def _inside(entry: Any, key: str | int, path: str) -> Any:
     if isinstance(key, int):
         if not isinstance(entry, list) or key >= len(entry):
             count = len(entry) if isinstance(entry, list) else 0
-            raise CaseError(f"'{path}' asks for entry [{key}], counted from [0], and the case has {count} there")
+            raise CaseError(f"'{path}' refers to entry [{key}], counted from [0], and the case has {count} there")
     elif not isinstance(entry, dict) or key not in entry:
         raise CaseError(unknown(f"entry of the case in '{path}'", key, entry if isinstance(entry, dict) else ()))
     return entry[key]

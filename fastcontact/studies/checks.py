@@ -15,10 +15,10 @@ from fastcontact.studies.settings import settings, shape_of
 
 
 def check_study(case: Case) -> None:
-    """Raise FastcontactError if a study of a case could not begin.
+    """Raise FastcontactError if a study of a case could not start.
 
-    Meshes of quadrangles are made where ``[study]`` gives the arguments of level 0, free triangles are not: they take as long
-    as a short run.
+    Quadrangle meshes are made if ``[study]`` gives the arguments of level 0; free triangle meshes are not, since they take as
+    long as a short run.
     """
     chosen = settings(case)
     study = chosen.data.get("study", {})

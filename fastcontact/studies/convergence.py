@@ -1,4 +1,4 @@
-"""Mesh-convergence study: solve a case on finer and finer meshes, fit limits, compare them with theory."""
+"""Mesh-convergence study: solve a case on a sequence of finer meshes, fit limits, compare them with theory."""
 
 from __future__ import annotations
 
@@ -40,37 +40,39 @@ def convergence_study(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Study:
-    """Solve a case or a Python model on finer and finer meshes; fit order and limit; separate model error from mesh error.
+    """Solve a case or a Python model on successively finer meshes, fit limit and order, separate model and mesh error.
 
-    Meshes of a case come from the generator that it names, its sizes halved on every level, or from uniform refinement of
-    its mesh file, arcs kept round; see the table ``[study]`` of case files. Of a function they are what it makes.
+    The meshes of a case come from its generator, with sizes halved on every level, or from uniform refinement of its
+    mesh file with arcs kept circular; see the table ``[study]`` of case files. The meshes of a function are those that
+    it generates.
 
     Parameters
     ----------
     case : Case, path-like or callable
-        A function of the mesh size returns a `Model`, which is solved in 20 equal steps, or what `solve` returns.
+        A function receives the mesh size and returns a `Model`, which is solved in 20 equal steps, or the result of
+        `solve`.
     levels : int or sequence of float
-        Of a case the number of meshes; a limit needs three, a reliable one five. Of a function the mesh sizes, any length
-        that goes to zero as the mesh is refined [length].
+        For a case the number of meshes; a limit needs three, a reliable one five. For a function the mesh sizes, any
+        length that tends to zero as the mesh is refined [length].
     elements, formulations : sequence of str, optional
-        Of a case, compared in all combinations; ``["all"]`` for all; by default what ``[study]`` names, or the case's own.
+        For a case, compared in all combinations; ``["all"]`` for all; by default those of ``[study]``, or of the case.
     quantities : sequence of str, or dict of str to callable
-        Further ones to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``; of a function, functions
-        of the last `StepResult` that return a number, by name, or names of standard quantities. One whose argument is called
-        ``steps`` gets the list of all steps.
+        Further quantities to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``. For a
+        function, names of standard quantities, or functions by name that receive the last `StepResult` and return a
+        number; a function whose argument is called ``steps`` receives the list of all steps.
     executor : concurrent.futures.Executor, optional
-        Where to run: by default processes of this machine, or e.g. ``Client.get_executor()`` of Dask or an
-        ``MPIPoolExecutor`` of mpi4py. It is not shut down here.
+        Executor of the runs, e.g. ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py, which is not
+        shut down; by default processes of this machine.
     workers : int, optional
-        Number of these processes, by default one for each processor, of a function 1, which runs everything in this one.
-        More than one start by importing the script they are called from: there the call belongs under
-        ``if __name__ == "__main__":``.
+        Number of processes, by default one for each processor, for a function 1, which runs everything in this
+        process. Several processes import the calling script, where the call must be under ``if __name__ ==
+        "__main__":``.
     store : path-like, optional
-        Folder of finished runs of a case: those found there are not run again; new ones are added.
+        Folder of finished runs of a case, which are reused; new ones are added.
     on_progress : callable, optional
         Called with a `Progress` after every run.
     progress : bool
-        Write a line on standard error that is drawn anew after every run, on terminals and in notebooks.
+        Show the progress on standard error, updated after every run, on terminals and in notebooks.
 
     Returns
     -------
@@ -84,7 +86,7 @@ def convergence_study(
     Warns
     -----
     FastcontactWarning
-        If the meshes of a function do not get finer as its sizes get smaller.
+        If the meshes of a function do not become finer as its sizes decrease.
 
     Examples
     --------
@@ -124,11 +126,11 @@ def convergence_study(
 def _of_function(
     function: Function, sizes: int | Sequence[float], wanted: Quantities, options: dict[str, Any]
 ) -> Study:
-    """Return the study of a function that makes models; `options` are those of `run_functions`."""
+    """Return the study of a model function; `options` are those of `run_functions`."""
     if isinstance(sizes, int | np.integer):
         raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
-    given = sorted(map(float, sizes), reverse=True)
-    if not given or len({*given}) < len(given) or not (given[-1] > 0 and given[0] < np.inf):
+    descending = sorted(map(float, sizes), reverse=True)
+    if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
     name, measures, argument = (
         functions.function_name(function),
@@ -140,16 +142,16 @@ def _of_function(
             label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
             function=function, positional=(size,), named={}, measures=measures,
         )
-        for level, size in enumerate(given)
+        for level, size in enumerate(descending)
     ]  # fmt: skip
     results = functions.run_functions(runs, "no size could be solved", **options)
-    solved = [(level, {**result, "h": given[level]}) for level, result in enumerate(results)]
+    solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
     series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
-    _tell_coarser(series.levels)
+    _warn_of_coarser_meshes(series.levels)
     return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)
 
 
-def _tell_coarser(levels: Sequence[Level]) -> None:
+def _warn_of_coarser_meshes(levels: Sequence[Level]) -> None:
     for coarse, fine in pairwise(levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(
@@ -160,13 +162,13 @@ def _tell_coarser(levels: Sequence[Level]) -> None:
 
 
 def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
-    """Return the run of one element and formulation on one mesh."""
+    """Return the job of one element and formulation on one mesh."""
     marks = {"level": level, "element": member.element, "formulation": member.formulation}
     return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
-    """Return the study of finished runs; `wanted` are quantities to fit besides the standard ones and those of checks."""
+    """Return the study of finished runs; quantities in `wanted` are fitted besides the standard ones and those of checks."""
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
         member = Combination(job.marks["element"], job.marks["formulation"])
@@ -192,9 +194,9 @@ def _series(
     theory: tuple[Any, float, str],
     asked: tuple[str, ...] = (),
 ) -> Series:
-    """Return one element and formulation with its limits; `checked` are fitted where they are known.
+    """Return the series of one element and formulation with its limits; `checked` quantities are fitted if known.
 
-    `theory` is that of the pair, the share of it that the model holds, and at what it is compared.
+    `theory` holds the theory of the pair, the fraction of it that the model represents, and the basis of comparison.
     """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
@@ -213,7 +215,7 @@ def _series(
 
 
 def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the theory's values at the limit of the force, and how much they change over its error bar."""
+    """Return the values of the theory at the limit of the force, and their variation over its error bar."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
     middle, upper = (of_theory(theory.at_force((force.value + off) / share), share) for off in (0.0, force.uncertainty))

@@ -1,4 +1,4 @@
-"""Pictures of a mesh-convergence study: errors over the mesh size, pressures of all levels, differences from theory."""
+"""Figures of a mesh-convergence study: errors over mesh size, pressures of all levels, differences from theory."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fastcontact.studies.render.figure import frame, marker, message
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 
-# With more curves than this, error bars would hide them.
+# Largest number of curves drawn with error bars, which would hide more of them.
 MOST_CURVES_WITH_BARS = 3
 
 
 def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Mapping[str, str]) -> None:
-    """Draw the mesh error of a quantity over h, doubly logarithmic, with error bars of the limit, fits and slopes."""
+    """Draw the mesh error of a quantity over h in log-log scale, with error bars of the limit, fits and slopes."""
     known = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not known:
         return message(ax, f"no limit of the {title(quantity)}:\na limit takes three levels")
@@ -50,13 +50,13 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     labels, size = (along, "|value - limit| / limit"), 8 if few else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
-    if few:  # matplotlib does not see error bars in the way of the legend
+    if few:  # matplotlib ignores error bars when it places the legend
         low, high = ax.get_ylim()
         ax.set_ylim(low, high * (high / low) ** (0.02 * size * (len(known) + len(explained)) / 2.2))
 
 
 def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> None:
-    """Draw triangles whose slopes are the least and the greatest fitted order, rounded to halves."""
+    """Draw slope triangles for the least and the greatest fitted order, rounded to halves."""
     orders = [series.limits[quantity].order for series in all_series]
     orders = [order for order in orders if math.isfinite(order)]
     if not orders:
@@ -75,7 +75,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
 
 
 def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]) -> None:
-    """Draw the contact pressure of all levels over the distance from the axis, and the theory's."""
+    """Draw the contact pressure of all levels over the distance from the axis, with that of the theory."""
     if not series.finest.profile:
         return message(ax, "this case has no contact pair,\nso there is no contact pressure")
     from matplotlib import colormaps
@@ -101,11 +101,11 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
 
 
 def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
-    """Draw the pressure of a theory, where it has one, at equal approach and at equal force."""
-    given = pressure_curve(theory)
-    if given is None:
+    """Draw the pressure of a theory, if it has one, at equal approach and at equal force."""
+    curve_given = pressure_curve(theory)
+    if curve_given is None:
         return
-    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", given)]
+    curves = [("theory" if series.exact_theory else f"theory {series.compared}", "k-", curve_given)]
     force = series.limits.get("force")
     if force is not None and force.value > 0 and hasattr(theory, "at_force"):
         same = pressure_curve(theory.at_force(force.value / series.share))
@@ -117,7 +117,7 @@ def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
 def draw_differences(
     ax: Any, all_series: Sequence[Series], best: Series, quantity: str, units: Mapping[str, str]
 ) -> None:
-    """Draw the difference from theory over h: it tends to the model error, and the rest is mesh error."""
+    """Draw the difference from theory over h; it tends to the model error, and the remainder is mesh error."""
     known = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not known:
         return message(ax, f"no theory of the {title(quantity)}, or no limit")

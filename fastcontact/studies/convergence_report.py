@@ -20,7 +20,7 @@ from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 
-# In figures, and in the table of all combinations.
+# Quantities in figures and in the table of all combinations.
 COMPARED = ("force", "pressure_max")
 
 
@@ -33,7 +33,7 @@ class Study(Report):
     series : list of Series
         One for each combination of element and formulation that could be solved.
     failed : dict of str to str
-        Why a whole combination failed, by its name.
+        Reason why a whole combination failed, by its name.
     theory : object or None
         The theory at equal approach, of `fastcontact.analytic`.
     """
@@ -64,9 +64,10 @@ class Study(Report):
     def as_dict(self) -> dict[str, Any]:
         """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them.
 
-        The top level holds the best combination (`best`), ``combinations`` all of them. Errors are relative to the theory,
-        or without one to the limit; ``mesh_error`` is that of the finest mesh, and ``model_error + mesh_error`` its
-        difference from theory. ``uncertainty`` is in the unit of the quantity, at a confidence of 95 %.
+        The top level contains the best combination (`best`), ``combinations`` contains all. Errors are relative to the
+        theory, or without one to the limit; ``mesh_error`` is that of the finest mesh, and ``model_error +
+        mesh_error`` its difference from theory. ``uncertainty`` is the half-width of the 95 % interval, in the unit of
+        the quantity.
         """
         numbers = {
             "confidence": CONFIDENCE,
@@ -79,14 +80,14 @@ class Study(Report):
     def table(self) -> AnyArray:
         """Return a structured array (n_rows,), one row a level of a combination, as ``--csv`` writes it.
 
-        Fields ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity
-        its value in its unit, ``..._error`` [-] (relative to its limit), ``..._order`` [-] (from the level before) and, where
-        there is a theory of it, ``..._from_theory`` [-] (relative to the theory).
+        Fields ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every
+        quantity its value in its unit, ``..._error`` [-] (relative to its limit), ``..._order`` [-] (from the previous
+        level) and, if there is a theory, ``..._from_theory`` [-] (relative to the theory).
         """
         return structured(tables.csv_columns(self.series))
 
     def tables(self) -> list[tuple[str, Rows]]:
-        """See `Report`: of every combination its levels and its limits, and all combinations beside each other."""
+        """See `Report`: levels and limits of every combination, and a comparison of all combinations."""
         captioned = []
         for series in self.series:
             captioned.append((str(series.combination), tables.level_rows(series, self.units)))
@@ -129,6 +130,6 @@ class Study(Report):
         return axes[0, 0].figure
 
     def _drawn(self) -> list[str]:
-        """Return the quantities whose errors are drawn."""
+        """Return the quantities for which errors are drawn."""
         known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
         return known if isinstance(self.best.combination, Named) else list(COMPARED)

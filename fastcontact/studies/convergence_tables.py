@@ -1,4 +1,4 @@
-"""Tables of a mesh-convergence study: rows for people, columns for CSV, dictionaries for JSON."""
+"""Tables of a mesh-convergence study: rows of text, columns for CSV, dictionaries for JSON."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from fastcontact.studies.series import Series
 
 # Quantities with columns in the tables of levels; the limits are given for all quantities.
 IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
-# Columns about limits, and the first columns of a table of all combinations.
+# Columns of limits, and the first columns of the table of all combinations.
 OF_LIMITS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
-# Behind the error bar of a limit whose values do not settle.
+# Mark after the error bar of a limit whose values do not settle.
 UNSETTLED = " (unsettled)"
 COMBINATION = ("combination", "levels", "finest DOF")
 
 
 def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[str] | None = None) -> Rows:
-    """Return header and rows of h, DOF, and of each quantity value, error against the limit, order from level to level."""
+    """Return header and rows: h, DOF, and for each quantity its value, error against the limit and order between levels."""
     names = series.shown(IN_TABLES) if quantities is None else quantities
     header = ["level", labelled("h", units, "length"), "DOF"]
     rows = [[str(level.number), number(level.h, 4), str(level.n_dofs)] for level in series.levels]
@@ -62,7 +62,7 @@ def _start(series: Series) -> list[str]:
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
-    """Return some columns about the limit of a quantity as texts; dashes where there is no limit."""
+    """Return columns on the limit of a quantity as text; dashes if there is no limit."""
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
         return ["-"] * len(columns)
@@ -82,7 +82,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
 
 
 def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
-    """Return the columns of all levels by name, each (n_rows,), without those that hold no number; see `Study.table`."""
+    """Return the columns (n_rows,) of all levels by name, without those that contain no number; see `Study.table`."""
     quantities = dict.fromkeys(name for series in all_series for name in series.quantities)
     columns: dict[str, list[Any]] = {}
     for series in all_series:
@@ -108,7 +108,7 @@ def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
 
 
 def series_dict(series: Series) -> dict[str, Any]:
-    """Return one combination of element and formulation for JSON."""
+    """Return the data of one combination of element and formulation for JSON."""
     return {
         "element": series.combination.element,
         "formulation": series.combination.formulation,
@@ -140,7 +140,7 @@ def series_dict(series: Series) -> dict[str, Any]:
 
 
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
-    """Return limit, order, theory and errors of a quantity; None where there is no such number."""
+    """Return limit, order, theory and errors of a quantity; None for missing numbers."""
     limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
     entry: dict[str, Any] = {
         "limit": limit.value if limit else None,

@@ -1,7 +1,7 @@
-"""Estimate of a solution's error, cell by cell: smoothed stress, and balance at the contact surface.
+"""Error estimate of a solution by cell, from the smoothed stress and the traction jump at the contact surface.
 
-The smoothed stress is more exact than the stress of the solution, so that their difference estimates the error
-(Zienkiewicz and Zhu, 1987). It does not contain the difference between smoothed stress and contact pressure on the contact
+The smoothed stress is more accurate than the stress of the solution, so that their difference estimates the error
+(Zienkiewicz and Zhu, 1987). This does not include the difference between smoothed stress and contact pressure on the contact
 surface, which is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
 """
 
@@ -38,7 +38,7 @@ class ErrorEstimate:
     cells : ndarray (n_solids,)
         Error of every solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
     contact : ndarray (n_solids,)
-        The part that stems from the contact surface [energy^(1/2)].
+        Contribution of the contact surface [energy^(1/2)].
     energy : float
         Energy norm of the solution [energy^(1/2)].
 
@@ -58,12 +58,12 @@ class ErrorEstimate:
 
     @property
     def total(self) -> float:
-        """Error of the whole solution."""
+        """Error of the solution."""
         return float(np.linalg.norm(self.cells))
 
     @property
     def relative(self) -> float:
-        """Error of the whole solution over its energy norm [-]."""
+        """Error of the solution divided by its energy norm [-]."""
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 
@@ -99,9 +99,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     smooth = smoothed_stress(model.mesh, model.kinematics, model.material_field(), step.displacement, offset)
     squares, energy = [], 0.0
     for name in model.mesh.solids:
-        difference, whole = _differences(model, step.displacement, name, smooth[name], offset)
+        difference, total = _differences(model, step.displacement, name, smooth[name], offset)
         squares.append(difference)
-        energy += whole
+        energy += total
     contact = np.zeros(sum(map(len, squares)))
     for result in step.contact.values():
         _add_contact(model, result, smooth, contact)
@@ -111,7 +111,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 def _differences(
     model: Model, displacement: Array, name: str, smooth: Array, offset: StressOffset | None
 ) -> tuple[Array, float]:
-    """Return the squared energy norms (n_cells,) of smoothed minus own stress, and that of the own stress in all."""
+    """Return the squared energy norms (n_cells,) of smoothed minus computed stress, and the total of the computed stress."""
     N, stress, volume, elastic = stress_in_cells(
         model, name, slice(None), displacement, elements.get(name).order + 1, offset
     )
@@ -121,7 +121,7 @@ def _differences(
 
 
 def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], contact: Array) -> None:
-    """Add h / E times the squared difference of pressure and smoothed normal stress, to the cells of the facets."""
+    """Add h / E times the squared difference between pressure and smoothed normal stress to the cells of the facets."""
     mesh = model.mesh
     pair = next(pair for pair in model.contact if pair.name == result.name)
     nodal = np.zeros(mesh.n_points)
@@ -160,7 +160,7 @@ def _traction(stress: Array, normal: Array) -> Array:
 
 
 def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
-    """Return the facets that belong to cells of a kind, those cells, and the facets' nodes as local nodes of the cells."""
+    """Return the facets of cells of a kind, these cells, and the facet nodes as local nodes of the cells."""
     near = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
     rows = np.array([same_facets(facets, cells[near][:, side]) for side in sides], np.intp).reshape(-1, len(near))

@@ -1,7 +1,7 @@
-"""Norms of the difference between a finite-element solution and a theory, by quadrature: energy and mean square.
+"""Energy and L2 norms of the difference between a finite-element solution and a theory, by quadrature.
 
-For convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often converge faster
-than the solution between them.
+They are for convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often
+converge faster than the solution between them.
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.cell_stress import CellStress, beside
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.initial_states import StressOffset
+from fastcontact.elasticity.loads import check_solids, solid_rows
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
 from fastcontact.model.model import Model
 
-# Quadrature points worked on at a time, so that theories with large intermediate arrays fit the memory.
+# Number of quadrature points evaluated at a time, which limits the intermediate arrays of theories.
 AT_ONCE = 100_000
 
 
@@ -43,18 +44,18 @@ class Theory(Protocol):
 
 @dataclass(frozen=True)
 class ErrorNorms:
-    """Norms of an error, and of the theory itself to compare them with.
+    """Norms of an error, and of the theory for comparison.
 
-    The energy norm of stresses s is the square root of the integral of s : C^-1 : s, C being the elastic moduli: the
-    root of twice the elastic energy [(force length)^(1/2)]. That of displacements is the square root of the integral of
+    The energy norm of stresses s is the square root of the integral of s : C^-1 : s with the elastic moduli C, that is
+    of twice the elastic energy [(force length)^(1/2)]. The norm of displacements is the square root of the integral of
     their square (L2) [length^(1 + dim/2)]. In axisymmetry integrals run over the full circle.
 
     Attributes
     ----------
     energy, displacement : float
-        Of the solution minus the theory.
+        Norms of the solution minus the theory.
     energy_of_theory, displacement_of_theory : float
-        Of the theory.
+        Norms of the theory.
 
     Examples
     --------
@@ -73,12 +74,12 @@ class ErrorNorms:
 
     @property
     def relative_energy(self) -> float:
-        """Energy norm of the error over that of the theory [-]."""
+        """Energy norm of the error divided by that of the theory [-]."""
         return self.energy / self.energy_of_theory
 
     @property
     def relative_displacement(self) -> float:
-        """L2 norm of the error of displacements over that of the theory [-]."""
+        """L2 norm of the error of displacements divided by that of the theory [-]."""
         return self.displacement / self.displacement_of_theory
 
 
@@ -100,19 +101,19 @@ def error_against(
     Parameters
     ----------
     theory : Theory
-        Anything with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
+        An object with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
     model : Model
-        Its mesh, kinematics and materials.
+        The model, of which mesh, kinematics and materials are used.
     displacement : array_like (n_points, dim)
-        Of the solution, e.g. ``fc.solve(model)[-1].displacement`` [length].
+        Displacement of the solution, e.g. ``fc.solve(model)[-1].displacement`` [length].
     groups : sequence of str or str, optional
-        Solid cells to integrate over, by default all.
+        Groups of solid cells to integrate over, by default all.
     n_points : int, optional
-        Points along each direction of a cell, three more than the order of the element by default: more than
-        the stiffness needs, so that the error is that of the solution.
+        Quadrature points along each direction of a cell; by default three more than the order of the element, so that
+        the quadrature error is negligible.
     rise : ndarray (n_points,), optional
-        Of the temperature at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
-        strains of the model count in full.
+        Temperature rise at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
+        strains of the model are included in full.
 
     Raises
     ------
@@ -137,25 +138,14 @@ def error_against(
         )
     if n_points is not None and n_points < 1:
         raise ModelError(f"n_points = {n_points} points along each direction of a cell must be at least 1")
-    chosen = _rows(model, (groups,) if isinstance(groups, str) else groups)
+    names = (groups,) if isinstance(groups, str) else groups
+    check_solids(model.mesh, names, " to integrate over")
     offset = model.material_field().offset(rise, [(1.0, state) for state in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
-    for name, rows in chosen.items():
+    for name, rows in solid_rows(model.mesh, names).items():
         for rows_of_part in _portions(rows, elements.get(name), n_points):
             total += _squares(theory, model, u, name, rows_of_part, n_points, offset)
     return ErrorNorms(*(math.sqrt(square) for square in total))
-
-
-def _rows(model: Model, groups: Sequence[str] | None) -> dict[str, Indices]:
-    """Return, by solid element, the cells to integrate over."""
-    mesh = model.mesh
-    if groups is None:
-        return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
-    for group in groups:
-        if not mesh.cells_of(group, dim=mesh.dim):
-            raise ModelError(f"group '{group}' holds no solid cells to integrate over")
-    cells = np.unique(np.concatenate([mesh.cell_groups[group] for group in groups]))
-    return {name: rows for name, rows in mesh.split(cells).items() if name in mesh.solids}
 
 
 def _portions(rows: Indices, element: Element, n_points: int | None) -> Iterator[Indices]:
@@ -171,11 +161,11 @@ def stress_in_cells(
     n_points: int | None,
     offset: StressOffset | None = None,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return shape functions, stresses, volumes and elastic constants at the quadrature points of some cells of a kind.
+    """Return shape functions, stresses, volumes and compliances at the quadrature points of some cells of a kind.
 
     Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    compliances (n_cells, 1 or n_q, n_components, n_components), where they vary inside cells those of the points
-    [1 / pressure]. `displacement` is (n_points, dim) [length].
+    compliances (n_cells, 1 or n_q, n_components, n_components) [1 / pressure], by quadrature point if they vary inside cells.
+    `displacement` is (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
@@ -199,7 +189,7 @@ def _squares(
     n_points: int | None,
     offset: StressOffset | None,
 ) -> Array:
-    """Return the squares (4,) of the norms over some cells, in the order of `ErrorNorms`."""
+    """Return the squared norms (4,) over some cells, in the order of `ErrorNorms`."""
     N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, offset)
     cells = model.mesh.cells[name][rows]
     places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])
@@ -213,7 +203,7 @@ def _squares(
 
 
 def _exact(theory: Theory, places: Array, n_components: int) -> tuple[Array, Array]:
-    """Return displacements and stresses (n_cells, n_q, ...) of the theory at `places` (n_cells, n_q, dim)."""
+    """Return displacements and stresses (n_cells, n_q, ...) of the theory at points `places` (n_cells, n_q, dim)."""
     points = places.reshape(-1, places.shape[2])
     at_points = []
     for name, size in (("displacement", points.shape[1]), ("stress", n_components)):

@@ -1,4 +1,4 @@
-"""Execution of runs by processes or any executor, with a store of finished runs."""
+"""Execution of runs in processes or by any executor, with a store of finished runs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from fastcontact._tools.paths import replacing
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import Run, run
-from fastcontact.studies.progress import told
+from fastcontact.studies.progress import reporting
 
 Result = dict[str, Any]
 # NumPy and Numba read these when they are imported, so they are set before a worker process starts.
@@ -38,17 +38,17 @@ class Progress:
     Attributes
     ----------
     label : str
-        The run that has just ended.
+        Label of the run that has just finished.
     done, total : int
-        Runs that have ended, and all.
+        Number of finished runs, and of all runs.
     left : tuple of str
-        Labels of the runs still to come.
+        Labels of the remaining runs.
     seconds : float
-        Time the run took [s]; 0 if it was found in the store.
+        Duration of the run [s]; 0 if its result came from the store.
     error : str
-        Why it failed; empty if it did not.
+        Reason of a failure; empty if there was none.
     stored : bool
-        Whether it was found in the store.
+        Whether the result came from the store.
     """
 
     label: str
@@ -68,7 +68,7 @@ def run_all(
     store: str | Path | None = None,
     on_progress: Callable[[Progress], None] | None = None,
 ) -> list[Result]:
-    """Run jobs side by side and return their results in the order of the jobs; the options as in `convergence_study`.
+    """Run jobs in parallel and return their results in the order of the jobs; options as in `convergence_study`.
 
     Raises CaseError if the number of workers is wrong, FastcontactError if no worker process can start.
     """
@@ -96,9 +96,9 @@ def run_all(
 def run_study(
     jobs: Sequence[Run], name: str, *, on_progress: Callable[[Progress], None] | None, progress: bool, **options: Any
 ) -> list[Result]:
-    """Return the results of `run_all`, told on a line if `progress`; the first error if all fail, begun by `name`."""
-    with told(on_progress, progress) as told_to:
-        results = run_all(jobs, on_progress=told_to, **options)
+    """Return the results of `run_all`, with a status line if `progress`; if all fail, raise the first error after `name`."""
+    with reporting(on_progress, progress) as report:
+        results = run_all(jobs, on_progress=report, **options)
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
         raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
@@ -106,7 +106,7 @@ def run_study(
 
 
 class Store:
-    """A folder of finished runs, a JSON file each, named by the keys of their jobs; made if it is not there."""
+    """A folder of finished runs, one JSON file each, named by the keys of their jobs; created if missing."""
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
@@ -116,11 +116,11 @@ class Store:
             raise FileError(f"the folder '{folder}' cannot be made: {error.strerror}; name another store") from error
 
     def path(self, job: Run) -> Path:
-        """Return where the result of a run is kept."""
+        """Return the file for the result of a run."""
         return self.folder / f"{job.key}.json"
 
     def get(self, job: Run) -> Result | None:
-        """Return the result of a run, or None if it is not there or was not written whole."""
+        """Return the result of a run, or None if it is missing or incomplete."""
         try:
             stored = json.loads(self.path(job).read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -129,7 +129,7 @@ class Store:
         return result if isinstance(result, dict) and "values" in result else None
 
     def put(self, job: Run, result: Result) -> None:
-        """Keep the result of a run; the file appears whole or not at all."""
+        """Store the result of a run; the file is written completely or not at all."""
         text = json.dumps({"label": job.label, "case": job.name, "marks": job.marks, "result": result}, default=str)
         with replacing(self.path(job)) as temporary:
             temporary.write_text(text + "\n", encoding="utf-8")
@@ -151,9 +151,9 @@ def _run_rest(
 
 
 def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run on `count` processes of this machine; a run that kills its worker is tried once more alone, then reported."""
+    """Run in `count` processes of this machine; a run that kills its worker is retried once on its own, then reported."""
     if _imports_its_script():
-        # The script calls the study outside of "if __name__ == '__main__'": the process that waits for this one says so.
+        # The script calls the study outside of "if __name__ == '__main__'"; the parent process reports the error.
         raise SystemExit(1)
     left = list(rest)
     try:
@@ -167,16 +167,16 @@ def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[t
 
 
 class Worker(SpawnProcess):
-    """A process whose start nothing interrupts: one that is half started would print that its input ended."""
+    """A process with an uninterruptible start: a partly started one would print that its input ended."""
 
     def start(self) -> None:
-        """Start it; signals wait meanwhile."""
+        """Start the process, with signals blocked meanwhile."""
         with uninterrupted():
             super().start()
 
 
 class Spawning(SpawnContext):
-    """Starts processes and knows them. Forked children of a process with OpenMP threads die, so they are spawned."""
+    """Context that spawns processes and keeps a list of them. Forked children of a process with OpenMP threads die."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -189,7 +189,7 @@ class Spawning(SpawnContext):
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool of processes that can be ended in the middle of their work, and that end with this process."""
+    """A pool of processes that can be ended during their work, and that end with this process."""
 
     def __init__(self, count: int) -> None:
         self.context = Spawning()
@@ -197,18 +197,18 @@ class Workers(ProcessPoolExecutor):
         super().__init__(count, self.context, initializer=end_with_parent, initargs=(heard,))
 
     def end(self) -> None:
-        """End the processes now; Python would wait for what they are doing before it ends itself."""
+        """End the processes now; otherwise Python would wait for their current work before it exits."""
         self.line.close()
         for process in self.context.processes:
-            if process.is_alive():  # also while it imports what it needs to read from the line
+            if process.is_alive():  # also while it imports the modules needed to read from the pipe
                 process.terminate()
 
 
 @contextlib.contextmanager
 def started_pool(count: int) -> Iterator[Workers]:
-    """Give a pool of processes of which one has answered; an error in the block ends them in the middle of their work.
+    """Yield a pool of processes once one of them has answered; an error in the block ends them during their work.
 
-    Raises FastcontactError if none can start.
+    Raises FastcontactError if no process can start.
     """
     pool = Workers(count)
     try:
@@ -221,7 +221,7 @@ def started_pool(count: int) -> Iterator[Workers]:
                 "or use workers=1"
             ) from None
         yield pool
-        pool.shutdown()  # they have nothing left to do, and end in their own way
+        pool.shutdown()  # all work is done, so the processes end normally
     except BrokenProcessPool:
         raise
     except BaseException:
@@ -232,9 +232,9 @@ def started_pool(count: int) -> Iterator[Workers]:
 
 
 def _imports_its_script() -> bool:
-    """Return whether this process is a worker that has only come to import the script of the one that started it."""
+    """Return whether this process is a worker that is still importing the script of its parent process."""
     script = sys.modules.get("__mp_main__")
-    return script not in (None, sys.modules["__main__"])  # which it becomes once it is imported
+    return script not in (None, sys.modules["__main__"])  # the script becomes __main__ once it is imported
 
 
 def _alone(job: Run) -> Result:
@@ -247,25 +247,25 @@ def _alone(job: Run) -> Result:
 
 
 def _processors() -> int:
-    """Return the number of processors that this process may use."""
+    """Return the number of processors available to this process."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run on any executor and yield number and result of each job as it ends; cancel the others if one raises."""
+    """Run on any executor; yield index and result of each job as it ends. If one raises, the others are cancelled."""
     futures: dict[Future[Result], int] = {}
     try:
-        # Threads read the environment of this process, which must not change under what they compile.
+        # Threads share the environment of this process, which must not change while they compile.
         with contextlib.nullcontext() if isinstance(executor, ThreadPoolExecutor) else _worker_settings():
-            # The largest first, so that none keeps the others waiting at the end.
+            # The largest jobs come first, so that no long one runs alone at the end.
             for index in sorted(rest, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException as error:
-        # A pool of processes that breaks, or is ended, fails at what was cancelled: it tells those that wait itself.
+        # A broken or ended pool fails on cancelled futures: it notifies the waiting threads itself.
         if not isinstance(executor, Workers) and not isinstance(error, BrokenExecutor):
             for future in futures:
                 future.cancel()
@@ -273,7 +273,7 @@ def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Ite
 
 
 def end_with_parent(line: Connection) -> None:
-    """Let this process end as soon as the one that started it has ended, however that came, or closes its end of `line`."""
+    """Let this process end as soon as its parent has ended, for whatever reason, or closes its end of the pipe `line`."""
     parent = multiprocessing.parent_process()
 
     def wait() -> None:
@@ -286,9 +286,9 @@ def end_with_parent(line: Connection) -> None:
 
 @contextlib.contextmanager
 def _worker_settings() -> Iterator[None]:
-    """Let processes started inside the block have one thread each, and leave Ctrl-C to this one.
+    """Let processes started in the block use one thread each and ignore Ctrl-C, which this process handles.
 
-    A terminal sends it to all of them, and each would print where it was interrupted.
+    A terminal sends Ctrl-C to all of them, and each would print a traceback.
     """
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))

@@ -4,7 +4,7 @@ The values are taken to be
 
 .. math:: v_i = L + C h_i^p (1 + s e_i)
 
-with independent normal :math:`e_i`: what remains of the mesh error fluctuates by a fraction s of itself. L, C and s are
+with independent normal :math:`e_i`: the mesh error fluctuates by a fraction s of itself. L, C and s are
 integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and
 the orders are averaged with their evidence; docs/theory/convergence.md gives the reasons. The prior of p is log-normal;
 that of s^2 weighs as much as one and a half meshes, so that a chance agreement of few meshes does not make the error bar
@@ -28,7 +28,7 @@ CONFIDENCE = 0.95
 ORDERS = np.geomspace(0.4, 6.0, 81)
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
-# How much more the first meshes may be off, and how probable it is for each that they are.
+# Factor by which the first meshes may scatter more, and the probability of this for each of them.
 COARSE_NOISE, COARSE_PROBABILITY = 10.0, 0.5
 
 
@@ -45,10 +45,10 @@ class Limit:
     order, order_uncertainty : float
         Fitted order of convergence in h, and its standard deviation; NaN if the values do not change.
     n_levels : int
-        Number of meshes that were fitted.
+        Number of meshes in the fit.
     converging : bool
-        Whether the values settle: the last change is smaller than nine tenths of the median of those before, or than a
-        twentieth of the largest; if not, there may be no limit.
+        Whether the values settle: the last change is smaller than nine tenths of the median of the earlier changes, or
+        than a twentieth of the largest one. Otherwise there may be no limit.
     """
 
     value: float
@@ -71,7 +71,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     h : array_like (n,)
         Mesh sizes, all different, n >= 3 [length].
     values : array_like (n,)
-        The quantity on each mesh, in its own unit; meshes where it is not finite are left out.
+        The quantity on each mesh, in its own unit; meshes with a value that is not finite are omitted.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     Raises
     ------
     CaseError
-        If fewer than three meshes are left, or mesh sizes are not positive and different.
+        If fewer than three meshes remain, or mesh sizes are not positive and distinct.
 
     Examples
     --------
@@ -151,7 +151,7 @@ def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
 
 
 def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[float]:
-    """Return the limits of the central interval, and between them the median, of a mixture of Student distributions."""
+    """Return the median of a mixture of Student distributions between the bounds of its central interval."""
     from scipy.optimize import brentq
     from scipy.special import stdtr
 
@@ -165,7 +165,7 @@ def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[f
 
 
 def step_orders(h: Sequence[float], values: Sequence[float], limit: float) -> list[float]:
-    """Return the order from each mesh to the next (n,) [-], the first NaN; see the header: it is erratic.
+    """Return the order from each mesh to the next (n,) [-], the first NaN; these orders are erratic, see the module header.
 
     `h` (n,) are mesh sizes [length], `values` (n,) and `limit` are in the unit of the quantity.
     """

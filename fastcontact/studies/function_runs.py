@@ -1,4 +1,4 @@
-"""Runs of studies of Python models: a function makes the model of a size or of parameters, others measure its last step."""
+"""Runs of studies of Python models: a function returns the model for a size or parameters, others measure its last step."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from fastcontact.studies import quantities
 from fastcontact.studies.execute import run_study
 from fastcontact.studies.job import Run
 
-# Of the last step; with an argument of the name `STEPS`, of the list of all steps.
+# Functions of the last step, or of the list of all steps if their argument is named `STEPS`.
 Measure = Callable[..., float]
-# Names of quantities, or functions by name.
+# Names of quantities, or functions by the name of their quantity.
 Quantities = Sequence[str] | Mapping[str, Measure]
 STEPS = "steps"
 Function = Callable[..., Any]
@@ -32,7 +32,7 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FunctionRun(Run):
-    """A call of a function that makes a model, or solves one."""
+    """A call of a function that returns a model or solves one."""
 
     function: Function
     positional: tuple[Any, ...]  # arguments
@@ -41,14 +41,14 @@ class FunctionRun(Run):
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
-        return _solved(self._made(), self.name)
+        return _solved(self._result(), self.name)
 
     def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """See `Run`."""
         return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
-    def _made(self) -> Any:
-        """Return what the function returns; CaseError with the line of it that failed."""
+    def _result(self) -> Any:
+        """Return the value of the function; raises CaseError with the line that failed."""
         try:
             return self.function(*self.positional, **self.named)
         except FastcontactError:
@@ -60,7 +60,7 @@ class FunctionRun(Run):
 
 
 def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
-    """Return the steps of what a function has made; of a model, solved here, also the case that it is."""
+    """Return the steps that a function has returned, or the case and the steps of the model that it has returned."""
     if isinstance(made, Model):
         case = Case(name, name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
         return case, solve(made, case.ramp)
@@ -74,7 +74,7 @@ def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
 
 
 def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
-    """Return a quantity of the caller's."""
+    """Return the value of a quantity defined by the caller."""
     try:
         return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
     except Exception as error:
@@ -94,12 +94,12 @@ def first_parameter(function: Function) -> str:
     """Return the name of the first argument of a function."""
     try:
         return next(iter(inspect.signature(function).parameters), "value")
-    except (TypeError, ValueError):  # of one that is compiled
+    except (TypeError, ValueError):  # compiled functions have no signature
         return "value"
 
 
 def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the fields of a `Report` that are those of a function; its text is its source where Python has it.
+    """Return the fields of a `Report` on a function; its text is its source if Python has it.
 
     Units are those of the models in the `results`.
     """
@@ -113,7 +113,7 @@ def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[s
 
 
 def measures_of(wanted: Quantities) -> dict[str, Measure]:
-    """Return the functions among the quantities; CaseError for a name that no run of a function can have."""
+    """Return the functions among the quantities; raises CaseError for a name that no run of a function can have."""
     if isinstance(wanted, Mapping):
         return dict(wanted)
     for name in wanted:
@@ -126,7 +126,7 @@ def measures_of(wanted: Quantities) -> dict[str, Measure]:
 
 
 def refuse(of_cases: Mapping[str, Any]) -> None:
-    """Raise CaseError for a given option that only studies of case files have."""
+    """Raise CaseError if an option is given that only studies of case files have."""
     for name, value in of_cases.items():
         if value is not None:
             raise CaseError(
@@ -137,17 +137,17 @@ def refuse(of_cases: Mapping[str, Any]) -> None:
 def run_functions(
     runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
 ) -> list[dict[str, Any]]:
-    """Return the results of `run_study`, by default one run after the other in this process."""
+    """Return the results of `run_study`, by default computed sequentially in this process."""
     if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
         _check_sendable(runs[0])
     return run_study(runs, name, executor=executor, workers=workers or 1, **options)
 
 
 def _check_sendable(run: FunctionRun) -> None:
-    """Raise CaseError for a function that cannot be sent to another process, or that it would not find there."""
+    """Raise CaseError for a function that cannot be sent to another process, or not be found there."""
     try:
         if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):
-            inspect.getfile(sys.modules["__main__"])  # TypeError without one, as in notebooks
+            inspect.getfile(sys.modules["__main__"])  # TypeError without a file, as in notebooks
         ForkingPickler.dumps(run)
     except Exception as error:
         raise CaseError(

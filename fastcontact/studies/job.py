@@ -1,4 +1,4 @@
-"""One run of a study: plain data in, plain data out, so that any process on any machine can do it."""
+"""One run of a study: plain data in, plain data out, so that any process on any machine can execute it."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings
 
-# Keys of contact pairs and obstacles that belong to no formulation.
+# Keys of contact pairs and obstacles that are independent of the formulation.
 KEYS = {
     *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "rotation", "ramp"),
     *("file", "group", "flip", "crease"),
 }
-# Raised when the measured numbers or their form in a store change.
+# Version number, raised when the measured numbers or their form in a store change.
 SCHEMA = 3
 
 
@@ -48,12 +48,12 @@ class Run:
     """One run of a study."""
 
     label: str  # for messages
-    name: str  # of the case, or of the function that makes the model
+    name: str  # name of the case or of the model function
     marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
     size: float = 0.0  # amount of work, in any unit that the runs of a study share
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
-        """Return the case of this run, where it is known, and its steps, or the last of them alone."""
+        """Return the case of this run, if known, and its steps, or only the last of them."""
         raise NotImplementedError
 
     def measured(self) -> dict[str, Any]:
@@ -87,7 +87,7 @@ class Run:
 
     @property
     def key(self) -> str:
-        """Name of the run in a store, a hash of all that its numbers depend on; CaseError where that is not known."""
+        """Name of the run in a store: a hash of all inputs of its numbers; raises CaseError if these are unknown."""
         raise CaseError(
             "a store keeps runs of case files, whose text tells what they do: of a function leave 'store' out"
         )
@@ -95,21 +95,21 @@ class Run:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job(Run):
-    """All data of the run of a case."""
+    """Data of the run of a case."""
 
     data: dict[str, Any]  # the parsed case file with all values of this run
     pair: str | None  # contact pair to measure
-    recipe: Recipe  # of the mesh
-    base: Mesh | None  # the case's mesh, where it was read from a file
-    folder: Path = Path()  # in which files lie that the case names
+    recipe: Recipe  # recipe of the mesh
+    base: Mesh | None  # the mesh of the case, if read from a file
+    folder: Path = Path()  # folder of the files that the case names
 
-    @cached_property  # of the files as they are when a study begins
+    @cached_property  # files are hashed as they are at the start of a study
     def key(self) -> str:
-        """Hash of all that the numbers depend on: the case, its mesh, the contents of all files it names, the version."""
+        """Hash of all inputs of the numbers: the case, its mesh, the contents of the files it names, the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
-        whole = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
-        whole["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
-        hashed = hashlib.sha256(json.dumps(whole, sort_keys=True, default=str).encode())
+        inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
+        inputs["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
+        hashed = hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode())
         if self.base is not None:
             hashed.update(_fingerprint(self.base))
         return hashed.hexdigest()[:32]
@@ -126,7 +126,7 @@ class Job(Run):
 
 @contextlib.contextmanager
 def recorded() -> Iterator[list[str]]:
-    """Yield a list that holds, behind the block, the texts of the package's warnings in it."""
+    """Yield a list that holds, after the block, the texts of the package's warnings raised in it."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
@@ -137,7 +137,7 @@ def recorded() -> Iterator[list[str]]:
 def job_of(
     case: Case, chosen: Settings, member: Combination, level: int, *, label: str, marks: dict[str, Any], size: float
 ) -> Job:
-    """Return the run of a case with an element and a formulation on the mesh of a level."""
+    """Return the job of a case with an element and a formulation on the mesh of a level."""
     data, mesh = case_data(chosen, member), recipe(chosen, member.element, level)
     base = case.mesh if chosen.generator is None else None
     return Job(
@@ -155,7 +155,7 @@ def _fingerprint(mesh: Mesh) -> bytes:
 
 
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
-    """Return the data of the case with another formulation, the study's options, and its number of load steps.
+    """Return the case data with another formulation, and with the options and number of load steps of the study.
 
     Options that another formulation does not have are dropped.
     """
@@ -174,7 +174,7 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
 
 
 def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name: str) -> None:
-    """Give the table of a contact pair or obstacle another formulation than its `name`."""
+    """Replace the formulation in the table of a contact pair or obstacle `name`."""
     if formulation != name:
         known = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
         for key in [key for key in entry if key not in known]:
@@ -184,7 +184,7 @@ def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name:
 
 
 def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
-    """Return a ramp of equal steps to the same end."""
+    """Return a ramp of equal steps with the same end."""
     if "instants" not in ramp:
         return {**ramp, "steps": steps}
     last = ramp["instants"][-1]
@@ -205,31 +205,24 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:
-        # One failed run must not end a study of many.
+        # A failed run must not end the whole study.
         where = traceback.extract_tb(error.__traceback__)[-1]
         return {"error": f"{error} ({where.name}, line {where.lineno})", "kind": type(error).__name__}
 
 
 def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
-    """Return the entries of a result that a dataclass has as fields."""
+    """Return the entries of a result that are fields of a dataclass."""
     fields = {field.name: result[field.name] for field in dataclasses.fields(kind) if field.name in result}
     return {**fields, "warnings": tuple(fields["warnings"])}
 
 
 def last_step(case: Case) -> StepResult:
     """Solve a case and return its last step; no earlier one is kept in memory."""
-    steps = solve_steps(
-        case.model,
-        case.ramp,
-        linear_solver=case.linear_solver,
-        linear_tolerance=case.linear_tolerance,
-        criteria=case.criteria,
-    )
-    return deque(steps, maxlen=1).pop()
+    return deque(solve_steps(case.model, case.ramp, **case.solution), maxlen=1).pop()
 
 
 def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:
-    """Return ``r`` and ``pressure`` along the contact of a plane or axisymmetric model; nothing without one."""
+    """Return ``r`` and ``pressure`` along the contact of a plane or axisymmetric model; empty without contact."""
     if pair is None or last.displacement.shape[1] != 2:
         return {}
     contact = last.contact[pair]

@@ -1,4 +1,4 @@
-"""Meshes of a study, level by level: a recipe of plain data, and the mesh that is made from it."""
+"""Meshes of a study by level: a recipe of plain data, and the mesh made from it."""
 
 from __future__ import annotations
 
@@ -19,43 +19,43 @@ Recipe = dict[str, Any]
 
 @dataclass(frozen=True)
 class Rule:
-    """How the arguments of a generator change from one level to the next."""
+    """Rule for the change of generator arguments from one level to the next."""
 
-    defaults: Arguments = field(default_factory=dict)  # of arguments to change, where the case gives none
+    defaults: Arguments = field(default_factory=dict)  # values of arguments to change that the case does not give
     halve: tuple[str, ...] = ()
     double: tuple[str, ...] = ()
     root: tuple[str, ...] = ()  # ratios of neighbouring edges: their square roots are taken
 
 
-def _spheres(element: str, given: Mapping[str, Any]) -> Rule:
-    R = float(given.get("R", 50.0))
+def _spheres(element: str, arguments: Mapping[str, Any]) -> Rule:
+    R = float(arguments.get("R", 50.0))
     if shape_of(element) == "triangles":
         return Rule({"size": R / 25}, ("size", "contact_size"))
     return Rule({"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",))
 
 
-def _cylinder(element: str, given: Mapping[str, Any]) -> Rule:
-    R = float(given.get("R", 50.0))
-    far = float(given.get("size", R / 10))
-    return Rule({"size": far, "contact_size": min(R / 100, far)}, ("size", "contact_size"))
+def _cylinder(element: str, arguments: Mapping[str, Any]) -> Rule:
+    R = float(arguments.get("R", 50.0))
+    coarse = float(arguments.get("size", R / 10))
+    return Rule({"size": coarse, "contact_size": min(R / 100, coarse)}, ("size", "contact_size"))
 
 
-def _ball(element: str, given: Mapping[str, Any]) -> Rule:
-    R = float(given.get("R", 50.0))
-    far = float(given.get("size", R / 4))
-    # Along a graded line the edges grow by `growth` times the distance, whatever their lengths.
-    return Rule({"size": far, "contact_size": min(R / 50, far)}, ("size", "contact_size", "growth"))
+def _ball(element: str, arguments: Mapping[str, Any]) -> Rule:
+    R = float(arguments.get("R", 50.0))
+    coarse = float(arguments.get("size", R / 4))
+    # Along a graded line the edges grow by `growth` times the distance, irrespective of their lengths.
+    return Rule({"size": coarse, "contact_size": min(R / 50, coarse)}, ("size", "contact_size", "growth"))
 
 
-def _half_space(element: str, given: Mapping[str, Any]) -> Rule:
-    width = float(given.get("width", 10.0))
-    radius, far = float(given.get("contact_radius", width / 10)), float(given.get("size", width / 4))
-    least = min(radius, float(given.get("contact_radius_y", radius)))
-    return Rule({"size": far, "contact_size": min(least / 10, far)}, ("size", "contact_size", "growth"))
+def _half_space(element: str, arguments: Mapping[str, Any]) -> Rule:
+    width = float(arguments.get("width", 10.0))
+    radius, coarse = float(arguments.get("contact_radius", width / 10)), float(arguments.get("size", width / 4))
+    least = min(radius, float(arguments.get("contact_radius_y", radius)))
+    return Rule({"size": coarse, "contact_size": min(least / 10, coarse)}, ("size", "contact_size", "growth"))
 
 
-def _punched(element: str, given: Mapping[str, Any]) -> Rule:
-    return Rule({"edge_size": float(given.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",))
+def _punched(element: str, arguments: Mapping[str, Any]) -> Rule:
+    return Rule({"edge_size": float(arguments.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",))
 
 
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
@@ -77,7 +77,7 @@ RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
 def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
     """Return the recipe of the mesh of a level: plain data, equal for equal meshes.
 
-    Raises CaseError if the element cannot be made of the case's mesh, or nothing is known of the generator's arguments.
+    Raises CaseError if the element cannot be made from the case's mesh, or the generator's arguments are unknown.
     """
     if element is not None and not makeable(settings, element):
         raise CaseError(_not_makeable(settings, element))
@@ -86,17 +86,17 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
         return {"refinements": level, "element": element, "curves": curves}
     element = element or str(_default_element(settings.generator))
     shape = shape_of(element)
-    # Where level 0 is given by shape, it is that of quadratic cells; linear ones have the same nodes.
+    # If level 0 is given by shape, it is for quadratic cells; linear cells use the same nodes.
     finer = level + int(settings.by_shape and elements.get(element).order == 1)
-    given = settings.arguments.get(shape, settings.arguments.get("", {}))
-    # Free triangles of another size lie in another pattern, which changes the largest pressure at random: refine them.
+    level_0 = settings.arguments.get(shape, settings.arguments.get("", {}))
+    # A new free triangulation has another pattern, which changes the largest pressure at random: refine instead.
     halvings, refinements = (0, finer) if shape == "triangles" else (finer, 0)
-    arguments = _finer(settings, element, given, halvings)
+    arguments = _finer(settings, element, level_0, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
 def _default_element(generator: str) -> Any:
-    """Return the element that a generator makes where none is named; tri3 for one that is not known."""
+    """Return the default element of a generator; tri3 for an unknown generator."""
     maker = generate.GENERATORS.get(generator)
     return inspect.signature(maker).parameters["element"].default if maker is not None else "tri3"
 
@@ -112,22 +112,22 @@ def _not_makeable(settings: Settings, element: str) -> str:
     )
 
 
-def _finer(settings: Settings, element: str, given: Mapping[str, Any], level: int) -> Arguments:
-    """Return a generator's arguments with sizes halved and counts doubled `level` times."""
+def _finer(settings: Settings, element: str, level_0: Mapping[str, Any], level: int) -> Arguments:
+    """Return generator arguments with sizes halved and counts doubled `level` times."""
     name = str(settings.generator)
     check_known("study.generator", name, generate.GENERATORS, CaseError)
     signature = inspect.signature(generate.GENERATORS[name]).parameters
-    for key in (*given, *settings.halve, *settings.double):
+    for key in (*level_0, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
-    rule = RULES[name](element, given) if name in RULES else Rule()
-    own_rule = bool(settings.halve or settings.double)  # then the rule's ratios may not suit
+    rule = RULES[name](element, level_0) if name in RULES else Rule()
+    own_rule = bool(settings.halve or settings.double)  # then the ratios of the rule may not apply
     halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
         raise CaseError(
             f"it is not known how the generator '{name}' makes finer meshes: name its arguments in [study] as "
             "halve = [...] or double = [...]"
         )
-    arguments = {**rule.defaults, **given, **({"element": element} if "element" in signature else {})}
+    arguments = {**rule.defaults, **level_0, **({"element": element} if "element" in signature else {})}
     for names, factor in ((halve, 0.5**level), (double, 2**level)):
         for key in names:
             value = arguments.get(key, signature[key].default if key in signature else None)
@@ -143,7 +143,7 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
-    """Return the mesh of a recipe; `base` is the loaded mesh that is refined where no generator is named."""
+    """Return the mesh of a recipe; without a generator, the loaded mesh `base` is refined."""
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
         mesh = generate.GENERATORS[recipe["generator"]](**arguments)

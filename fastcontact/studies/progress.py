@@ -1,4 +1,4 @@
-"""Progress of studies on a terminal or in a notebook: one line, drawn anew after every run or mesh."""
+"""Progress of studies on a terminal or in a notebook: one line, redrawn after every run or mesh."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.analysis.progress import StatusLine
 
 
 class Runs(StatusLine):
-    """Runs of a study: the one that has ended, how many are left, and for how long."""
+    """Status line of the runs of a study: the last one, the number left, and the time left."""
 
     def __init__(self, show: bool) -> None:
         super().__init__(100, show)
@@ -32,8 +32,8 @@ class Runs(StatusLine):
 
 
 @contextlib.contextmanager
-def told(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
-    """Yield what is called after every run: a function of the user's, and a line if `show`."""
+def reporting(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
+    """Yield the function to call after every run; it calls that of the user and redraws a line if `show`."""
     with Runs(show) as line:
 
         def ended(progress: Any) -> None:

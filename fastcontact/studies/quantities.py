@@ -1,4 +1,4 @@
-"""Quantities of interest: measured on the last step of a run, given by a theory; their titles and units."""
+"""Quantities of interest: values from the last step of a run and from a theory, titles and units."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.units import labelled
 
-# Theories about the very bodies that are modelled, not about half spaces or beams in their place.
+# Theories that are exact for the modelled bodies, not for half-spaces or beams in their place.
 EXACT_THEORIES = (PressFit, HertzBox)
-# Of the standard quantities, which every study shows where they are known: title, and kind of the unit, empty for ratios.
+# Title and kind of unit (empty for ratios) of the standard quantities, which every study shows if they are known.
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),
@@ -39,7 +39,7 @@ LABELS = {
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return every quantity of interest of a solved case, in the case's units; without a `pair` those of no contact."""
+    """Return all quantities of interest of a solved case, in the case's units; without a `pair` none of contact."""
     values_measured = {} if pair is None else _of_contact(case, last.contact[pair], pair)
     values_measured["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
@@ -51,19 +51,19 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
-    """Raise CaseError for the name of a quantity that no run of the case can have, see `measure`."""
+    """Raise CaseError for a quantity that no run of the case can have, see `measure`."""
     of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
     for name in names:
         check_known("quantity", name, [*LABELS, *of_probes], CaseError)
 
 
 def _kinds(case: Case) -> list[str]:
-    """Return the quantities that every probe of a case has."""
+    """Return the quantities available at every probe of a case."""
     return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
 
 
 def of_contacts(last: StepResult) -> dict[str, float]:
-    """Return the quantities of the first contact pair of a step that need no model; not finite where there is none."""
+    """Return the quantities of the first contact pair of a step that need no model; not finite without contact."""
     contact = next(iter(last.contact.values()), None)
     return {} if contact is None else _of_pressure(contact)
 
@@ -98,7 +98,7 @@ def secondary(case: Case, pair: str) -> Surface:
 
 
 def contact_radius(contact: ContactResult) -> float:
-    """Return the distance from the middle at which the pressure goes to zero [length]; NaN without contact.
+    """Return the distance from the middle at which the pressure vanishes [length]; NaN without contact.
 
     Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
     the whole contact). A line is fitted through the closed nodes beyond 0.4 of the radius, without the last two, where the
@@ -114,8 +114,8 @@ def contact_radius(contact: ContactResult) -> float:
     used = used[np.argsort(r[used])]
     if len(used) < 3:
         return float(0.5 * (inside + outside))
-    kept = used[:-2] if len(used) >= 5 else used
-    slope, start = np.polyfit((r[kept] / outside) ** 2, (contact.pressure[kept] / contact.pressure.max()) ** 2, 1)
+    fitted = used[:-2] if len(used) >= 5 else used
+    slope, start = np.polyfit((r[fitted] / outside) ** 2, (contact.pressure[fitted] / contact.pressure.max()) ** 2, 1)
     if slope >= 0:
         return float(outside)
     return float(np.clip(outside * np.sqrt(max(-start / slope, 0.0)), inside, outside))
@@ -138,11 +138,11 @@ def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: An
 
 
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
-    """Return the largest value of a nodal field (n_points,), and its place (dim,) between the nodes [length].
+    """Return the largest value of a nodal field (n_points,), and its position (dim,) between the nodes [length].
 
-    On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, where there are
-    enough of them. Otherwise a quadratic function is fitted to the nodes around the largest one (on the axis: even in the
-    radius); the result is its vertex if that is a maximum within the ring of these nodes, otherwise the node.
+    On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, if there are enough of
+    them. Otherwise a quadratic function is fitted to the nodes around the largest one (on the axis: even in the radius); the
+    result is its vertex if that is a maximum within the ring of these nodes, otherwise the node.
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
@@ -159,7 +159,7 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
 
 
 def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
-    """Return the maximum of a quartic through the axis nodes near `top` in its body; None with fewer than eight."""
+    """Return the maximum of a quartic fitted to the axis nodes near `top` in its body; None with fewer than eight nodes."""
     line = np.flatnonzero(np.abs(mesh.points[:, 0]) <= 1e-9 * np.abs(mesh.points).max())
     _, body = bodies(mesh)
     line = line[body[line] == body[top]]
@@ -197,7 +197,7 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
     c = np.append(c, np.zeros(6 - len(c)))
     hessian = np.array([[2 * c[3], c[5]], [c[5], 2 * c[2]]])
     if on_axis:
-        hessian[0, 0] = -1.0  # whatever the curvature across, the vertex is on the axis
+        hessian[0, 0] = -1.0  # for any radial curvature the vertex is on the axis
     if not (np.linalg.eigvalsh(hessian) < 0).all():
         return None
     vertex = np.linalg.solve(hessian, -np.array([c[4], c[1]]))
@@ -208,14 +208,14 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
 
 
 def _depth(case: Case, pair: str, where: Array) -> float:
-    """Return the distance of a place from the nearer side of a contact pair."""
+    """Return the distance of a position from the nearer side of a contact pair."""
     sides = next((p.secondary, *filter(None, [p.primary])) for p in case.model.contact if p.name == pair)
     nodes = np.concatenate([case.mesh.points[case.mesh.points_of(side)] for side in sides])
     return float(np.linalg.norm(nodes - where, axis=1).min())
 
 
 def mesh_size(case: Case, pair: str | None) -> float:
-    """Return the length of the shortest facet of the secondary surface, or without contact of the shortest edge."""
+    """Return the length of the shortest facet of the secondary surface, without contact that of the shortest edge."""
     if pair is None:
         return quality(case.mesh).shortest_edge
     shortest = np.inf
@@ -228,7 +228,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 
 def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
-    """Return the quantities of interest that a theory gives, in its units; the model holds a `share` of its force."""
+    """Return the quantities of interest of a theory, in its units; the model carries a `share` of its force."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if "force" in quantities:
@@ -243,10 +243,10 @@ def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
 
 
 def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
-    """Return the quantities of a pair by its theory at equal approach, its mesh-converged solution, and at equal force.
+    """Return the quantities of a pair from its theory at equal approach and at equal force and its mesh-converged solution.
 
-    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force]. Nothing is known
-    without a case.
+    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force]. Without a case the
+    result is empty.
     """
     theories = {} if case is None else case.theories.get(pair or "", {})
     theory: Any = theories.get("theory")
@@ -265,18 +265,18 @@ def title(quantity: str) -> str:
 
 
 def unit(quantity: str, units: Mapping[str, str]) -> str:
-    """Return the name of a quantity's unit; empty for ratios, and where it is not known."""
+    """Return the name of a quantity's unit; empty for ratios and if it is unknown."""
     return units.get(_kind(quantity) or "", "")
 
 
 def _kind(quantity: str) -> str | None:
-    """Return what a quantity is: a length, a force, a pressure; empty for ratios, None for a caller's own."""
+    """Return the kind of a quantity: length, force, pressure; empty for ratios, None if defined by the caller."""
     if quantity in LABELS:
         return LABELS[quantity][1]
     return None if "." not in quantity else "length" if ".displacement." in quantity else "pressure"
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
-    """Return the header of a column or axis: a label and the unit of its quantity where that is known, ``[1]`` for ratios."""
+    """Return the header of a column or axis: a label and, if known, the unit of its quantity, ``[1]`` for ratios."""
     kind = _kind(quantity)
     return f"{label} [1]" if kind == "" else labelled(label, units, kind or "")

@@ -1,4 +1,4 @@
-"""What the reports of all studies share: the case; how tables and sentences stand on terminals, pages and in notebooks."""
+"""Base of the reports of all studies: the case, and the layout of tables and sentences for terminals, pages and notebooks."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ if TYPE_CHECKING:
 
 
 def of_case(case: Case) -> dict[str, Any]:
-    """Return the fields of a `Report` that are those of its case."""
+    """Return the fields of a `Report` that describe its case."""
     units = units_of_results(case.units, case.model.kinematics)
     return {"name": case.name, "title": case.title, "text": case.text, "units": units}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """A finished study of a case or of a function.
+    """A finished study of a case or a function.
 
     Attributes
     ----------
     kind, picture : str
-        Of every study of a class: what it is, and what its figure shows.
+        Names of the kind of study and of its figure.
     explanations : tuple of str
-        How its numbers are to be read, at the end of its page.
+        Explanations of the numbers, at the end of the report.
     name, title, text : str
-        Of the case: file name without suffix, title, text of the file; of a function: its name, the first line of its
-        docstring, its source.
+        For a case, file name without suffix, title and text of the file; for a function, its name, the first line of
+        its docstring and its source.
     units : dict of str to str
-        Names of the units of length, force and pressure; of plane models, of forces per thickness.
+        Names of the units of length, force and pressure; in plane models with forces per thickness.
     """
 
     kind: ClassVar[str]
@@ -60,15 +60,15 @@ class Report:
         raise NotImplementedError
 
     def sentences(self) -> list[str]:
-        """Return what the numbers say."""
+        """Return the conclusions as sentences."""
         return []
 
     def remarks(self) -> list[str]:
-        """Return warnings, and what failed."""
+        """Return warnings and failures."""
         return []
 
     def lines(self) -> list[str]:
-        """Return tables and sentences for a person, as the command line prints them."""
+        """Return tables and sentences as lines of text, as the command line prints them."""
         lines = [self.title]
         for caption, rows in self.tables():
             lines += ["", *filter(None, [caption]), *aligned(rows)]
@@ -78,12 +78,12 @@ class Report:
 
     def html(self) -> str:
         """Return the study as one self-contained HTML page."""
-        parts = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
-        parts += [page.table(rows, caption) for caption, rows in self.tables()]
-        parts += map(page.failure, self.remarks())
+        blocks = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
+        blocks += [page.table(rows, caption) for caption, rows in self.tables()]
+        blocks += map(page.failure, self.remarks())
         if self.explanations:
-            parts += [page.section("How to read this"), *map(page.paragraph, self.explanations)]
-        return page.page(f"{self.kind}: {self.title}", parts, self.text)
+            blocks += [page.section("How to read this"), *map(page.paragraph, self.explanations)]
+        return page.page(f"{self.kind}: {self.title}", blocks, self.text)
 
     def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""
@@ -92,12 +92,12 @@ class Report:
     def to_pandas(self) -> pandas.DataFrame:
         """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed.
 
-        ``attrs["units"]`` holds the names of units by column, where they are known.
+        ``attrs["units"]`` holds the names of units by column, if they are known.
         """
         return data_frame(self.table(), {name: unit(name, self.units) for name in self.table().dtype.names or ()})
 
     def __repr__(self) -> str:
-        lines = self.lines()[self.title == self.name :]  # of a function without docstring
+        lines = self.lines()[self.title == self.name :]  # equal for a function without docstring
         return "\n".join([f"{type(self).__name__} of '{self.name}'", *lines])
 
     def _repr_html_(self) -> str:
@@ -107,6 +107,6 @@ class Report:
         )
 
     def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
-        """Return the numbers of a study as ``--json`` writes them, between its case and the versions."""
+        """Return the numbers of a study with its case and the versions, as ``--json`` writes them."""
         case = {"case": self.name, "title": self.title, "units": dict(self.units)}
         return {**case, **numbers, "versions": versions()}

@@ -7,7 +7,7 @@ from fastcontact.studies.quantities import title
 from fastcontact.studies.render.table import number, percent
 from fastcontact.studies.series import Series, Split
 
-# The quantities that sentences are about, in this order.
+# Quantities covered by the sentences, in this order.
 MAIN = ("pressure_max", "force")
 
 
@@ -60,18 +60,18 @@ def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
 
 
 def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> str:
-    """Return that a formulation misses a theory which is exact for the model."""
+    """Return the sentence that a formulation does not converge to a theory that is exact for the model."""
     limit = series.limits[quantity]
     tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
     return (
-        f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is about the very bodies of the model, "
+        f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is exact for the bodies of the model, "
         f"so this is no model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
     )
 
 
 def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
-    """Name the mesh that lies nearer to theory than half the model error by its mesh error: it looks better than it is."""
+    """Return a warning if the mesh error of a level cancels more than half the model error: it looks too accurate."""
     off = series.from_theory(quantity)
     best = min(range(len(off)), key=lambda k: abs(off[k]))
     if series.exact_theory or not split.resolved or not abs(off[best]) < 0.5 * abs(split.model):
@@ -79,7 +79,7 @@ def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
     level = series.levels[best]
     return [
         f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off[best])} from theory because its "
-        f"mesh error of {percent(off[best] - split.model)} cancels model error: that it agrees is no proof of a good mesh."
+        f"mesh error of {percent(off[best] - split.model)} cancels model error: this agreement is no proof of a good mesh."
     ]
 
 

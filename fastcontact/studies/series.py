@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
-# Relative differences below this are those of straight facets and tolerances, no matter of the formulation [-].
+# Relative differences below this stem from straight facets and tolerances, not from the formulation [-].
 EXACT = 1e-4
 
 
@@ -21,13 +21,13 @@ class Split:
     Attributes
     ----------
     theory : float
-        The theory's value, in the unit of the quantity.
+        Value of the theory, in the unit of the quantity.
     model : float
         Model error: difference of the limit from the theory.
     mesh : float
         Mesh error: difference of the finest mesh from the limit.
     uncertainty : float
-        Of both, from that of the limit, at 95 %.
+        Uncertainty of both errors, from that of the limit, at 95 %.
     """
 
     theory: float
@@ -47,7 +47,7 @@ class Split:
 
 
 def split(finest: float, limit: Limit, theory: float) -> Split:
-    """Split the difference of the value on the finest mesh from the theory's.
+    """Split the difference between the finest mesh and a theory into model error and mesh error.
 
     Examples
     --------
@@ -98,31 +98,31 @@ class Level(Measured):
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """One element and formulation on all levels.
+    """Results of one element and formulation on all levels.
 
     Attributes
     ----------
     combination : Combination
     levels : list of Level
-        Those that could be solved, coarsest first.
+        Levels that could be solved, coarsest first.
     failed : dict of int to str
-        Why a level failed, by its number.
+        Reason why a level failed, by its number.
     theory, reference : dict of str to float
-        By quantity: the theory at equal approach, and the mesh-converged solution if the case names one.
+        Theory at equal approach, and mesh-converged solution if the case names one, by quantity.
     equal_force, equal_force_spread : dict of str to float
-        By quantity: the theory at the limit of the force, and its change over the error bar of the force.
+        Theory at the limit of the force, and its change over the error bar of the force, by quantity.
     quantities : tuple of str
-        Those that were fitted, or would have been with more levels.
+        Quantities that are fitted if there are enough levels.
     limits : dict of str to Limit
-        By quantity; empty with fewer than three levels.
+        Limits by quantity; empty with fewer than three levels.
     exact_theory : bool
-        Whether the theory is about the very bodies of the model, so that there is no model error.
+        Whether the theory describes exactly the bodies of the model, so that there is no model error.
     share : float
-        Part of the theory's contact that the model holds [-].
+        Modelled fraction of the theory's contact [-].
     asked : tuple of str
-        Quantities that tables, figures and sentences show before the standard ones.
+        Requested quantities, which tables, figures and sentences show before the standard ones.
     compared : str
-        At what the theory is held against the values: "at equal approach" or "under the given load".
+        Condition of the comparison with theory: "at equal approach" or "under the given load".
     """
 
     combination: Combination
@@ -140,12 +140,12 @@ class Series:
     asked: tuple[str, ...] = ()
 
     def shown(self, standard: Sequence[str]) -> list[str]:
-        """Return the quantities to show: those asked for, then the `standard` ones that are known."""
+        """Return the quantities to show: the requested ones, then the `standard` ones that are known."""
         return [name for name in dict.fromkeys((*self.asked, *standard)) if name in self.quantities]
 
     @property
     def finest(self) -> Level:
-        """The last level that could be solved."""
+        """The finest level that was solved."""
         return self.levels[-1]
 
     @property
@@ -154,7 +154,7 @@ class Series:
         return [level.h for level in self.levels]
 
     def values(self, quantity: str) -> list[float]:
-        """Return a quantity on every level (n_levels,), in its unit; NaN where it is not known."""
+        """Return a quantity on every level (n_levels,), in its unit; NaN if it is unknown."""
         return [level.values.get(quantity, math.nan) for level in self.levels]
 
     def errors(self, quantity: str) -> list[float]:
@@ -163,7 +163,7 @@ class Series:
         return [value / limit.value - 1.0 if limit and limit.value else math.nan for value in self.values(quantity)]
 
     def orders(self, quantity: str) -> list[float]:
-        """Return the order from level to level (n_levels,) [-], the first NaN."""
+        """Return the observed orders of successive levels (n_levels,) [-], the first being NaN."""
         limit = self.limits.get(quantity)
         return step_orders(self.h, self.values(quantity), limit.value) if limit else [math.nan] * len(self.levels)
 
@@ -173,27 +173,27 @@ class Series:
         return [value / theory - 1.0 if theory else math.nan for value in self.values(quantity)]
 
     def split(self, quantity: str) -> Split | None:
-        """Return model and mesh error at equal approach, where there are a limit and a theory."""
+        """Return model and mesh error at equal approach, if there are a limit and a theory."""
         limit, theory = self.limits.get(quantity), self.theory.get(quantity)
         return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
 
     def converges_to_theory(self, quantity: str) -> bool | None:
-        """Return whether the limit is that of an exact theory, within its error bar; None without such a theory."""
+        """Return whether the limit agrees with an exact theory within its error bar; None without such a theory."""
         split, limit = self.split(quantity), self.limits.get(quantity)
         if split is None or limit is None or not self.exact_theory:
             return None
         return bool(limit.converging and abs(split.model) <= max(split.uncertainty, EXACT))
 
     def split_equal_force(self, quantity: str) -> Split | None:
-        """Return model and mesh error against the theory at the limit of the force."""
+        """Return model and mesh error relative to the theory at the limit of the force."""
         limit, theory = self.limits.get(quantity), self.equal_force.get(quantity)
         if not (limit and theory):
             return None
-        # The theory's value is as uncertain as the force at which it is taken.
+        # The value of the theory inherits the uncertainty of the force.
         error_bar = math.hypot(limit.uncertainty, self.equal_force_spread.get(quantity, 0.0))
         return split(self.values(quantity)[-1], dataclasses.replace(limit, uncertainty=error_bar), theory)
 
     def mesh_error(self, quantity: str) -> float:
-        """Return the error of the finest mesh [-], relative to the theory, or without one to the limit."""
+        """Return the error of the finest mesh [-], relative to the theory, or to the limit without a theory."""
         split = self.split(quantity)
         return split.mesh if split else self.errors(quantity)[-1]

@@ -16,13 +16,13 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, Circle
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
-# Elements that "all" stands for.
+# Elements included in "all".
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 
 @dataclass(frozen=True)
 class Combination:
-    """An element and a contact formulation; `element` is None for the mesh's own cells where they are mixed."""
+    """An element and a contact formulation; `element` is None for the cells of a mesh with several elements."""
 
     element: str | None
     formulation: str | None
@@ -32,14 +32,14 @@ class Combination:
 
     @property
     def rank(self) -> tuple[int, int, int]:
-        """The greater, the more accurate it usually is: pressure fields, quadratic cells, quadrangles."""
+        """Sort key of the expected accuracy: pressure fields, quadratic cells, quadrangles."""
         order = elements.get(self.element).order if self.element else 0
         return int(self.formulation != "node_to_segment"), order, int((self.element or "").startswith("quad"))
 
 
 @dataclass(frozen=True)
 class Named(Combination):
-    """What a function makes, known by its name."""
+    """Combination of a model function, identified by its name."""
 
     name: str
 
@@ -54,17 +54,17 @@ class Settings:
     data: dict[str, Any]  # the parsed case file
     own: Combination  # element and formulation of the case itself
     pair: str | None  # the contact pair that is measured
-    formulations: dict[str, str]  # of the contact pairs and obstacles of the case, by name
-    generator: str | None  # of the meshes; None where a mesh file is refined
-    # Arguments of the generator on level 0: by shape of the cells (a key of `SHAPES`), or the case's own by "".
+    formulations: dict[str, str]  # formulations of the contact pairs and obstacles of the case, by name
+    generator: str | None  # mesh generator; None if a mesh file is refined
+    # Arguments of the generator on level 0, by shape of the cells (a key of `SHAPES`); those of the case under "".
     arguments: dict[str, dict[str, Any]]
     halve: tuple[str, ...] = ()  # arguments to halve from level to level; without both, those of `levels.RULES`
     double: tuple[str, ...] = ()  # arguments to double likewise
-    curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: the circles found
-    load_steps: int | None = None  # of every run; None: the case's
-    options: dict[str, dict[str, Any]] = field(default_factory=dict)  # of the contact pair, by formulation
-    quantities: tuple[str, ...] = ()  # to fit and to show besides the standard ones
-    combinations: tuple[Combination, ...] = ()  # to compare by default
+    curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: circles are detected
+    load_steps: int | None = None  # number of load steps of every run; None: those of the case
+    options: dict[str, dict[str, Any]] = field(default_factory=dict)  # options of the contact pair, by formulation
+    quantities: tuple[str, ...] = ()  # fitted and shown besides the standard ones
+    combinations: tuple[Combination, ...] = ()  # compared by default
 
     @property
     def by_shape(self) -> bool:
@@ -73,7 +73,7 @@ class Settings:
 
 
 def data_of(case: Case) -> dict[str, Any]:
-    """Return the data of a case file, of which studies make others; CaseError for a case of anything else."""
+    """Return the data of a case file, which studies modify; raises CaseError if the case is not from a case file."""
     try:
         data = tomllib.loads(case.text) if case.deck is None else {}
     except ValueError:
@@ -87,7 +87,7 @@ def data_of(case: Case) -> dict[str, Any]:
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the settings of a case's studies, checked; `data` replaces the parsed case file, e.g. with other values."""
+    """Return the checked settings of a case's studies; `data` replaces the parsed case file, e.g. with other values."""
     data = data_of(case) if data is None else data
     study = data.get("study", {})
     pair = study.get("contact") or next((combination.name for combination in case.model.contact), None)
@@ -161,9 +161,9 @@ def _checked(element: str | None, formulation: str | None) -> Combination:
 def combinations(
     settings: Settings, names: Sequence[str] | None, formulations: Sequence[str] | None
 ) -> tuple[Combination, ...]:
-    """Return the combinations to compare: every element with every formulation, or without both the case's choice.
+    """Return the combinations to compare: every element with every formulation, by default those of the case.
 
-    Raises CaseError if an element or a formulation is unknown, or cannot be made of this case's mesh.
+    Raises CaseError if an element or a formulation is unknown, or cannot be made from the mesh of the case.
     """
     if names is None and formulations is None:
         return settings.combinations
@@ -180,7 +180,7 @@ def combinations(
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
-    """Return the last combination of ``[study]`` with this element and formulation, where given; else make one of them."""
+    """Return the last combination of ``[study]`` with the given element and formulation, or a new one of these."""
     formulation = formulation.replace("-", "_") if formulation else None
     for known in reversed(settings.combinations):
         if element in (None, known.element) and formulation in (None, known.formulation):

@@ -1,4 +1,4 @@
-"""Parameter sweep: solve the same case with other values of its parameters."""
+"""Parameter sweep: solve a case for several values of its parameters."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from fastcontact.studies.sweep_figures import label_of
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 from fastcontact.studies.sweep_report import Sweep
 
-# The level of the study's meshes by default: fine enough for trends larger than the mesh error.
+# Default level of the meshes: fine enough for trends larger than the mesh error.
 LEVEL = 2
-# Points of a theory's curve.
+# Number of points of a theory curve.
 CURVE = 60
 
 
@@ -49,23 +49,25 @@ def parameter_sweep(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Sweep:
-    """Solve a case or a Python model for all combinations of some parameters' values.
+    """Solve a case or a Python model for all combinations of parameter values.
 
     Parameters
     ----------
     case : Case, path-like or callable
-        A function of the parameters returns a `Model`, which is solved in 20 equal steps, or what `solve` returns.
+        A function receives the parameters and returns a `Model`, which is solved in 20 equal steps, or the result of
+        `solve`.
     parameters : mapping of str to sequence, or sequence
-        Values by parameter; of a function by argument, or of its first argument alone. Of a case, a parameter is the path of
-        a number in the case file, e.g. ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"`` (tables in a list
-        count from 0), or a name of ``[study.parameters]``, which stands for several paths that change together.
+        Values by parameter; for a function by argument, or a sequence for its first argument. For a case, a parameter
+        is the path of a number in the case file, e.g. ``"contact.hertz.friction"``, ``"material[0].E"`` or
+        ``"mesh.size"`` (tables in a list are numbered from 0), or a name of ``[study.parameters]``, which sets several
+        linked values.
     quantities
-        Further ones to show, as in `convergence_study`.
+        Further quantities, as in `convergence_study`.
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or the case's own.
+        By default the last of ``study.combinations``, or those of the case.
     level : int, optional
-        Refinement, as in `convergence_study`; by default 2 where ``[study]`` gives the meshes of level 0, otherwise the
-        mesh of the case.
+        Refinement level, as in `convergence_study`; by default 2 if ``[study]`` defines the meshes of level 0,
+        otherwise the mesh of the case.
     executor, workers, store, on_progress, progress
         As in `convergence_study`.
 
@@ -124,7 +126,7 @@ def _of_function(
     wanted: Quantities,
     options: dict[str, Any],
 ) -> Sweep:
-    """Return the sweep of a function that makes models; `options` are those of `run_functions`."""
+    """Return the sweep of a model function; `options` are those of `run_functions`."""
     named = isinstance(parameters, Mapping)
     by_name = parameters if isinstance(parameters, Mapping) else {functions.first_parameter(function): [*parameters]}
     choices, name, measures = _choices(by_name), functions.function_name(function), functions.measures_of(wanted)
@@ -143,7 +145,7 @@ def _of_function(
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
-    """Return all combinations of values, the last parameter fastest; CaseError for none or too many."""
+    """Return all combinations of values, the last parameter fastest; raises CaseError for none or too many."""
     if not parameters or not all(len(values) for values in parameters.values()):
         raise CaseError("a sweep needs at least one parameter with at least one value")
     check_runs(prod(len(values) for values in parameters.values()))
@@ -157,7 +159,7 @@ def _label(choice: Mapping[str, Value]) -> str:
 def _points(
     parameters: Mapping[str, Sequence[Value]], choices: Sequence[dict[str, Value]], results: Sequence[Result]
 ) -> dict[str, Any]:
-    """Return the fields of a `Sweep` about its parameters and points."""
+    """Return the fields of a `Sweep` on its parameters and points."""
     runs = list(zip(choices, results, strict=True))
     return {
         "parameters": {name: tuple(values) for name, values in parameters.items()},
@@ -189,12 +191,12 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
 def _theory_at(
     data: dict[str, Any], choice: Mapping[str, Value], linked: Mapping[str, Any], pair: str | None
 ) -> dict[str, float]:
-    """Return what the theory of a pair gives for a choice of the parameters; nothing where it is not defined."""
+    """Return the quantities of the theory of a pair for a choice of parameters; empty where it is undefined."""
     for parameter, value in choice.items():
         data = substituted(data, parameter, value, linked)
     try:
         theories = described(data)["theories"].get(pair or "", {})
-    except FastcontactError:  # such as a Poisson's ratio for which no theory is known
+    except FastcontactError:  # such as a Poisson's ratio outside the range of the theory
         return {}
     return of_theory(theories.get("theory"), theories.get("share", 1.0))
 
@@ -207,7 +209,7 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     chosen = settings(case, data)
     member = one_combination(chosen, element, formulation)
     finer = (LEVEL if chosen.by_shape else 0) if level is None else level
-    # The largest mesh starts first; of a generator, its size is told by the number of points on level 0.
+    # The largest mesh starts first; for a generator, its size is the number of points on level 0.
     size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {finer}"}
     return job_of(case, chosen, member, finer, label=_label(choice), marks=marks, size=size)

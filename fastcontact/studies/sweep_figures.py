@@ -1,4 +1,4 @@
-"""Pictures of a parameter sweep: quantities over the first parameter with theory as a curve, and ratios to theory."""
+"""Figures of a parameter sweep: quantities over the first parameter with theory curves, and ratios to theory."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from fastcontact.studies.render.figure import frame, marker, message
 if TYPE_CHECKING:
     from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 
-# From this ratio of the largest to the smallest value of the parameter on, axes are logarithmic.
+# Ratio of the largest to the smallest parameter value from which axes are logarithmic.
 WIDE = 9.0
-# What the last word of a parameter's path means, and the kind of its unit, empty for ratios.
+# Meaning of the last word of a parameter path, and kind of its unit (empty for ratios).
 MEANINGS = {
     "E": ("Young's modulus", "pressure"),
     "nu": ("Poisson's ratio", ""),
@@ -34,7 +34,7 @@ _TABLE = re.compile(r"(?P<table>\w+)(?:\[(?P<number>\d+)\]|\.(?P<name>[\w-]+))\.
 
 
 def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
-    """Return a parameter in words with its unit; paths that are not known stay as they are.
+    """Return a parameter in words with its unit; unknown paths stay as they are.
 
     Examples
     --------
@@ -57,7 +57,7 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
 
 
 class Drawing:
-    """What is drawn of a sweep over its first parameter; points that differ in the others are curves of their own.
+    """Drawing of a sweep over its first parameter, with one curve for each choice of the other parameters.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Drawing:
         self.scale = "plain log" if wide else "linear"
 
     def draw_values(self, ax: Any, quantity: str) -> None:
-        """Draw values over the parameter, and the theory as a curve; both axes are of one kind."""
+        """Draw values over the parameter, and the theory as a curve; both axes have the same scale."""
         for k, (label, x, points) in enumerate(self._curves()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
@@ -94,7 +94,7 @@ class Drawing:
     def _draw_theory(
         self, ax: Any, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int
     ) -> None:
-        """Draw the theory of one choice of the other parameters; between the points where it is known there, too."""
+        """Draw the theory for one choice of the other parameters, also between the points if it is known there."""
         name = (self.theory + self._unmoved(quantity)) if k == 0 else None
         color = "black" if not self.others else f"C{k}"
         for curve in self.theories:
@@ -106,7 +106,7 @@ class Drawing:
             ax.plot(x, exact, "_", ms=9, label=name, color=color)
 
     def _unmoved(self, quantity: str) -> str:
-        """Return what is to be said of a theory that is the same at all values of the first parameter; else nothing."""
+        """Return a note if the theory is the same for all values of the first parameter; otherwise empty."""
         several = False
         for _, _, points in self._curves():
             known = {point.theory[quantity] for point in points if quantity in point.theory}
@@ -150,6 +150,6 @@ class Drawing:
 
 
 def label_of(parameters: Mapping[str, Value], others: Sequence[str]) -> str:
-    """Return some of the parameters with their values in words, as what tells a curve from others."""
+    """Return the label of a curve: some of the parameters with their values."""
     values = ((name, parameters[name]) for name in others)
     return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)

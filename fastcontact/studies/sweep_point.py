@@ -1,4 +1,4 @@
-"""Results of a sweep for one choice of its parameters, and theory between them."""
+"""Results of a sweep at one point, and theory curves between the points."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class Point(Measured):
     ----------
     parameters : dict of str to value
     theory, reference, equal_force : dict of str to float
-        By quantity: the theory at equal approach, the mesh-converged solution if the case names one, and the theory at
-        equal force.
+        Theory at equal approach, mesh-converged solution if the case names one, and theory at equal force, by
+        quantity.
     """
 
     parameters: dict[str, Value]
@@ -29,14 +29,14 @@ class Point(Measured):
     equal_force: dict[str, float]
 
     def ratio(self, quantity: str, to: str = "theory") -> float:
-        """Return value over ``"theory"``, ``"reference"`` or ``"equal_force"`` [-]; NaN where one is not known."""
+        """Return the ratio of the value to ``"theory"``, ``"reference"`` or ``"equal_force"`` [-]; NaN if one is unknown."""
         other = getattr(self, to).get(quantity)
         return self.values.get(quantity, math.nan) / other if other else math.nan
 
 
 @dataclass(frozen=True, eq=False)
 class TheoryCurve:
-    """What the theory of a case gives over the first parameter of a sweep.
+    """Theory of a case over the first parameter of a sweep.
 
     Attributes
     ----------

@@ -16,9 +16,9 @@ from fastcontact.studies.report import Report
 from fastcontact.studies.sweep_figures import Drawing
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 
-# Quantities in tables and figures.
+# Quantities shown in tables and figures.
 MAIN = ("force", "pressure_max", "contact_radius")
-# What values are compared with, and what the difference is called in JSON and CSV.
+# References of the values, and the names of the differences in JSON and CSV.
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
 
@@ -33,15 +33,15 @@ class Sweep(Report):
     parameters : dict of str to tuple
         Values by parameter.
     points : list of Point
-        Those that could be solved; the last parameter changes fastest.
+        Points that could be solved; the last parameter varies fastest.
     failed : list of (dict, str)
-        Parameters and reason of the others.
+        Parameters and reason of the failed points.
     theories : tuple of TheoryCurve
-        The theory over the first parameter, for each choice of the others; none where the parameter is no number.
+        Theory over the first parameter, for each choice of the others; empty if the parameter is not a number.
     compared : str
-        At what the theory is the same: ``"at equal approach"``, or empty where the case gives it otherwise.
+        Condition of the comparison with theory: ``"at equal approach"``, or empty if the case gives another load.
     asked : tuple of str
-        Quantities that ``[study]`` asks for beside the main ones: tables and figures show them.
+        Further quantities of ``[study]``, shown in tables and figures.
     """
 
     kind = "Sweep"
@@ -57,7 +57,7 @@ class Sweep(Report):
 
     @property
     def quantities(self) -> list[str]:
-        """Names of all quantities that were measured."""
+        """Names of all evaluated quantities."""
         return list(dict.fromkeys(name for point in self.points for name in point.values))
 
     def as_dict(self) -> dict[str, Any]:
@@ -73,8 +73,8 @@ class Sweep(Report):
     def table(self) -> AnyArray:
         """Return a structured array (n_points,), one row a point, as ``--csv`` writes it.
 
-        Fields: the parameters, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity its value in its unit
-        and where known ``..._from_theory``, ``..._from_theory_at_equal_force`` and ``..._from_reference`` [-].
+        Fields are the parameters, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity its value in its
+        unit and, if known, ``..._from_theory``, ``..._from_theory_at_equal_force`` and ``..._from_reference`` [-].
         """
         columns: dict[str, list[Any]] = {name: [p.parameters[name] for p in self.points] for name in self.parameters}
         for attribute in ("h", "n_dofs", "seconds"):
@@ -98,14 +98,14 @@ class Sweep(Report):
         return [*(f"warning: {text}" for text in warnings), *(f"{choice} failed: {text}" for choice, text in choices)]
 
     def figure(self) -> Any:
-        """Return a matplotlib figure: values over the first parameter, and beside them their ratio to theory.
+        """Return a matplotlib figure: values over the first parameter, and their ratio to theory.
 
-        Points that differ in other parameters are curves of their own.
+        There is a curve for each combination of the other parameters.
         """
         names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
         known = any(name in point.theory for point in self.points for name in names)
         size = (8.8 if known else 5.2, 0.5 + 3.1 * len(names))
-        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # of a function they are the same
+        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # equal for a function
         axes = panels(len(names), 1 + known, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)

@@ -1,4 +1,4 @@
-"""Array arguments and results of functions, and whether their docstrings give shape and unit.
+"""Check that docstrings give shape and unit of every array argument and result.
 
 What counts are parameters, results, properties and attributes whose annotation, or documented type, is an array, or a
 function of positions. A shape is a parenthesis such as ``(n_points, dim)``, ``(...)`` standing for any shape; a unit is a

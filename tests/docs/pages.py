@@ -1,4 +1,4 @@
-"""The code blocks of README and docs: found, run page by page as a reader would, in a folder of their own.
+"""Run the code blocks of README and docs page by page, each page in a separate folder.
 
 A page is run from top to bottom. Fences ``python`` share one namespace; lines of fences ``sh`` that begin with
 ``fastcontact`` run in this process, ``python`` lines with this interpreter, and the rest in bash. A ``{code-block}`` with

@@ -1,4 +1,4 @@
-"""The documentation names everything that there is, and nothing that there is not."""
+"""The documentation names everything that exists, and nothing else."""
 
 import inspect
 import re

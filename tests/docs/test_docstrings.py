@@ -1,4 +1,4 @@
-"""Docstrings: their examples give what they say, and every array argument and result has a shape and a unit."""
+"""Docstrings: examples run, and every array argument and result has a shape and a unit."""
 
 from __future__ import annotations
 

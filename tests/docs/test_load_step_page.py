@@ -1,4 +1,4 @@
-"""The page on a load step names every module that a step of its own example runs."""
+"""The page on a load step names every module that its example runs in a step."""
 
 import re
 import sys

@@ -1,4 +1,4 @@
-"""Notebooks of the documentation: their code runs from top to bottom, and no outputs are stored in them."""
+"""Notebooks of the documentation run from top to bottom and contain no outputs."""
 
 import json
 

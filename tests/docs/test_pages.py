@@ -1,4 +1,4 @@
-"""Every code block of the README and the documentation runs, and every picture shown is one that its page made."""
+"""Every code block of README and docs runs, and the commands of a page make its pictures."""
 
 import re
 import warnings

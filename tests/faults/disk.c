@@ -9,7 +9,7 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-static char folder[4096];
+static char folder[4096], failed[4096];
 static long calls, first = -1;
 static int once, number;
 
@@ -17,16 +17,20 @@ static int once, number;
    Error 0 is none: writes take half of what they are given, as they may. */
 void disk_fails(const char *where, long start, int error, int alone) {
     strncpy(folder, where, sizeof folder - 1);
-    calls = 0, first = start, number = error, once = alone;
+    calls = 0, first = start, number = error, once = alone, failed[0] = 0;
 }
 
 long disk_calls(void) { return calls; }
 
+/* The file of the first call that failed; empty if none did. */
+const char *disk_failed(void) { return failed; }
+
 static int below(const char *path) { return folder[0] && strncmp(path, folder, strlen(folder)) == 0; }
 
-static int counted(void) {
+static int counted(const char *path) {
     long call = calls++;
     if (first < 0 || call < first || (once && call > first)) return 0;
+    if (call == first) strncpy(failed, path, sizeof failed - 1);
     errno = number;
     return 1;
 }
@@ -39,7 +43,7 @@ static int fails(int fd) {
     ssize_t length = readlink(link, path, sizeof path - 1);
     if (length < 0) return 0;
     path[length] = 0;
-    return below(path) && counted();
+    return below(path) && counted(path);
 }
 
 #define REAL(name) static __typeof__(name) *real; if (!real) real = dlsym(RTLD_NEXT, #name)
@@ -59,4 +63,4 @@ int posix_fallocate(int fd, off_t at, off_t size);
 int posix_fallocate(int fd, off_t at, off_t size) { REAL(posix_fallocate); return REFUSED(fd) ? number : real(fd, at, size); }
 int posix_fallocate64(int fd, off64_t at, off64_t size);
 int posix_fallocate64(int fd, off64_t at, off64_t size) { REAL(posix_fallocate64); return REFUSED(fd) ? number : real(fd, at, size); }
-int rename(const char *from, const char *to) { REAL(rename); return below(from) && counted() && number ? -1 : real(from, to); }
+int rename(const char *from, const char *to) { REAL(rename); return below(from) && counted(from) && number ? -1 : real(from, to); }

@@ -1,4 +1,4 @@
-"""A harness for commands on a disk that fails: builds the library, runs the worker, judges what came of each fault."""
+"""Test harness for commands on a failing disk: build the library, run the worker, judge each fault."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def complaints(fault: dict[str, Any]) -> list[str]:
     where = f"{' '.join(fault['command'])}, call {fault['call']}, error {fault['error']}"
     wrong = [f"{where}: {text}" for text in fault.get("intact", [])]
     lines = [line for line in fault["said"].splitlines() if not line.startswith("warning: ")]
-    if fault["call"] < 0 or not fault["error"]:
+    if fault["call"] < 0 or fault["harmless"]:
         return wrong + ([f"{where}: {fault['code']} {lines}"] if fault["code"] or lines else [])
     if fault["code"] != 1:
         wrong.append(f"{where}: exit code {fault['code']}, {lines}")

@@ -1,9 +1,11 @@
-"""Run commands on a disk that fails at one call after the other. Started with the library of `disk.c` preloaded.
+"""Run commands on a disk that fails at one call after the other, with the library of `disk.c` preloaded.
 
 Arguments: folder to work in, folder of the files to start from, number of faults a command (0: at every call), commands as
 JSON. Then all writes are short once, which is no fault. Each command runs in a child of its own, on a fresh copy of the
-files. Prints one JSON line a fault: command, call, error, whether it is the only one, exit code or minus the signal, what
-was printed as error, and the names of the files left.
+files. Prints one JSON line a fault: command, call, error, whether it is the only one, the file of the call, exit code or
+minus the signal, what was printed as error, the names of the files left, and what is wrong with them. A lock is held by
+the operating system, so that a command may go on without the text of its file; what it leaves then has the same contents
+as without a fault.
 The children come from a parent that has run no kernel, since threads do not survive a fork.
 """
 
@@ -18,6 +20,9 @@ import os
 import shutil
 import sys
 from pathlib import Path
+
+import h5py
+import numpy as np
 
 from fastcontact.cli import main
 
@@ -35,6 +40,7 @@ with contextlib.suppress(ImportError):
     importlib.import_module("matplotlib.pyplot")
 
 DISK = ctypes.CDLL(None)
+DISK.disk_failed.restype = ctypes.c_char_p
 ERRORS = (errno.EIO, errno.ENOSPC)
 SHORT = 0
 
@@ -52,10 +58,10 @@ def run(command: list[str], work: Path, source: Path, call: int, error: int, onc
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         DISK.disk_fails(os.fsencode(folder), call, error, once)
         code = main(command)
-        counts.write_text(str(DISK.disk_calls()))
+        counts.write_text(f"{DISK.disk_calls()} {os.path.basename(os.fsdecode(DISK.disk_failed()))}")
         os._exit(code)
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    shutil.rmtree(work / "left", ignore_errors=True)
+    calls, _, failed = counts.read_text().partition(" ") if counts.exists() else ("0", "", "")
     return {
         "command": command,
         "call": call,
@@ -64,7 +70,8 @@ def run(command: list[str], work: Path, source: Path, call: int, error: int, onc
         "code": status,
         "said": said.read_text(),
         "files": sorted(os.listdir(folder)),
-        "calls": int(counts.read_text()) if counts.exists() else 0,
+        "calls": int(calls),
+        "failed": failed,
     }
 
 
@@ -80,13 +87,19 @@ def main_loop() -> None:
     for command in json.loads(sys.argv[4]):
         whole = run(command, work, source, -1, 0, False)
         print(json.dumps(whole), flush=True)
+        shutil.rmtree(work / "whole", ignore_errors=True)
+        shutil.copytree(work / "files", work / "whole")
         for number, call in enumerate(spread(int(str(whole["calls"])), count)):
             (work / "calls.txt").unlink(missing_ok=True)
             found = run(command, work, source, call, ERRORS[number % 2], bool(number % 3))
+            found["harmless"] = bool(found["once"]) and str(found["failed"]).endswith(".lock")
             found["intact"] = intact(work / "files", source)
+            if found["harmless"]:
+                found["intact"] += apart(work / "files", work / "whole")
             print(json.dumps(found), flush=True)
         found = run(command, work, source, 0, SHORT, False)
-        found["intact"] = intact(work / "files", source)
+        found["harmless"] = True
+        found["intact"] = intact(work / "files", source) + apart(work / "files", work / "whole")
         print(json.dumps(found), flush=True)
 
 
@@ -110,6 +123,34 @@ def intact(folder: Path, source: Path) -> list[str]:
         elif not path.stat().st_size:
             wrong.append(f"{path.name} is empty")
     return wrong
+
+
+def contents(path: Path) -> object:
+    """Return what a file holds: the arrays of results, all but the times of a summary, else its bytes."""
+    if path.suffix == ".json":
+        return {key: value for key, value in json.loads(path.read_text()).items() if key != "timings"}
+    if path.suffix != ".vtkhdf":
+        return path.read_bytes()
+    arrays: dict[str, bytes] = {}
+
+    def keep(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset):
+            arrays[name] = np.asarray(item[()]).tobytes()
+
+    with h5py.File(path, "r") as file:
+        file.visititems(keep)
+    return arrays
+
+
+def apart(folder: Path, whole: Path) -> list[str]:
+    """Return the names of the files that are not what they are without a fault."""
+    names = {path.name for path in (*folder.iterdir(), *whole.iterdir())}
+    alike = {
+        name
+        for name in names
+        if (folder / name).exists() and (whole / name).exists() and contents(folder / name) == contents(whole / name)
+    }
+    return [f"{name} is not what it is without a fault" for name in sorted(names - alike)]
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Damage at the level of bytes: the same seed gives the same damage."""
+"""Byte-level damage: the same seed gives the same damage."""
 
 from __future__ import annotations
 

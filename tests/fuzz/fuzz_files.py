@@ -1,4 +1,4 @@
-"""One damaged file from a seed and a number: always the same one."""
+"""A damaged file from a seed and a number, always the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Damage inside HDF5 files that stay valid HDF5: other shapes, types, links, attributes, storage."""
+"""Damage inside valid HDF5 files: other shapes, types, links, attributes, storage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read a file as a user would, and judge what came of it."""
+"""Read a file like a user, and judge the outcome."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fuzzing as a whole: seeds, workers that may die, a count of what came of each file."""
+"""Fuzzing run: seeds, workers that may die, outcomes of all files."""
 
 from __future__ import annotations
 

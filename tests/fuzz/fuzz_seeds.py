@@ -1,4 +1,4 @@
-"""Small valid files of every format that fastcontact reads: what the fuzzer starts from."""
+"""Small valid files of every supported format, from which the fuzzer starts."""
 
 from __future__ import annotations
 

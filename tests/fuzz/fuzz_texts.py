@@ -1,4 +1,4 @@
-"""Damage to texts that keep their form: decks, Gmsh's sections, VTK's XML."""
+"""Damage to well-formed texts: decks, sections of Gmsh, XML of VTK."""
 
 from __future__ import annotations
 

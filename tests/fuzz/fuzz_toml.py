@@ -1,4 +1,4 @@
-"""Damage to case files that stay valid TOML: other values, other types, keys that are missing or too many."""
+"""Damage to case files that remain valid TOML: other values and types, missing and additional keys."""
 
 from __future__ import annotations
 

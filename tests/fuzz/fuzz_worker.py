@@ -1,4 +1,4 @@
-"""A process that makes damaged files and reads them, one after the other, under limits of memory and time.
+"""A process that generates and reads damaged files under limits of memory and time.
 
 Takes numbers from its standard input, a line each, and answers with a line of JSON.
 """

@@ -77,14 +77,13 @@ def test_memory_that_is_wanted_behind_a_clear_error_is_seen(monkeypatch, tmp_pat
     assert fuzz_readers.outcome(tmp_path)[0] == "memory"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of memory and time as Linux knows them")
 @pytest.mark.parametrize(
     ("code", "kind"),
     [
-        ("import os; os.abort()", "crash"), pytest.param("while True: pass", "hang", marks=pytest.mark.slow),
-        pytest.param("bytearray(1 << 31)", "memory", marks=pytest.mark.slow),
-        pytest.param("open('/etc/hostname').close()", "outside", marks=pytest.mark.slow),
-        pytest.param("path.parent.joinpath('mine').touch()", "read", marks=pytest.mark.slow),
+        ("import os; os.abort()", "crash"), ("while True: pass", "hang"), ("bytearray(1 << 31)", "memory"),
+        ("open('/etc/hostname').close()", "outside"), ("path.parent.joinpath('mine').touch()", "read"),
     ],
 )  # fmt: skip
 def test_the_fuzzer_survives_and_tells_what_a_reader_does(monkeypatch, tmp_path, one_seed, code, kind):

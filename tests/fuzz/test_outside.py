@@ -1,4 +1,4 @@
-"""What leads out of a file is refused before anything there is opened: links, outer storage, virtual data sets, paths."""
+"""References to other files are refused before opening them: links, external storage, virtual data sets, paths."""
 
 import sys
 from xml.etree import ElementTree
@@ -88,6 +88,7 @@ def read(path):
         fc.read_mesh(path)
 
 
+@pytest.mark.each_value
 @pytest.mark.skipif(sys.platform != "linux", reason="watching a folder is done as Linux does it")
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("kind", ["med", "vtkhdf", "xdmf", "h5m", "hmf", "cgns"])
@@ -129,7 +130,7 @@ def test_a_file_that_only_links_to_results_is_no_result_to_write_over(tmp_path, 
     with h5py.File(path, "w") as file:
         file["VTKHDF"] = h5py.ExternalLink(outside / "bait.h5", "/VTKHDF")
     before, watch = path.read_bytes(), Watch(outside)
-    with pytest.raises(FileError, match="is no result file"):
+    with pytest.raises(FileError, match="is not a result file"):
         ResultWriter(path, solved[0], overwrite=True)
     with pytest.raises(FileError, match="refers to another file"):
         fc.open_results(path)

@@ -1,4 +1,4 @@
-"""Small cases of all that has a history: yielding and stretching bodies, heat, layers, fluid, modes, coming supports."""
+"""Small cases of all features with a history: nonlinear bodies, heat, cohesion, fluid, modes, supports that begin later."""
 
 from __future__ import annotations
 

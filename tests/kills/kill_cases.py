@@ -1,4 +1,4 @@
-"""The cases whose runs are killed: with and without friction, in two and in three dimensions."""
+"""Cases whose runs are killed: with and without friction, in two and three dimensions."""
 
 from __future__ import annotations
 

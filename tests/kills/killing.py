@@ -1,4 +1,4 @@
-"""Runs that are killed at random instants: what is left of them, and where they end when they are resumed."""
+"""Runs killed at random instants: what the file contains, and how they end after resuming."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whatever has a history goes on from a killed run with the bits of an uninterrupted one, in every array of the file."""
+"""After a kill, every feature with a history resumes with the bits of an uninterrupted run, in every array."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Result files of all that has a history, forged data set by data set: read, or refused with one line."""
+"""Result files of all features with a history, forged data set by data set: read, or refused with one line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run that is killed at any instant leaves a file that opens, right up to its last step, and can be resumed."""
+"""A run killed at any instant leaves a file that opens, is correct up to its last step, and can be resumed."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""What may be wrong with a place to write to: functions that arrange it, the command, and a pattern of the message."""
+"""Failures of output files: functions that provoke them, the command, and a pattern of the message."""
 
 import errno
 import os
@@ -47,7 +47,7 @@ ACCIDENTS = [
     ("another run writes the result file", other_writer, ["run", "case.toml", "-o", "busy.vtkhdf"],
      r"'.*busy\.vtkhdf' is being written by process \d+: let it end or name another file"),
     ("the result file exists and is something else", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
-     r"'.*text\.vtkhdf' exists and is no result file: name another file or remove it first"),
+     r"'.*text\.vtkhdf' exists and is not a result file: name another file or remove it first"),
     ("the result file is a pipe", pipe, ["run", "case.toml", "-o", "pipe.vtkhdf"],
      r"'.*pipe\.vtkhdf' is a device or a pipe: name a plain file"),
 ]

@@ -1,4 +1,4 @@
-"""Mistakes in a case file: what is replaced by what in the FORMA04 A case, and a pattern of the message."""
+"""Mistakes in a case file: a replacement in the FORMA04 A case, and a pattern of the message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 # fmt: off
@@ -138,7 +138,7 @@ COMMANDS = [
     ("unknown linear solver", ["run", "case.toml", "--linear", "direkt"],
      r"unknown linear solver 'direkt': did you mean 'direct'"),
     ("no threads", ["run", "case.toml", "--threads", "0"], r"--threads 0 must lie between 1 and \d+"),
-    ("mesh maker misspelled", ["mesh", "half-sphere", "-o", "a.med"],
+    ("mesh generator misspelled", ["mesh", "half-sphere", "-o", "a.med"],
      r"unknown generator 'half-sphere': did you mean 'half-spheres'"),
     ("result file missing", ["profile", "nothing.vtkhdf"],
      r"there is no file 'nothing\.vtkhdf': check its name and the folder you are in"),
@@ -156,7 +156,7 @@ COMMANDS = [
      r"'case\.toml' is what this command reads: name another file to write"),
     ("results over the mesh", ["run", "case.toml", "-o", "forma04a.med"],
      r"'.*forma04a\.med' is what this command reads: name another file to write"),
-    ("threads in words", ["run", "case.toml", "--threads", "two"],
+    ("threads as a word", ["run", "case.toml", "--threads", "two"],
      r"argument --threads: invalid int value: 'two'; see 'fastcontact run --help'"),
     ("no level asked for", ["converge", "case.toml", "--levels", "0"], r"levels = 0 must be at least 1; a limit takes 3"),
     ("unknown parameter of a sweep", ["sweep", "case.toml", "--set", "aproach=1,2"],
@@ -168,6 +168,6 @@ COMMANDS = [
     ("mesh into a suffix of no format", ["mesh", "half-spheres", "-o", "a.xyz"],
      r"'.*a\.xyz': unknown mesh file suffix '\.xyz': use \.med, \.msh, \.vtu, \.vtk, \.inp, \.xdmf, \.mesh or another format of meshio"),
     ("export of a case file", ["export", "case.toml", "--xdmf", "a.xdmf"],
-     r"'case\.toml' is no HDF5 file: name a result file that fastcontact wrote \(\.vtkhdf\)"),
+     r"'case\.toml' is not an HDF5 file: name a result file that fastcontact wrote \(\.vtkhdf\)"),
 ]
 # fmt: on

@@ -1,4 +1,4 @@
-"""Cases that are solved but doubtful: what their mesh and case file are, and a pattern of the warning with its number."""
+"""Solvable but doubtful cases: mesh and case file, and a pattern of the warning with its number."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 from typing import NamedTuple
@@ -191,7 +191,7 @@ DOUBTS = [
             '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "continuous"\nclearance = -0.2\n',
         ),
         (
-            r"contact 'pair': facets of 'CONT_INNER' and of what it faces stand off their arcs by up to 0\.297, which may move pressures by the order of 49\.9, beside a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 bring it down",
+            r"contact 'pair': facets of 'CONT_INNER' and of what it faces deviate from their arcs by up to 0\.297, which may move pressures by the order of 49\.9, beside a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 bring it down",
         ),
     ),
     Doubt(
@@ -271,7 +271,7 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "nodes nearly lie where others are",
+        "nodes nearly coincide",
         lambda: generate.union(
             block((0.5, 1.0), (2, 2), name="A"), block((0.5, 1.0), (2, 2), origin=(0.5 + 1e-7, 0.0), name="B")
         ),
@@ -289,11 +289,11 @@ DOUBTS = [
         ),
     ),
     Doubt(
-        "bodies begin deeper inside each other than they are pushed",
+        "the initial penetration exceeds the prescribed approach",
         lambda: raised(-0.02),
         of(STEEL, BLOCKS, PAIR),
         (
-            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push: forces are those of the penetration\. Move a body apart, or give an interference that is meant as clearance",
+            r"contact 'pair' begins with a penetration of 0\.02 at point \d+ \[.*\], more than the 0\.01 that supports push along its normal: forces are those of the penetration\. Move a body apart, or give an interference that is meant as clearance",
         ),
     ),
     Doubt(

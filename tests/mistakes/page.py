@@ -1,4 +1,4 @@
-"""The page of the documentation about mistakes, made from the catalogue: ``python tests/mistakes/page.py`` writes it."""
+"""Generate the documentation page on mistakes from the catalogue: ``python tests/mistakes/page.py``."""
 
 import re
 from pathlib import Path
@@ -11,20 +11,19 @@ from otherwise import OTHERWISE
 from spoilt import MESHES
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mistakes.md"
-HEAD = """# Mistakes and what is said about them
+HEAD = """# Mistakes and their messages
 
-Whatever is wrong in an input is told at once: in one line that names the culprit and the remedy, before any numerics
-begin. `fastcontact` then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text, one
-kind for each kind of mistake. What can be solved but is doubtful is solved, and gives a warning with its number: on screen,
-in the log, in `--json` and in the result file, from which `open_results(path).warnings` gives it back; the library warns with
-`FastcontactWarning`.
+Every mistake in an input is reported at once, before any numerics, in one line that names the culprit and the remedy.
+The command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text. A
+doubtful but solvable model is solved, with a warning that states a number: on screen, in the log, in `--json`, in the
+result file (`open_results(path).warnings`), and in Python as `FastcontactWarning`.
 
-This page is made from the tests, which make each mistake and compare the message. The last column says what
-finite-element programs commonly do with the same mistake; none does all of it.
+The tables are generated from tests, which make each mistake and compare the message. The last column describes what
+finite-element programs commonly do with the same mistake; no program does all of it.
 """
 SECTIONS = (
-    ("In a case file", "`fastcontact run`, with the ready case FORMA04 A and one change.", CASES),
-    ("In a mesh file", "The same, with a mesh that is spoilt.", MESHES),
+    ("In a case file", "`fastcontact run` with the ready case FORMA04 A and one change:", CASES),
+    ("In a mesh file", "The same with a damaged mesh:", MESHES),
     ("On the command line", "", COMMANDS),
     ("Where results are written", "", ACCIDENTS),
     ("In calls: meshes", "", library.MESH),
@@ -33,7 +32,7 @@ SECTIONS = (
     ("In calls: contact", "", library.CONTACT),
     ("In calls: loads", "", library.LOADS),
     ("In calls: ramp and options", "", [*library.RAMP, *library.OPTIONS]),
-    ("Warnings", "The case is solved; its result is doubtful.", DOUBTS),
+    ("Warnings", "The case is solved, but its result is doubtful:", DOUBTS),
 )
 CONSEQUENCE = {name: text for text, names in OTHERWISE.items() for name in names}
 
@@ -43,7 +42,7 @@ def page() -> str:
     parts = [HEAD]
     for title, remark, entries in SECTIONS:
         rows = [f"| {name} | {cell(said)} | {CONSEQUENCE[name]} |" for name, said in map(named, entries)]
-        table = "\n".join(["| mistake | what we say | what happens without it |", "| --- | --- | --- |", *rows])
+        table = "\n".join(["| mistake | message | common behaviour of other programs |", "| --- | --- | --- |", *rows])
         parts.append("\n\n".join(text for text in (f"## {title}", remark, table) if text) + "\n")
     return "\n".join(parts)
 

@@ -1,4 +1,4 @@
-"""Mistakes that few make with files: functions that make one, the kind of error, a pattern of the message.
+"""Rare mistakes with files: functions that provoke them, the class of error, a pattern of the message.
 
 No function names a device or anything else outside the folder it is given: a check that is missing could destroy it.
 """
@@ -171,7 +171,7 @@ def steps_announced(file):
 
 
 CALLS = [
-    ("a mesh of Ansys with Gmsh's suffix", of_ansys, fc.errors.FileError, r"a\.msh' is no Gmsh file, which starts with \$MeshFormat: convert it to \.med"),
+    ("a mesh of Ansys with Gmsh's suffix", of_ansys, fc.errors.FileError, r"a\.msh' is not a Gmsh file, which starts with \$MeshFormat: convert it to \.med"),
     ("a result with fewer steps than it says", lambda folder: resulting(folder, steps_announced), fc.errors.FileError, r"only 1 of 2 steps"),
     ("a case with a name beyond all limits", lambda: cases.read_case("a" * 5000 + ".toml"), fc.errors.CaseError, r"cannot look for the case file 'a+' \(File name too long\)"),
     ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready cases"),
@@ -184,14 +184,14 @@ CALLS = [
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a plain file"),
     ("a file that was never made", vanished, fc.errors.FileError, r"a\.txt' cannot be written \(No such file or directory\)"),
     ("an Abaqus file that cannot be read", lambda folder: abaqus.check_readable(folder), fc.errors.FileError, r"cannot read '.*': .*Is a directory"),
-    ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are no numbers: check that the file is complete"),
+    ("coordinates in words", lambda: build_mesh([["a", "b"]], [], {}), fc.MeshError, r"its coordinates are not numbers: check that the file is complete"),
     ("an HDF5 file with groups in a circle", lambda folder: opened(folder, circle), fc.errors.FileError, r"spoilt\.h5' has groups in a circle or too deep, at '.*': write it anew"),
-    ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which not every HDF5 knows: use gzip"),
+    ("an HDF5 file with a strange filter", lambda folder: opened(folder, lzf), fc.errors.FileError, r"is packed by the filter 32000, which HDF5 may lack: use gzip"),
     ("an HDF5 file with texts for numbers", lambda folder: opened(folder, texts), fc.errors.FileError, r"holds no plain numbers: the file is damaged, write it anew"),
     ("packed data without head", lambda: packing.unpacked(np.zeros(300, np.uint8)), ValueError, r"no packed data"),
     ("packed data that were changed", packed_and_changed, ValueError, r"packed data are cut off or changed"),
     ("packed data of another kind", packed_of_another_kind, ValueError, r"an array of \|O8 is not one of ours"),
-    ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is no text"),
+    ("a result whose kinematics are a number", lambda folder: resulting(folder, kinematics_in_numbers), fc.errors.FileError, r"its kinematics or its case is not text"),
     ("a result whose point numbers are broken", lambda folder: resulting(folder, broken_point_numbers), fc.errors.FileError, r"the contact table of 'pair' is of another kind"),
     ("a result with a cell field cut off", lambda folder: resulting(folder, cell_field_cut_off), fc.errors.FileError, r"error of step 0 is cut off or of another kind"),
     ("a cell field with a name of two words", announced, fc.errors.FileError, r"'two words' cannot be the name of a cell field: it is taken or no plain word; choose another"),

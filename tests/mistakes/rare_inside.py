@@ -1,4 +1,4 @@
-"""What goes wrong inside, or around: a part is made to fail, and the failure must be told. Kinds and patterns likewise."""
+"""Failures inside the library or of its environment, which must be reported: classes of errors and patterns."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import errno
@@ -134,7 +134,7 @@ def stuck(patch):
 
 def indefinite():
     K = bsr_array(np.array([[1.0, 2.0], [2.0, 1.0]]), blocksize=(1, 1))
-    Direct(tolerance=1e-10)._with_last(K, np.array([1]))
+    Direct(tolerance=1e-10)._factorised(K, np.array([1]))
 
 
 def no_triangulation(patch):

@@ -1,4 +1,4 @@
-"""Mistakes that few make in models, formulations and pictures: what is done, the kind of error, a pattern of the message."""
+"""Rare mistakes in models, formulations and pictures: the call, the class of error, a pattern of the message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import sys
@@ -107,7 +107,7 @@ MISTAKES = [
     Mistake("a forked process with threads", forked, fc.errors.FastcontactError,
             r"this process was forked after its parent had started the threads .*: start processes by multiprocessing's 'spawn'"),
     Mistake("a penalty where constraints have no areas", formulation_without_areas, fc.ContactError,
-            r"formulation 'mortar' knows no penalty: leave out the option"),
+            r"formulation 'mortar' supports no penalty: leave out the option"),
     Mistake("unknown multipliers", lambda: pair_of("CONT_UPPER", "CONT_LOWER", formulation="mortar", multipliers="dul"),
             fc.ContactError, r"unknown kind of multipliers 'dul': did you mean 'dual'\?"),
     Mistake("an augmentation of zero", lambda: pair_of("CONT_UPPER", "CONT_LOWER", formulation="mortar", augmentation=0.0),
@@ -125,7 +125,7 @@ MISTAKES = [
     Mistake("a clearance from an obstacle's nodes", lambda: obstacle(motion={"y": -1.0}, clearance_primary=0.1),
             fc.ContactError, r"a rigid obstacle has no nodes to measure from: give contact 'plane' the option 'clearance'"),
     Mistake("tied with friction", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", friction=0.3), fc.ContactError,
-            r"contact 'pair' is tied, which knows no friction: leave out 'friction' or 'kind'"),
+            r"contact 'pair' is tied, which excludes friction: leave out 'friction' or 'kind'"),
     Mistake("tied to an obstacle", lambda: obstacle(motion={"y": -1.0}, kind="tied"), fc.ContactError,
             r"contact 'plane' cannot be tied to a rigid obstacle: prescribe the displacements of the group, or couple them"),
     Mistake("a number as a group of nodes", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded=3), fc.ContactError,

@@ -1,4 +1,4 @@
-"""Meshes with a mistake in them: functions that write a spoilt copy of a MED file, and a pattern of the message."""
+"""Damaged meshes: functions that write a damaged copy of a MED file, and a pattern of the message."""
 # ruff: noqa: E501 (messages stay in one piece)
 
 import shutil
@@ -86,8 +86,8 @@ MESHES = [
     ("the file has no groups", rewritten(without_groups),
      r"the mesh has no groups at all, so none is 'SPHHAU': name groups in the mesher, or with Mesh\.with_groups"),
     ("the file has lines only", rewritten(lines_only), r"the mesh has no solid cells, only line2"),
-    ("a cell in the file stands there twice", rewritten(with_a_copy),
-     r"cell \d+ \(tri3 at \(.*\)\) stands in the mesh 2 times, one of 1 such cells: remove the copies"),
-    ("the file has a mesh in space", in_space, r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
+    ("a duplicate cell in the file", rewritten(with_a_copy),
+     r"cell \d+ \(tri3 at \(.*\)\) occurs in the mesh 2 times, one of 1 such cells: remove the copies"),
+    ("the file has a 3D mesh", in_space, r"kinematics 'axisymmetric' do not fit a mesh in 3 dimensions: use '3d'"),
 ]
 # fmt: on

@@ -1,4 +1,4 @@
-"""Each mistake in a call of the library is told at once, by an error of one kind or a warning, in one sentence."""
+"""Each mistake in a call of the library gives at once an error of the right class or a warning, in one sentence."""
 
 import re
 import warnings

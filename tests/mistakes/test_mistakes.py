@@ -1,4 +1,4 @@
-"""Each wrong input ends at once: exit code 1 and one line that names the culprit, before any numerics."""
+"""Each invalid input ends with exit code 1 and one line that names the culprit, before any numerics."""
 
 import re
 import shutil

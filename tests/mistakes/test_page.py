@@ -1,4 +1,4 @@
-"""The page about mistakes is that of the catalogue, and each mistake says what happens without its message."""
+"""The page on mistakes agrees with the catalogue, and describes the behaviour of other programs for each."""
 
 from collections import Counter
 

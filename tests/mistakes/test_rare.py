@@ -1,4 +1,4 @@
-"""Mistakes that few make are told as clearly as those of the catalogue."""
+"""Rare mistakes are reported as clearly as those of the catalogue."""
 
 import inspect
 import re

@@ -1,4 +1,4 @@
-"""A run in a child process: prints, as JSON, what the child found, or the name and the text of its error.
+"""A run in a child process: prints the results, or the name and text of the error, as JSON.
 
 Usage: python children.py METHOD RUN BEFORE with a method of multiprocessing, a run of `whole_runs`, and "run" where the
 parent runs it too, before the child is started.

@@ -1,4 +1,4 @@
-"""Read beyond the end of an array in a serial and in a parallel kernel: prints the error each one ends with."""
+"""Read beyond the end of an array in a serial and in a parallel kernel, and print the error of each."""
 
 import numba
 import numpy as np

@@ -1,4 +1,4 @@
-"""Start Python in another mode: the environment chooses threads, cache folder, compiled or not."""
+"""Start Python in another mode: environment variables for threads, cache folder, compilation."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""NUMBA_BOUNDSCHECK=1: the kernels' own tests, with every index of compiled code checked."""
+"""NUMBA_BOUNDSCHECK=1: tests of kernels with checked array indices."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Compiled kernels kept on disk: where nothing may be written, and where two processes write at once."""
+"""Cache of compiled kernels: read-only folders, and two processes that write at once."""
 
 import json
 import os
@@ -44,6 +44,7 @@ def test_a_read_only_install_compiles_in_every_process_and_says_so_once(asked, i
     assert not list(folder.iterdir())
 
 
+@pytest.mark.slow
 @linux
 def test_a_read_only_install_keeps_kernels_where_it_is_told(installed, tmp_path):
     environment = installed | {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
@@ -53,6 +54,7 @@ def test_a_read_only_install_keeps_kernels_where_it_is_told(installed, tmp_path)
         assert MESSAGE not in log
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_leave_a_good_cache(tmp_path):
     environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     at_once = [start("two_kernels.py", **environment) for _ in range(2)]

@@ -1,4 +1,4 @@
-"""NUMBA_DISABLE_JIT=1: the same kernels in plain Python find the same numbers."""
+"""NUMBA_DISABLE_JIT=1: interpreted kernels give the same numbers."""
 
 import json
 
@@ -15,6 +15,7 @@ def found():
     return [json.loads(finished(start("whole_runs.py", *CLOSE, NUMBA_DISABLE_JIT=mode))[0]) for mode in "01"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("run", CLOSE)
 def test_interpreted_kernels_find_the_numbers_of_compiled_ones(run, found):
     compiled, interpreted = found

@@ -1,4 +1,4 @@
-"""The oldest releases that the tests run with are the lower bounds that the package names."""
+"""The oldest tested releases of dependencies are the lower bounds of the package."""
 
 import re
 import tomllib

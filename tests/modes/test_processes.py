@@ -1,4 +1,4 @@
-"""Children of multiprocessing: they find what their parent finds, or are told why they cannot."""
+"""Children of multiprocessing give the results of their parent, or an error that states why they cannot."""
 
 import json
 import sys
@@ -16,12 +16,14 @@ def found(method, run, before="run", **environment):
     return answer
 
 
-@pytest.mark.parametrize("method", [pytest.param("spawn", marks=pytest.mark.slow), "forkserver"])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["spawn", "forkserver"])
 def test_started_children_find_the_same_bits(method):
     answer = found(method, "small")
     assert answer["child"] == answer["parent"]
 
 
+@pytest.mark.slow
 def test_a_child_forked_before_the_threads_start_runs():
     assert "sizes" in found("fork", "small", before="nothing")["child"]
 

@@ -1,4 +1,4 @@
-"""Call two compiled functions, one of them parallel: prints, as JSON, whether they were right and came from the cache."""
+"""Call two compiled functions, one of them parallel: print as JSON whether they are correct and came from the cache."""
 
 import json
 import logging

@@ -1,4 +1,4 @@
-"""Whole runs in a process of its own: prints, as JSON, what each one found; the bits as digests, the sizes as numbers.
+"""Whole runs in a separate process: print the results as JSON, bits as digests, sizes as numbers.
 
 Usage: python whole_runs.py NAME ... with the names of `RUNS`. The environment chooses the mode: number of threads, cache
 folder, compiled or not.

@@ -1,4 +1,4 @@
-"""What all properties share: helpers of the verification tests, and no warnings of coarse meshes and large strains."""
+"""Shared settings of property tests: helpers of verification tests; no warnings of coarse meshes and large strains."""
 
 import sys
 from pathlib import Path

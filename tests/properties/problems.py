@@ -1,4 +1,4 @@
-"""Small contact problems of any kind: two blocks, one with a crowned and tilted face, pressed together."""
+"""Small random contact problems: two blocks pressed together, one with a crowned and tilted face."""
 
 from __future__ import annotations
 

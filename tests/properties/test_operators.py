@@ -1,4 +1,4 @@
-"""Operators that theory says are symmetric and positive are so: stiffness, compliance, preconditioner."""
+"""Stiffness, compliance and preconditioner are symmetric and positive, as theory requires."""
 
 import numpy as np
 from hypothesis import assume, given
@@ -67,9 +67,7 @@ def test_compliance_is_symmetric_and_positive(recipe, solver):
 @examples(25)
 @given(
     # Of the others, equations have a compliance and are not eliminated.
-    recipe=st.sampled_from([FORMULATIONS[0], FORMULATIONS[3]]).flatmap(
-        lambda one: recipes(formulation=one) | recipes(formulation=one, **SPACE)
-    ),
+    recipe=st.sampled_from([FORMULATIONS[0], FORMULATIONS[3]]).flatmap(lambda one: recipes(formulation=one, **SPACE)),
     tied=st.booleans(), seed=st.integers(0, 99),
 )  # fmt: skip
 def test_the_multigrid_cycle_is_symmetric_and_positive(recipe, tied, seed):

@@ -1,4 +1,4 @@
-"""Any sequence of active sets ends: in a solution, or in the error that says so, within its limits."""
+"""Any sequence of active sets ends in a solution or in the corresponding error, within its limits."""
 
 from contextlib import nullcontext
 from unittest.mock import patch

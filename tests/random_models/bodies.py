@@ -1,4 +1,4 @@
-"""Bodies for random models: blocks and boxes that are graded, crowned, bent to arcs, turned and shifted."""
+"""Bodies for random models: graded, crowned, bent, rotated and translated blocks and boxes."""
 
 from __future__ import annotations
 

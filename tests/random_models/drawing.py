@@ -1,4 +1,4 @@
-"""A random contact model by its seed: what a user might build from the generators, and then some."""
+"""A random contact model from a seed."""
 
 from __future__ import annotations
 

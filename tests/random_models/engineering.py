@@ -1,4 +1,4 @@
-"""Random models of sectors, periods, turning obstacles, plates, orthotropic rings, bolts, couplings and heat."""
+"""Random models of sectors, periods, rotating obstacles, plates, orthotropic rings, bolts, couplings and heat."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The kinds of random models: layers on each other, punches beside each other, and what the generators make."""
+"""Families of random models: stacked layers, adjacent punches, and meshes of the generators."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random models on the meshes that the generators make whole: discs, spheres, cylinders, rings, graded and crowned blocks."""
+"""Random models on meshes of the generators: discs, spheres, cylinders, rings, graded and crowned blocks."""
 
 from __future__ import annotations
 

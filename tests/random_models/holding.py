@@ -1,4 +1,4 @@
-"""What holds the bodies of random models, and what presses on them."""
+"""Supports and loads of random models."""
 
 from __future__ import annotations
 

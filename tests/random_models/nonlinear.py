@@ -1,4 +1,6 @@
-"""Random models whose bodies yield or stretch: two blocks on each other, or one below a rigid ball; what must hold of them.
+"""Random models of nonlinear bodies: two blocks, or a block below a rigid ball; invariants of their results.
+
+Of two blocks, the second may be of another material, and be pressed by a force and let go by half in place of a displacement.
 
 `python tests/random_models/nonlinear.py FIRST COUNT` prints a line for each seed.
 """
@@ -16,15 +18,16 @@ from wording import SpokenModel, reworded
 
 import fastcontact as fc
 
-# Out of balance over the largest force; change by other words, over the largest displacement; missing in the work of a
-# step over the largest energy.
+# Out of balance over the largest force, and moments of bodies over that times their size; change by other words, over the
+# largest displacement; missing in the work of a step over the largest energy.
 BALANCE, SAME, WORK = 2e-6, 1e-6, 0.02
+INSTANTS = [1 / 3, 2 / 3, 1.0]
 
 
-def law(random: Random) -> tuple[fc.ElasticPlastic | fc.NeoHookean, str]:
-    """Return a material with a shear modulus of about 1, and the strain that it is for."""
+def law(random: Random, kinds: range = range(6)) -> tuple[fc.ElasticPlastic | fc.NeoHookean, str]:
+    """Return a material with a shear modulus of about 1, and the strain that it is for; of one of the `kinds`."""
     mu, bulk = random.uniform(0.5, 2.0), 10.0 ** random.uniform(0.5, 3.0)
-    kind = int(random.integers(6))
+    kind = int(random.integers(kinds.start, kinds.stop))
     if kind == 0:
         hardening = [(0.0, 0.02 * mu), (0.05, 0.03 * mu)] if random.random() < 0.5 else []
         kinematic = 0.0 if hardening and random.random() < 0.5 else random.uniform(0.02, 0.2) * mu
@@ -69,14 +72,25 @@ def drawn(seed: int) -> SpokenModel:
     lower = block(random, "A", dim, 0.0, cells)
     mesh = fc.generate.union(lower, block(random, "B", dim, 0.5, cells + 1)) if two else lower
     model = SpokenModel(mesh, kinematics, strain)
-    model.add_material(material)
+    more = np.random.default_rng([seed, 33])
+    if two and more.random() < 0.5:
+        other = law(more, range(1, 6))[0] if strain == "finite" else fc.LinearElastic(more.uniform(3.0, 30.0), 0.3)
+        model.add_material(material, "A")
+        model.add_material(other, "B")
+    else:
+        model.add_material(material)
     up, along = "xyz"[dim - 1], "xyz"[: dim - 1]
     model.fix("A_BOTTOM", along + up)
     if kinematics != "axisymmetric" and two:
         model.fix("B_TOP", along[1:]) if dim == 3 else None
     if two:
         drawn_by = pressed * random.uniform(-0.5, 0.5) * (kinematics != "axisymmetric")
-        model.prescribe("B_TOP", **{up: -pressed, "x": drawn_by})
+        if more.random() < 0.5:
+            model.prescribe("B_TOP", **{up: -pressed, "x": drawn_by})
+        else:
+            model.prescribe("B_TOP", x=drawn_by)
+            stress = 4.0 * pressed if strain == "finite" else 1.3 * material.yield_stress
+            model.add_traction("B_TOP", **{up: -stress}, ramp=[(0.0, 0.0), (0.7, 1.0), (1.0, 0.5)])
         model.add_contact("joint", secondary="B_BOTTOM", primary="A_TOP", friction=friction)
     else:
         centre = np.array([0.0 if kinematics == "axisymmetric" else 0.45, 0.55, 0.0])[:dim]
@@ -96,17 +110,17 @@ def outcome(seed: int) -> dict[str, Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", fc.FastcontactWarning)
         try:
-            last = fc.solve(model, 3)[-1]
+            last = fc.solve(model, INSTANTS)[-1]
         except fc.FastcontactError as error:
             return row | {"error": f"{type(error).__name__}: {error}"}
         row |= figures(model, last)
         again = reworded(model, np.random.default_rng([seed, 7]))
         if again is not None:
-            other = fc.solve(again.model, 3)[-1]
+            other = fc.solve(again.model, INSTANTS)[-1]
             apart = np.abs(again.back(other.displacement) - last.displacement).max()
             apart /= np.abs(last.displacement).max() or 1.0  # a ball between coarse nodes may touch none
             row |= {"words": again.words, "said again": float(apart)}
-    bounds = {"balance": BALANCE, "said again": SAME, "work": WORK}
+    bounds = {"balance": BALANCE, "moment": BALANCE, "said again": SAME, "work": WORK}
     if any("works of these load steps do not add up" in text for text in last.warnings):
         bounds.pop("work")  # it is told, with the number
     row["wrong"] = [name for name, bound in bounds.items() if not row.get(name, 0.0) <= bound]
@@ -117,21 +131,39 @@ def outcome(seed: int) -> dict[str, Any]:
 
 
 def figures(model: fc.Model, step: fc.StepResult) -> dict[str, float]:
-    """Return how much of forces nothing balances, and what is missing in the balance of work."""
+    """Return how much of forces and of their moments nothing balances, and what is missing in the balance of work."""
+    loads = [
+        force * (np.interp(step.load_factor, *np.transpose(ramp)) if ramp else 1.0)
+        for ramp, force in model.forces_by_ramp().items()
+    ]
     contact = np.zeros_like(step.displacement)
     for pair in step.contact.values():
         np.add.at(contact, pair.points, pair.force_vectors)
         if pair.primary_points is not None and len(pair.primary_points):
             np.add.at(contact, pair.primary_points, pair.primary_force_vectors)
+    outer = sum(loads, step.reaction + contact)
     size = max(np.abs(contact).max(), np.abs(step.reaction).max())
-    if model.strain == "finite":
-        off = np.abs(model.internal_forces(step.displacement) - step.reaction - contact).max()
-    else:  # the whole of a body; forces of plastic bodies depend on their history
-        sum_of_all = (step.reaction + contact).sum(axis=0)
-        off = np.abs(sum_of_all[1:] if model.kinematics == "axisymmetric" else sum_of_all).max()
+    bodies = [model.mesh.points_of(name) for name in "AB" if name in model.mesh.group_names]
+    of_bodies = np.array([outer[points].sum(axis=0) for points in bodies])
+    off = np.abs(of_bodies[:, 1:] if model.kinematics == "axisymmetric" else of_bodies).max()
+    arms = model.mesh.points + (step.displacement if model.strain == "finite" else 0.0)
+    moments = [np.abs(moment(arms[points], outer[points])).max() for points in bodies]
+    if model.strain == "finite":  # nodes, too; forces of plastic bodies depend on their history
+        off = max(off, np.abs(model.internal_forces(step.displacement) - outer).max())
+    turning = 0.0 if model.kinematics == "axisymmetric" else max(moments)
     work = step.work
     energies = [abs(work[name]) for name in ("strain_energy", "external_work", "friction_work")]
-    return {"balance": float(off / size) if size else 0.0, "work": abs(work["imbalance"]) / (max(energies) or 1.0)}
+    return {
+        "balance": float(off / size) if size else 0.0, "moment": float(turning / size) if size else 0.0,
+        "work": abs(work["imbalance"]) / (max(energies) or 1.0),
+    }  # fmt: skip
+
+
+def moment(arms: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Return the moment of forces (n, dim) about the origin (1 or 3,)."""
+    if arms.shape[1] == 2:
+        return np.array([(arms[:, 0] * forces[:, 1] - arms[:, 1] * forces[:, 0]).sum()])
+    return np.cross(arms, forces).sum(axis=0)
 
 
 if __name__ == "__main__":

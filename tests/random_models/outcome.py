@@ -1,4 +1,4 @@
-"""How a random model ends: in a result that is checked, in an error of our own, or in a finding."""
+"""Outcome of a random model: a checked result, an error of the package, or a finding."""
 
 from __future__ import annotations
 

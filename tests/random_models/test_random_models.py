@@ -1,4 +1,4 @@
-"""Random models end in results that are right, or in errors of our own; `bench/random_models.py` solves two thousand."""
+"""Random models end in correct results or errors of the package; `bench/random_models.py` solves two thousand."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -27,7 +27,7 @@ def check(seeds):
 
 
 def test_random_models_end_right():
-    rows = check(range(16))
+    rows = check(range(8))
     assert {row["kinematics"] for row in rows if "kinematics" in row} >= {"plane_strain", "axisymmetric", "3d"}
     assert sum(row.get("closed", 0) > 0 for row in rows) >= 0.8 * len(rows)
 
@@ -39,7 +39,7 @@ def test_more_random_models_end_right(first):
 
 
 @pytest.mark.parametrize(
-    "seeds", [range(6), *(pytest.param(range(k, k + 20), marks=pytest.mark.slow) for k in (6, 26, 46))]
+    "seeds", [range(4), *(pytest.param(range(k, k + 20), marks=pytest.mark.slow) for k in (4, 24, 44))]
 )
 def test_random_models_of_bodies_that_yield_or_stretch_end_right(seeds):
     rows = [nonlinear.outcome(seed) for seed in seeds]

@@ -1,4 +1,4 @@
-"""The same model in other words: turned, its points renumbered, its supports along normals, along axes, as relations."""
+"""Equivalent models: rotated, renumbered, with supports along normals, along axes, or as multi-point constraints."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Arguments of a wrong type: every public call tells which one it is, by one of our errors."""
+"""Arguments of a wrong type: every public call names the argument, in an error of the package."""
 
 import inspect
 

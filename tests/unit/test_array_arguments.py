@@ -1,4 +1,4 @@
-"""Arrays as arguments of public calls: masked entries and imaginary parts are refused, never dropped."""
+"""Array arguments of public calls: masked entries and imaginary parts are refused, never dropped."""
 
 import inspect
 

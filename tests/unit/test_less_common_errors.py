@@ -1,4 +1,4 @@
-"""Errors and answers that few users meet: wrong histories, places, fields of files, streams; systems that lack something."""
+"""Less common errors: wrong histories, positions, fields of files, streams; incomplete systems."""
 
 import dataclasses
 import errno
@@ -446,5 +446,5 @@ def test_a_slice_of_steps_by_no_whole_numbers(tmp_path):
 
 def test_axes_that_are_no_numbers():
     block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
-    with pytest.raises(fc.ModelError, match="returned 'text', which are no numbers"):
+    with pytest.raises(fc.ModelError, match="returned 'text', not numbers"):
         block.fix("LEFT", "x", axes=lambda points: "text")

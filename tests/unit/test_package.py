@@ -1,4 +1,4 @@
-"""What is packed: nothing of other folders of the same names, and what the package says of itself."""
+"""The package: contents of distributions, and consistent metadata."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""The public names: loaded when first used, the same for type checkers, packed with the package."""
+"""Public names: loaded on first use, known to type checkers, included in the package."""
 
 import ast
 import importlib

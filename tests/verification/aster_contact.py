@@ -1,4 +1,4 @@
-"""Contact zones of code_aster's specs: formulation, options, rigid surfaces, and what is missing for them."""
+"""Contact zones of code_aster's specs: formulation, options, rigid surfaces, and unsupported features."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Meshes of code_aster's specs: groups that its command files define, and points that its keywords name."""
+"""Meshes of code_aster's specs: groups of its command files, and points of its keywords."""
 
 from __future__ import annotations
 

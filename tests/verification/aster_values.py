@@ -1,4 +1,4 @@
-"""Values that a spec of code_aster tests, taken from results of fastcontact, and how far they are from the reference.
+"""Tested values of a code_aster spec, taken from results of fastcontact, and their deviation from the reference.
 
 A value is read as code_aster writes it: LAGS_C and PRES are negative in compression, forces of axisymmetric models are
 per radian, a reduction runs over all nodes that carry the component.

@@ -1,4 +1,4 @@
-"""Runs a deck with CalculiX where that is installed, and reads the displacements and forces of all its nodes."""
+"""Run a deck with CalculiX, if it is installed, and read the displacements and forces of all nodes."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""What tests of this folder share: blocks with given grid lines, fine where bodies touch."""
+"""Shared helpers: blocks with given grid lines, fine where bodies touch."""
 
 import numpy as np
 

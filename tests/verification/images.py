@@ -1,4 +1,4 @@
-"""One small contact problem, and its images: turned, mirrored, moved, in other units, with its mesh renumbered."""
+"""A small contact problem and its images: rotated, mirrored, translated, in other units, renumbered."""
 
 from dataclasses import dataclass, field, replace
 

@@ -1,4 +1,4 @@
-"""Orthotropic and anisotropic bodies against exact solutions, and turned as a whole."""
+"""Orthotropic and anisotropic bodies compared with exact solutions, and rotated as a whole."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Decks of our own, solved here and by CalculiX: displacements of all nodes and reactions of supports.
+"""Decks solved by fastcontact and CalculiX: displacements of all nodes and support reactions.
 
 Without contact both solve the same equations, and differ by the digits that CalculiX prints. Its contact is a penalty at
 integration points, here an exact multiplier, or a penalty of the same slope averaged over nodes: there they differ by the

@@ -1,4 +1,4 @@
-"""Bilateral contact: what is closed never opens, and slides without friction."""
+"""Bilateral contact: no separation, and frictionless sliding."""
 
 import numpy as np
 import pytest

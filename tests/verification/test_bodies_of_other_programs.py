@@ -1,4 +1,4 @@
-"""Bodies without contact beside other programs on the same meshes: CalculiX 2.20 (Debian) and FElupe 11.3."""
+"""Bodies without contact compared with other programs on the same meshes: CalculiX 2.20 (Debian) and FElupe 11.3."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pretension sections: a bar, and a bolted joint as two springs, force first, then the length; exact up to round-off."""
+"""Pretension sections: a bar, and a bolted joint as two springs, force first, then locked; exact up to round-off."""
 
 import contextlib
 

@@ -1,4 +1,4 @@
-"""Two like cylinders in plane strain, pressed and then drawn along: partial slip, its reversal, what stays behind.
+"""Two equal cylinders in plane strain, pressed and loaded tangentially: partial slip, reversal, residual tractions.
 
 The bodies mirror each other, so pressure and shear are not coupled, and Cattaneo's solution is exact for half planes.
 """

@@ -1,4 +1,4 @@
-"""code_aster's validation cases, read from folders of specs (``pytest --cases DIR``) and run through our interface.
+"""code_aster's validation cases, read from folders of specs (``pytest --cases DIR``) and run through the public API.
 
 Every tested value must lie within the tolerance of its spec, but for the `AMENDMENTS`: there the stated value is wrong, or
 belongs to something else than the case, or its tolerance stands for something, or an exact method must do better; and
@@ -119,7 +119,7 @@ ON_PURPOSE = (
     "the largest rotation",
     "Young's moduli differ by a factor of 1e\\+07",
     "contact .* lacks facets",
-    "contact .* stand off their arcs",  # geometry as in code_aster
+    "contact .* deviate from their arcs",  # geometry as in code_aster
 )
 
 
@@ -140,7 +140,7 @@ def pytest_generate_tests(metafunc):
     cases = []
     for folder in metafunc.config.getoption("--cases") or FOLDERS:
         found = [
-            pytest.param((path, run), id=f"{path.stem}-{run}", marks=AT_THE_END if at_the_end(path, run) else ())
+            pytest.param((path, run), id=f"{path.stem}-{run}", marks=marks_of(path, run))
             for path, run in aster_spec.specs(folder)
         ]
         absent = pytest.mark.skip(reason=f"there are no specs in {folder}")
@@ -148,9 +148,10 @@ def pytest_generate_tests(metafunc):
     metafunc.parametrize("spec_and_run", cases)
 
 
-def at_the_end(path, run):
-    """Return whether a run has nodes beyond the end of the primary side that decide about its values."""
-    return path.stem == "ssnv104d" and run in (0, 2)
+def marks_of(path, run):
+    """Return the marks of a run: further runs of a spec are slow, and some have values decided beyond the end of a side."""
+    at_the_end = path.stem == "ssnv104d" and run in (0, 2)
+    return [*([pytest.mark.slow] if run else []), *([AT_THE_END] if at_the_end else [])]
 
 
 def test_values_lie_within_the_tolerances_of_code_aster(spec_and_run):

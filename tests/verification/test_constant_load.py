@@ -1,4 +1,4 @@
-"""Load steps in which no load changes: with friction, too, forces and displacements stay."""
+"""Load steps with constant load: forces and displacements do not change, also with friction."""
 
 import numpy as np
 import pytest
@@ -24,6 +24,7 @@ def changes(model, name, first=1):
     return max(np.abs(later - shear[0]).max() / np.abs(shear[0]).max() for later in shear[1:])
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("elements", ["tri3", "quad4", "quad8"])
 @pytest.mark.parametrize("options", [FORMULATIONS[i] for i in (0, 2, 3, 4)], ids=str)
 def test_ball_on_block(elements, options):

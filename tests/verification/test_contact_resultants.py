@@ -1,4 +1,4 @@
-"""Force, moment, area, centre, mean gap, work of friction and wear of contacts that are known exactly."""
+"""Force, moment, area, centre, mean gap, work of friction and wear of contacts with exact solutions."""
 
 import json
 
@@ -215,7 +215,7 @@ def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
     [
         (lambda m, s: fc.contact_resultants(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
         (lambda m, s: fc.wear(m, s, "plane", -1.0), "coefficient of wear -1.0 must be"),
-        (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs a place of the space"),
+        (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs a point of the space"),
     ],
 )
 def test_what_is_refused(call, said):

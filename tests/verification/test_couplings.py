@@ -1,4 +1,4 @@
-"""Couplings, moments and hydrostatic pressure: beams by the theory of bending, statics, and motions as of rigid bodies."""
+"""Couplings, moments and hydrostatic pressure: beam theory, statics, and rigid-body motions."""
 
 import numpy as np
 import pytest
@@ -147,7 +147,7 @@ def test_a_case_file_has_couplings_moments_and_liquids():
     [
         (
             lambda m: m.add_coupling("RIGHT", "LEFT"),
-            "'RIGHT' is no reference point: make the model of fc.generate.with_ref",
+            "'RIGHT' is not a reference point: make the model of fc.generate.with_ref",
         ),
         (lambda m: m.add_coupling("REF", "LEFT", kind="stiff"), "unknown kind of coupling 'stiff'"),
         (lambda m: m.add_coupling("REF", "REF"), "the group needs points, without the reference point itself"),

@@ -1,4 +1,4 @@
-"""Modes of a ring from one sector, by nodal diameters: against the same whole ring, and of thin rings as Love has them."""
+"""Modes of a ring from one sector, by nodal diameters: compared with the whole ring, and with Love's thin rings."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Input decks with exact values and CalculiX's: each within its tolerances; wrong ones with the line and what is wrong."""
+"""Input decks compared with exact values and CalculiX within tolerances; invalid decks refused with the line."""
 
 import dataclasses
 import json

@@ -1,4 +1,4 @@
-"""Contact in finite strain on the deformed surfaces: patch tests, sliding over facets, rings held by contact alone."""
+"""Contact in finite strain on deformed surfaces: patch tests, sliding over facets, floating rings."""
 
 import numpy as np
 import pytest
@@ -30,6 +30,7 @@ def stack(kinematics: str, element: str, law, **options):
     return fc.solve(model, 3)[-1], model
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("law", ["neo-Hookean", "Ogden"])
 @pytest.mark.parametrize(
     ("kinematics", "element"),

@@ -1,4 +1,4 @@
-"""Rigid obstacles driven by forces: the same as driven by the displacement that the force makes, and what can go wrong."""
+"""Force-driven rigid obstacles: equal to displacement-driven ones; failures."""
 
 import json
 

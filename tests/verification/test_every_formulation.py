@@ -1,4 +1,4 @@
-"""One test for every contact formulation: a new one passes it or is wrong."""
+"""One test for every contact formulation; every new formulation must pass it."""
 
 import numpy as np
 import pytest

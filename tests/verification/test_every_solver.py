@@ -1,8 +1,8 @@
-"""One table that shows that results do not depend on the linear solver: multigrid beside factors.
+"""Results do not depend on the linear solver: multigrid compared with the direct solver.
 
 Every element, formulation and dimension, rigid obstacles too, with and without friction and penalty, either side secondary.
-The default run takes each element, formulation and friction once, in turn with a penalty or swapped, of elements in space two
-formulations; the whole table is slow.
+The default run takes each element with two formulations, with friction and without, in space with one, in turn with friction,
+a penalty, or swapped; on obstacles every second element. The whole table is slow.
 """
 
 from itertools import product
@@ -19,7 +19,7 @@ from fastcontact.mesh.generate.box import SOLIDS
 pytestmark = [
     pytest.mark.pairwise,
     pytest.mark.filterwarnings(
-        "ignore:.*stand off their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
+        "ignore:.*deviate from their arcs", "ignore:.*raise its penalty", "ignore:multigrid gave up"
     ),
 ]
 FORMULATIONS = {
@@ -46,6 +46,7 @@ def cells(kinematics, elements, every=1):
     ):
         for penalty, swapped in product((None, PENALTY), (False, True)):
             taken = (i + j) % every == 0 == (i + j + k + (penalty is not None) + 2 * swapped) % 4
+            taken = taken and (every < 4 or k == i % 2)
             marks = () if taken else pytest.mark.slow
             cell = (kinematics, element, formulation, friction, penalty, swapped)
             name = "-".join([kinematics, element, formulation, "friction" * bool(friction), "penalty" * bool(penalty)])
@@ -162,24 +163,24 @@ def compare(cell, obstacle=False):
 WHOLE = ("kinematics", "element", "formulation", "friction", "penalty", "swapped")
 
 
-@pytest.mark.parametrize(WHOLE, cells("3d", (*SOLIDS, "hex8+tet10", "wedge6+hex20"), every=2))
+@pytest.mark.parametrize(WHOLE, cells("3d", (*SOLIDS, "hex8+tet10", "wedge6+hex20"), every=4))
 def test_multigrid_gives_what_factors_give_in_space(kinematics, element, formulation, friction, penalty, swapped):
     compare((kinematics, element, formulation, friction, penalty, swapped))
 
 
-@pytest.mark.parametrize(WHOLE, cells("plane_strain", FACES) + cells("axisymmetric", FACES))
+@pytest.mark.parametrize(WHOLE, cells("plane_strain", FACES, every=2) + cells("axisymmetric", FACES, every=2))
 def test_multigrid_gives_what_factors_give_in_a_plane(kinematics, element, formulation, friction, penalty, swapped):
     compare((kinematics, element, formulation, friction, penalty, swapped))
 
 
-ON_OBSTACLES = [  # by default each element with friction, formulations in turn
+ON_OBSTACLES = [  # by default every second element with friction, formulations in turn
     pytest.param(
         k,
         e,
         formulation,
         friction,
         penalty,
-        marks=() if friction and not penalty and (i + j) % 3 == 0 else pytest.mark.slow,
+        marks=() if friction and not penalty and (i + j) % 3 == 0 == i % 2 else pytest.mark.slow,
     )
     for i, (k, e) in enumerate([*product(("plane_strain", "axisymmetric"), FACES), *product(("3d",), SOLIDS)])
     for j, formulation in enumerate(("node_to_segment", "continuous", "dual"))

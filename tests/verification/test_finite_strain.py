@@ -1,7 +1,8 @@
-"""Finite strains against closed forms: bars of every law, simple shear, an inflated tube, the elastica; contact."""
+"""Finite strains compared with closed forms: bars of every law, simple shear, an inflated tube, the elastica; contact."""
 
 import numpy as np
 import pytest
+from pairwise import first_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -236,7 +237,7 @@ def balls(law, strain: str, approach: float, **options):
     return fc.solve(model, 4), model
 
 
-@pytest.mark.parametrize("formulation", [None, pytest.param("node_to_segment", marks=pytest.mark.slow), "continuous"])
+@pytest.mark.parametrize("formulation", first_of(1, [None, "node_to_segment", "continuous"]))
 def test_two_balls_squeezed_flat(formulation: str | None) -> None:
     law = fc.NeoHookean(E=20_000.0, nu=0.3)
     steps, model = balls(law, "finite", 12.0, formulation=formulation)

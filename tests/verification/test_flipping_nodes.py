@@ -1,4 +1,4 @@
-"""Nodes that flip between two facets whichever of their normals is taken: equilibrium is at the edge, and it is found."""
+"""Nodes that alternate between two facets: the equilibrium at their common edge is found."""
 
 import numpy as np
 import pytest
@@ -52,7 +52,7 @@ def pressed(element, cells, swapped, friction):
     return fc.solve(model, 1)[-1]
 
 
-@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")  # coarse facets stand off their arcs
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")  # coarse facets deviate from their arcs
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize(("element", "cells", "friction"), [
     ("hex8", (6, 4), 0.0), ("hex8", (4, 6), 0.3), ("tet4", (5, 5), 0.0), ("tet4", (6, 4), 0.3),

@@ -1,4 +1,4 @@
-"""Bodies that contact and friction alone hold cost multigrid at most ten linear solutions."""
+"""Floating bodies, with and without friction, cost multigrid at most ten linear solutions."""
 
 import numpy as np
 import pytest

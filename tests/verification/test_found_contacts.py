@@ -1,4 +1,4 @@
-"""Contact pairs found by themselves: the right facets of the right bodies, and results as with groups by name."""
+"""Automatic contact pairs: the right facets of the right bodies, and results equal to those of named groups."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Friction at held nodes: there wherever sides slide, none where symmetry leaves no slip, however supports are said."""
+"""Friction at supported nodes: present where sides slide, zero where symmetry excludes slip, however supports are stated."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Friction between mirrored bodies does nothing: they stick everywhere, as if each were pressed on a smooth plane.
+"""Friction between mirrored bodies has no effect: they stick everywhere, as if each were pressed on a smooth plane.
 
 Without friction two-body contact is not quite symmetric itself, since at the edge of the contact the normal of one side
 leans; friction takes up what that leaves. So the two bodies with friction are compared with each on a smooth plane.

@@ -1,4 +1,4 @@
-"""A ring squeezed into a groove of three rigid walls with friction, whose corner nodes two walls hold at once."""
+"""A ring compressed in a groove of three rigid walls with friction, with corner nodes held by two walls."""
 
 import numpy as np
 import pytest
@@ -24,6 +24,7 @@ def squeezed(element, nu, mu, **options):
     return fc.solve(model, [1.0, 2.0])[-1]
 
 
+@pytest.mark.each_value
 @pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")  # five nodes a side
 @pytest.mark.parametrize("nu", [0.3, 0.4995])
 @pytest.mark.parametrize(("element", "mu", "formulation"), [

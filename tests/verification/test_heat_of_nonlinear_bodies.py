@@ -1,4 +1,4 @@
-"""Heat in bodies that yield or stretch: free and held expansion, conduction in deformed bodies, exchange with contact."""
+"""Heat in nonlinear bodies: free and constrained expansion, conduction in deformed bodies, coupling with contact."""
 
 import numpy as np
 import pytest

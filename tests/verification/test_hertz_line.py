@@ -1,4 +1,4 @@
-"""Line contact in plane strain against Hertz at equal force: a rigid cylinder on a block, a half-cylinder on a plane."""
+"""Line contact in plane strain and Hertz at equal force: a rigid cylinder on a block, a half-cylinder on a plane."""
 
 from functools import cache
 

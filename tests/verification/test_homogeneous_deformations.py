@@ -1,4 +1,4 @@
-"""Every law in every element, uniaxial, equibiaxial and sheared: closed forms, no forces inside (patch test)."""
+"""Every law in every element, uniaxial, equibiaxial and shear: closed forms, equilibrium at inner nodes (patch test)."""
 
 import numpy as np
 import pytest

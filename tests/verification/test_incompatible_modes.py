@@ -1,4 +1,4 @@
-"""Incompatible modes: beams of one cell across bend exactly, patches of uniform stress stay so, heat strains freely."""
+"""Incompatible modes: exact bending of beams with one cell across, patch tests, free thermal strain."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Gravity and centrifugal forces against exact solutions."""
+"""Gravity and centrifugal forces compared with exact solutions."""
 
 import numpy as np
 import pytest

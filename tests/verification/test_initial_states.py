@@ -1,4 +1,4 @@
-"""Initial stresses and strains: released, held, in balance, as temperatures, in a shrink fit against Lame, with axes."""
+"""Initial stresses and strains: released, held, in equilibrium, as temperatures, in a shrink fit, with axes."""
 
 import numpy as np
 import pytest

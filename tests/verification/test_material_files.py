@@ -1,4 +1,4 @@
-"""Constants of materials from files: the same bits as arrays, a graded bar, other orders, groups, mistakes."""
+"""Material constants from files: the same bits as arrays, a graded bar, other orders, groups, mistakes."""
 
 import h5py
 import meshio

@@ -1,8 +1,9 @@
-"""Rigid meshed surfaces as obstacles: the same as the exact shapes they mesh, up to how well they mesh them."""
+"""Rigid meshed surfaces as obstacles: equal to the exact shapes up to their discretisation."""
 
 import numpy as np
 import pytest
 from models import elastic_model
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact import obstacles
@@ -27,7 +28,9 @@ def half_sphere(obstacle, formulation="continuous", element="quad4"):
 
 @pytest.mark.parametrize(
     ("formulation", "element", "facet"),
-    [("continuous", "quad8", "line2"), ("continuous", "quad4", "line3"), ("node_to_segment", "tri3", "line2")],
+    first_of(
+        1, [("continuous", "quad8", "line2"), ("continuous", "quad4", "line3"), ("node_to_segment", "tri3", "line2")]
+    ),
 )
 def test_a_meshed_plane_is_a_plane(formulation, element, facet):
     x = np.linspace(0.0, 60.0, 41) + 0.2 * np.sin(np.arange(41) * np.pi / 2)  # facets of several lengths
@@ -58,7 +61,7 @@ def test_a_meshed_ball_becomes_a_ball_as_its_facets_shrink():
     assert errors[1] < 0.2 * errors[0]
 
 
-@pytest.mark.parametrize("facet", ["hex8", "tet4", "hex20"])
+@pytest.mark.parametrize("facet", first_of(1, ["hex8", "tet4", "hex20"]))
 def test_a_meshed_plane_in_three_dimensions_is_a_plane(facet):
     ball = sphere_octant("hex8", R=2.0, size=0.8, contact_size=0.12, contact_radius=0.4)
     tool = box((2.5, 1.0, 2.5), (3, 1, 4), facet, (0.0, -1.0, 0.0))

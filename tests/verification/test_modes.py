@@ -1,4 +1,4 @@
-"""Modes: bars, beams, plates and rings of the textbooks; bodies joined by contact as whole ones; closed forms of preload."""
+"""Modes: bars, beams, plates and rings of textbooks; bodies joined by contact as one body; closed forms with preload."""
 
 import numpy as np
 import pytest
@@ -186,6 +186,30 @@ def test_what_slides_is_free_along_the_surface_unless_it_is_held():
     assert found["slides"] == pytest.approx(found["tied"], rel=1e-3)
 
 
+def test_a_warning_counts_modes_that_friction_would_hold():
+    """A body that nothing but sliding friction holds along the joint; one that slides without friction has no remedy."""
+    mesh = union(
+        bar("quad8", "plane_strain", (4, 4), "LOW", height=0.1), bar("quad8", "plane_strain", (4, 4), "UP", 0.1, 0.1)
+    )
+
+    def pressed(push: dict[str, float], **options: float) -> fc.Model:
+        model = model_of(mesh, "plane_strain")
+        model.fix("LOW BOTTOM", "xy")
+        model.add_contact("joint", secondary="UP BOTTOM", primary="LOW TOP", **options)
+        if push:
+            model.prescribe("UP TOP", **push)
+        return model
+
+    (step,) = fc.solve(pressed({"x": 2e-4, "y": -2e-4}, friction=0.05), 1)
+    free, own = pressed({}, friction=0.05), {"stress_stiffening": False, "n": 3}
+    with pytest.warns(fc.FastcontactWarning, match=r"1 of 3 modes .* next to zero .*hold_sliding=True holds"):
+        loose = fc.modes(free, step, **own).frequencies
+    held = fc.modes(free, step, hold_sliding=True, **own).frequencies
+    assert abs(loose[0]) < 1e-3 * held[0]
+    (step,) = fc.solve(pressed({"x": 0.0, "y": -2e-4}), 1)
+    assert abs(fc.modes(pressed({}), step, **own).frequencies[0]) < 1e-3 * held[0]
+
+
 @pytest.mark.filterwarnings("ignore:contact 'joint' penetrates")
 def test_what_is_open_is_free_and_penalties_are_springs():
     """Two bars of length 1 joined by a spring k: ``w cos w sin w = k (cos^2 w - sin^2 w)`` with w the angular frequency."""
@@ -265,7 +289,9 @@ def test_modes_are_steps_for_pictures_and_files(tmp_path):
     with fc.open_results(tmp_path / "modes.vtkhdf") as results:
         assert [step.load_factor for step in results] == pytest.approx(found.frequencies)
         np.testing.assert_array_equal(results[1].displacement, found.shapes[1])
-        assert fc.plot.deformed_shape(results.mesh, results[1], field="displacement").get_title()
+        title = fc.plot.deformed_shape(results.mesh, results[1], field="displacement").get_title()
+    assert f"frequency {found.frequencies[1]:.6g}" in title
+    assert "phase 0.5" in repr(found.phases(1, 2)[1])
 
 
 def test_a_case_file_asks_for_modes(tmp_path, capsys):

@@ -1,4 +1,4 @@
-"""Mortar contact: the patch test on meshes that do not match."""
+"""Mortar contact: the patch test on non-matching meshes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Mortar contact between faces: the patch test on meshes that do not match, and friction in the plane of contact."""
+"""Mortar contact between faces: the patch test on non-matching meshes, and friction in the plane of contact."""
 
 import numpy as np
 import pytest

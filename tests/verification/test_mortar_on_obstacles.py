@@ -1,4 +1,4 @@
-"""Weighted gaps against rigid obstacles: uniform pressure exactly, Hertz and Coulomb on quadratic facets."""
+"""Weighted gaps against rigid obstacles: exact uniform pressure, Hertz and Coulomb on quadratic facets."""
 
 import numpy as np
 import pytest

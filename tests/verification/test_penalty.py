@@ -1,4 +1,4 @@
-"""Penalty: pressure = penalty times penetration, exactly; the exact method is its limit."""
+"""Penalty: pressure equals penalty times penetration; exact contact is its limit."""
 
 import numpy as np
 import pytest

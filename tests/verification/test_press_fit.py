@@ -1,4 +1,4 @@
-"""Press fits by a negative clearance, against Lame: nothing is left but the error of the mesh."""
+"""Press fits by a negative clearance compared with Lame: only the discretisation error remains."""
 
 import warnings
 

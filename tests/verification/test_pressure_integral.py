@@ -1,12 +1,11 @@
-"""The pressure that is reported carries the force: its integral over the secondary side, by every formulation."""
+"""The reported pressure integrates to the contact force, in every formulation."""
 
 import warnings
 
-import aster_spec
 import numpy as np
 import pytest
-from aster_mesh import MissingError
 from models import elastic_model
+from pairwise import first_of
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
@@ -14,7 +13,7 @@ from fastcontact.analysis import step_result
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
-pytestmark = pytest.mark.pairwise
+pytestmark = pytest.mark.each_value
 
 METHODS = {
     "node": {"formulation": "node_to_segment"},
@@ -147,7 +146,6 @@ def test_options_change_nothing_about_it(method, options, space, carried):
     check(solved(made(model, **{"normals": "averaged", **METHODS[method], **options})), carried)
 
 
-@pytest.mark.each_value
 @EVERY
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6", "quad8"])
 def test_the_training_case(method, element, carried, forma04):
@@ -194,13 +192,12 @@ def test_a_pin_in_a_hole_presses_where_it_touches(method, sides, carried):
     assert along == pytest.approx(np.abs(contact.force[1]), rel=0.02)
 
 
-@pytest.mark.each_value
 @pytest.mark.parametrize("multipliers", ["standard", "dual"])
-@pytest.mark.parametrize("element", ["hex8", "hex20", "tet10"])
+@pytest.mark.parametrize("element", first_of(2, ["hex8", "hex20", "tet10"]))
 def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carried):
     """A punch on a wider block: nothing physical depends on where its edge lies in the faces of the block."""
     largest = []
-    for offset in (0.0, 0.05, 0.09, 0.099, 0.0999):
+    for offset in (0.0, 0.09, 0.0999):
         low = box((2.0, 1.0, 1.0), (10, 2, 3), element, (0.0, 0.0, -1.0))
         up = box((1.0, 1.0, 1.0), (7, 3, 3), element, (0.5 + offset, 0.0, 0.0))
         parts = zip("LU", (low, up), strict=True)
@@ -214,21 +211,3 @@ def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carrie
         check(steps, carried)
         largest.append(steps[-1].contact["pair"].pressure_max)
     assert np.ptp(largest) < 0.5 * np.mean(largest)
-
-
-@pytest.mark.slow
-def test_code_aster_cases(carried, pytestconfig):
-    """Every run of the specs that is translated."""
-    tried = 0
-    for path, run in aster_spec.specs(pytestconfig.getoption("--cases")):
-        try:
-            problem = aster_spec.problem(path, run)
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", fc.FastcontactWarning)
-                steps = aster_spec.solve(problem)
-        except MissingError:
-            continue
-        check(steps, carried, kinds={pair.options.get("kind", "unilateral") for pair in problem.model.contact})
-        tried += 1
-    if not tried:
-        pytest.skip("there are no specs")

@@ -1,4 +1,4 @@
-"""A layer without weight, pressed on its base by a line load: the contact recedes at once and then stays as it is.
+"""A weightless layer pressed on its base by a line load: the contact recedes at once, then does not change.
 
 Keer, Dundurs and Tsai (1972): the half-width of the contact does not depend on the load.
 """
@@ -76,6 +76,7 @@ def test_contact_on_a_rigid_base_is_the_same_from_first_to_last_load(formulation
         pressure_fits(contact, load, exact, size)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("ratio", [0.1, 1.0])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_contact_with_an_elastic_base_that_does_not_match(formulation, ratio):

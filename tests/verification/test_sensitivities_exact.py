@@ -1,4 +1,4 @@
-"""Sensitivities against exact derivatives: a bar, Lamé's press fit, Hertz, and what scaling leaves the same.
+"""Sensitivities compared with exact derivatives: a bar, Lamé's press fit, Hertz, and scaling invariants.
 
 Measured: the bar and the identities hold to round-off; Lamé's force by interference and constants is right to 7e-4, the error
 of the mesh; Hertz's powers of the force to 7 %.

@@ -1,4 +1,4 @@
-"""Forces spread by distance, couplings weighted by it, springs between groups."""
+"""Forces distributed by distance, couplings weighted by distance, springs between groups."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The convergence study of the training case tells model error from mesh error."""
+"""The convergence study of the training case separates model error from mesh error."""
 
 import json
 

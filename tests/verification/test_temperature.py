@@ -1,4 +1,4 @@
-"""Thermal strains: free and held bodies, a heated shrink fit against Lame, a bimetal strip against Timoshenko."""
+"""Thermal strains: free and constrained bodies, a heated shrink fit compared with Lame, a bimetal strip with Timoshenko."""
 
 import numpy as np
 import pytest

@@ -60,6 +60,7 @@ def heated(mesh, kinematics, *args, steps=1, from_file=True, **kwargs):
     return fc.solve(model, fc.linear_ramp(steps))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kinematics", ["plane_strain", "plane_stress", "axisymmetric", "3d"])
 @pytest.mark.parametrize("kind", ["med", "vtu", "vtk", "vtkhdf"])
 def test_a_field_of_a_file_gives_the_bits_of_the_array(tmp_path, kind, kinematics):

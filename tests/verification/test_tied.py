@@ -1,4 +1,4 @@
-"""Tied contact: bodies glued along meshes that need not match."""
+"""Tied contact between meshes that need not match."""
 
 import numpy as np
 import pytest
@@ -52,6 +52,7 @@ def outward(side, dim):
     return (-1.0 if side.endswith(("LEFT", "MIN")) else 1.0) * np.eye(dim)[axis]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "quad9", "hex8", "tet4", "hex20", "tet10"])
 def test_mortar_ties_meshes_that_do_not_match_exactly(element, swap):
@@ -119,6 +120,7 @@ def test_ties_are_determined_where_supports_hold_both_sides(element, formulation
             assert np.linalg.norm(contact.shear, axis=1).max() < 2.0
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("make", [blocks, boxes])
 def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
@@ -138,6 +140,7 @@ def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
     assert np.abs(glued.displacement - whole.displacement[nearest]).max() < 1e-9 * np.abs(whole.displacement).max()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("turn", [0.0, 1e-3])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_curved_sides_are_tied_without_stress_as_they_lie(formulation, turn):
@@ -189,7 +192,7 @@ def moved(mesh, by):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    ({"kind": "bilateral", "friction": 0.3}, "contact 'pair' is bilateral, which knows no friction"),
+    ({"kind": "bilateral", "friction": 0.3}, "contact 'pair' is bilateral, which excludes friction"),
 ])  # fmt: skip
 def test_what_contradicts_itself_is_refused(options, words):
     with pytest.raises(fc.ContactError, match=words):

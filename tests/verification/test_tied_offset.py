@@ -1,4 +1,4 @@
-"""Tied sides that lie apart: rotations are free, shear keeps its moment, with every formulation and solver."""
+"""Tied sides with an offset: free rotations, moments of shear, with every formulation and solver."""
 
 import numpy as np
 import pytest

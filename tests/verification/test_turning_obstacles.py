@@ -1,4 +1,4 @@
-"""Rigid obstacles that turn: the torque of full slip, what a turn leaves as it is, turned models, and what is refused."""
+"""Rotating rigid obstacles: the torque of full slip, invariants of rotation, refusals."""
 
 import json
 

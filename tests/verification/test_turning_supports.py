@@ -1,4 +1,4 @@
-"""Supports and obstacles that turn bodies by any angle: no stress from rigid rotations; contact and friction go along."""
+"""Supports and obstacles that rotate bodies by any angle: no stress; contact and friction follow."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pairs that are only watched, that search near by, that share nodes or are paired node by node; forces on both sides."""
+"""Gap-only pairs, search distance, shared nodes, node-to-node pairing; forces on both sides."""
 
 import numpy as np
 import pytest
@@ -232,7 +232,7 @@ def pin_in_hole(formulation, **options):
     return model
 
 
-@pytest.mark.filterwarnings("ignore:.*stand off their arcs")
+@pytest.mark.filterwarnings("ignore:.*deviate from their arcs")
 @each
 def test_forces_lie_along_the_normals_that_are_asked_for(formulation, options):
     model = pin_in_hole(formulation, normals="secondary", **options)
@@ -263,7 +263,7 @@ def test_one_vector_turns_all_forces(formulation, options):
     ({"slip": "none"}, "unknown kind of slip 'none'"),
     ({"search_distance": 0.0}, "search_distance = 0.0 of contact 'pair' must be positive; leave it out for any distance"),
     ({"kind": "gap_only", "penalty": 1.0}, "gap_only, which has no forces"),
-    ({"kind": "gap_only", "friction": 1.0}, "gap_only, which knows no friction"),
+    ({"kind": "gap_only", "friction": 1.0}, "gap_only, which excludes friction"),
     ({"tangential_penalty": 1.0}, "no friction that it could soften"),
     ({"tangential_penalty": -1.0, "friction": 0.1}, "tangential_penalty -1 of contact 'pair' must be positive"),
 ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""Nodal pressures that waver from node to node are told with their size, and what the warning names helps."""
+"""Oscillating nodal pressures give a warning with their size, and its remedy helps."""
 
 import warnings
 

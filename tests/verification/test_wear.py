@@ -1,4 +1,4 @@
-"""Wear that the next load steps begin with: volume, the worn-in shape, and what is refused."""
+"""Wear that later load steps start from: volume, the worn shape, refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pairs of small bodies that contact options are tried on: blocks, boxes, rings."""
+"""Pairs of small bodies for tests of contact options: blocks, boxes, rings."""
 
 import numpy as np
 from models import elastic_model

@@ -1,11 +1,11 @@
-r"""Semismooth Newton method for contact with Coulomb friction, independent of how gaps and slips follow from forces.
+r"""Semismooth Newton method for contact with Coulomb friction, independent of the operator from forces to gaps and slips.
 
 With normal forces n, tangential ones t, gaps g and slips s, in units in which each constraint has a compliance near one,
 the solution is the zero of
 
 .. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
 
-(Alart and Curnier, 1991). These residuals are semismooth; a line search goes down on their norm.
+(Alart and Curnier, 1991). These residuals are semismooth; a line search decreases their norm.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from fastcontact.arrays import Array, Mask
 
 # Residual of a solution over the largest force.
 EXACT = 1e-12
-# Newton iterations from one start, the shortest step along them, and how often a longer one may be of no use.
+# Newton iterations from one start, the smallest damping, and the number of steps without progress.
 PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
 
 
@@ -56,7 +56,7 @@ class Linearised(Protocol):
     ----------
     law : Law
     round_off : float
-        What gaps and slips may be off.
+        Error bound of gaps and slips.
     """
 
     law: Law
@@ -65,8 +65,8 @@ class Linearised(Protocol):
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """Return forces and gaps (1 + k, m) at which the equations of a state, linearised at `y` and `gaps`, hold.
 
-        Closed gaps and sticking slips vanish; of sliding constraints ``t = mu n d`` with the direction d of t - s, which
-        in three dimensions turns with it.
+        Closed gaps and sticking slips vanish; sliding constraints have ``t = mu n d`` with the direction d of t - s, which in
+        three dimensions varies with t - s.
         """
         ...
 
@@ -75,20 +75,20 @@ def newton(
     problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None,
     line_search: bool = True, least: int = 0,
 ) -> Forces:  # fmt: skip
-    """Go down to a zero of the residual from forces and gaps (1 + k, m).
+    """Find a zero of the residual, starting from forces and gaps (1 + k, m).
 
     Parameters
     ----------
     problem : Linearised
     y, gaps : ndarray (1 + k, m)
     exact : float
-        The residual that is small enough, over the largest force.
+        Tolerance of the residual over the largest force.
     patience : int, optional
         Iterations allowed; PATIENCE by default.
     line_search : bool
-        Whether steps are cut until the residual goes down; else all are whole.
+        Whether steps are shortened until the residual decreases; otherwise full steps are taken.
     least : int
-        Iterations to make however small the residual is.
+        Minimum number of iterations.
     """
     patience = PATIENCE if patience is None else patience
     law = problem.law
@@ -113,7 +113,7 @@ def newton(
             and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change)) > (1 - 1e-4 * damping) * size
         ):
             damping *= 0.5
-            if damping < SHORTEST:  # at a kink no step may go down: the whole one leads elsewhere
+            if damping < SHORTEST:  # at a kink no step may decrease the residual: take the full one
                 damping, uphill = 1.0, uphill + 1
                 break
         y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)

@@ -1,9 +1,9 @@
 """Unilateral contact and Coulomb's law as a complementarity function, scaled by the stiffness of each constraint.
 
-Another law begins here. Its tangential force is also used where a sliding constraint is linearised: `dense._step`,
-`eliminated.Eliminated`, and in the fallback `dense._on_edges`. Its parameters come from
-`PairOptions` by way of `Constraints`; those that are forces are scaled where `Law` is made, as forces are. That a constraint
-without friction needs no tangents is assumed by `Law.state` and by the formulations.
+To implement another law, begin here. Its tangential force is also used where a sliding constraint is linearised: in
+`dense._step`, `eliminated.Eliminated` and the fallback `dense._on_edges`. Its parameters come from `PairOptions` through
+`Constraints`; parameters that are forces are scaled where `Law` is created. `Law.state` and the formulations assume that a
+constraint without friction needs no tangents.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ class Law:
     ----------
     mu : ndarray (m,)
     equality : ndarray of bool (m,), optional
-        Constraints that are equations: closed whatever their force.
+        Constraints that are equations: closed under any force.
     """
 
     mu: Array
     equality: Mask | None = None
 
     def trial(self, y: Array, gaps: Array) -> tuple[Array, Array, Array, Array]:
-        """Return n - g, t - s, the length of the latter and the radius of the disc."""
+        """Return n - g, t - s, the norm of t - s and the radius of the disc."""
         n, t = y[0] - gaps[0], y[1:] - gaps[1:]
         return n, t, np.sqrt((t * t).sum(axis=0)), self.mu * np.maximum(n, 0.0)
 
@@ -49,7 +49,7 @@ class Law:
         return closed, (n > 0) & (reach <= radius) & (self.mu > 0)
 
     def slide(self, y: Array, gaps: Array, sliding: Indices) -> tuple[Array, Array]:
-        """Return the directions (k, q) in which constraints `sliding` (q,) slide, and how much of a turn t follows (q,)."""
+        """Return the slip directions (k, q) of constraints `sliding` (q,), and by which factor (q,) t rotates with them."""
         _, t, reach, radius = self.trial(y, gaps)
         along = np.maximum(reach[sliding], TINY)
         return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)

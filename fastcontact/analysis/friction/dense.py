@@ -1,12 +1,13 @@
-"""Contact with Coulomb friction on a dense Delassus operator: forces from the gaps and slips without contact forces.
+"""Contact with Coulomb friction on a dense Delassus operator.
 
-Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Two methods stand
-behind each other:
+Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Two methods are tried in
+turn:
 
-1. Newton's, see `cone_newton`; in two dimensions it is an active set of open, stick and slip forwards or backwards. It
-   nearly always suffices.
-2. The same from the solution for a cone with few edges, a linear complementarity problem that Lemke's pivots solve for
-   every positive definite F and every mu (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
+1. Newton's method, see `cone_newton`; in two dimensions it is an active-set method with open, stick, and slip in either
+   direction. It nearly always suffices.
+2. The same from the solution for a polyhedral cone with few edges, a linear complementarity problem that Lemke's method
+solves
+   for every positive definite F and every mu (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
 
 With large mu there may be several solutions; one of them is found.
 """
@@ -22,21 +23,21 @@ from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Mask
 
-# Residual of a solution over the largest force where round-off leaves no better one.
+# Accepted residual over the largest force where round-off prevents a smaller one.
 ACCEPTABLE = 1e-9
 # Edges of the cones in three dimensions, and the largest complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
-# Slips that depend on each other get this compliance, in units of that of the gaps: at nodes that several sides hold, or that
-# supports hold on one side, forces along the surface would be any. So do problems with a pivot below DEPENDENT. Forces that
-# make slips yield by more than JAMMED of the gaps balance nothing: bodies jam.
+# Linearly dependent slips get this compliance, relative to that of the gaps: at nodes of several sides, or held by
+# supports on one side, tangential forces are undetermined. So do all slips of problems with a pivot below DEPENDENT.
+# Forces that make slips yield by more than JAMMED of the gaps are not balanced: the bodies jam.
 JAMMED = 1e-6
 YIELDING, DEPENDENT = (1e-11, 1e-9), 1e-8
-# Edges repeat each other, which pivots do not bear: their problem is shifted by this fraction.
+# Edges are degenerate for pivoting: their problem is shifted by this fraction.
 SHIFT = 1e-6
 
 
 def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
-    """Return forces that obey contact and Coulomb friction.
+    """Return forces that satisfy unilateral contact and Coulomb's law.
 
     Parameters
     ----------
@@ -46,14 +47,14 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
         Gaps and slips without forces.
     mu : ndarray (m,)
     closed : ndarray of bool (m,)
-        Constraints to start from as closed and sticking.
+        Constraints that are closed and sticking in the second start.
     guess : ndarray (1 + k, m), optional
-        Forces to start from before that.
+        Forces of the first start.
     """
     parts, m = free.shape
     if not m:
         return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
-    # Each constraint in units of its own compliance, so that c = 1 suits all.
+    # Each constraint is scaled by its own compliance, so that c = 1 suits all.
     compliance = np.diag(F)[:m]
     unit = 1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max()))
     length = float(np.abs(free * unit).max()) or 1.0
@@ -66,7 +67,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
         F[slips, slips] += yielding
         problem = _Problem(F, free * unit / length, mu)
         for start, line_search in _starts(problem, closed, guess):
-            # Of a pairing before, gaps of soft constraints are not closed to what is round-off for the others.
+            # With forces of an earlier pairing, gaps of soft constraints are not closed to the round-off of the others.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
@@ -83,7 +84,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
 
 
 def _dependent(F: Array) -> bool:
-    """Return whether rows of a scaled compliance F depend on each other but for round-off."""
+    """Return whether rows of a scaled compliance F are linearly dependent up to round-off."""
     try:
         return bool(np.diag(np.linalg.cholesky(F)).min() ** 2 < DEPENDENT)
     except np.linalg.LinAlgError:
@@ -106,9 +107,9 @@ class _Problem:
 
 
 def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
-    """Yield forces for Newton's method to start from, the more laborious the later, and whether it searches along its steps.
+    """Yield initial forces of Newton's method, the cheapest first, and whether to use a line search.
 
-    At kinks of the residual whole steps often lead on where no part of one goes down.
+    At kinks of the residual full steps often succeed where no shortened step decreases it.
     """
     if guess is not None and guess.any():
         yield guess, True
@@ -166,9 +167,9 @@ def _solved(A: Array, right: Array) -> Array:
 
 
 def _on_edges(problem: _Problem, edges: int) -> Array | None:
-    """Return the forces for a cone with a few edges, None if Lemke's method does not find any.
+    """Return the forces for a polyhedral cone with a few edges, None if Lemke's method fails.
 
-    Unknowns are the normal forces, the part of the tangential ones along each edge, and the largest slip along one.
+    Unknowns are the normal forces, the tangential forces along each edge, and the largest slip along an edge.
     """
     k, m = len(problem.free) - 1, problem.free.shape[1]
     size, last = (2 + edges) * m, (1 + edges) * m
@@ -182,7 +183,7 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     M[last:, :m] = np.diag(problem.mu)
     M[last:, m:last] = -np.tile(np.eye(m), edges)
     M[m:last, last:] = np.tile(np.eye(m), edges).T
-    q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # no two alike
+    q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # all different
     q[:last] += X.T @ problem.free.ravel()
     z, _ = lemke.solved(M, q, 5 * size)
     return None if z is None else (X @ z[:last]).reshape(1 + k, m)

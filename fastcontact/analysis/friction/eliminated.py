@@ -1,9 +1,9 @@
 """Coulomb friction with eliminated constraints: the Delassus operator is not formed.
 
-A step of Newton's method holds closed gaps and sticking slips as equations. A sliding constraint drags with ``mu n`` along
-its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three dimensions t follows
-the slip as that turns, which is a spring across d: ``t = mu n d - stiffness (s - (d s) d)``. Penalties are a diagonal
-compliance of these equations.
+In a step of Newton's method closed gaps and sticking slips are equations. A sliding constraint has the friction force
+``mu n`` along its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three
+dimensions t rotates with the slip, which acts as a spring perpendicular to d: ``t = mu n d - stiffness (s - (d s) d)``.
+Penalties are a diagonal compliance of these equations.
 """
 
 from __future__ import annotations
@@ -17,29 +17,27 @@ from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
+from fastcontact.analysis.tolerances import RESIDUAL
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import TINY
 
-# Bound of the tangential stiffness across a slip, which is unbounded as the slip vanishes, in units of the stiffness of the
-# constraint. The solution does not depend on it, since nothing slips across there.
+# Bound of the tangential stiffness perpendicular to a slip, which is unbounded as the slip vanishes, over the stiffness
+# of the constraint. The solution does not depend on it, because the slip has no perpendicular component there.
 STIFFEST = 100.0
-# Constraints are taken for so much softer than the unknowns that they act on are by themselves, since neighbours deform.
+# Factor by which constraints are assumed softer than the diagonal of their unknowns, since neighbouring nodes deform as well.
 # Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
-# are softer still, with its root, or Newton's method reverses a few slips again and again (nu = 0.4999, 161 442 unknowns: 588
-# iterations, where it did not settle; nu = 0.499 did not care).
+# are softer still, by its square root; otherwise Newton's method reverses a few slips repeatedly (nu = 0.4999, 161 442
+# unknowns: 588 iterations without convergence; nu = 0.499 was not affected).
 SOFTER = 0.2
-# The residual of the friction law that is small enough, in units of that of the linear solutions; and that which will do
-# after PATIENCE steps: contact forces that are a small part of all forces are no more accurate.
+# Tolerance of the residual of the friction law over that of the linear solutions; and the tolerance after PATIENCE steps:
+# contact forces that are a small fraction of all forces are no more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
-# Where Newton's method goes on to the end, its steps are no more accurate than so much of the residual of the friction law,
-# but LOOSEST at least: slips that hardly move get other directions from looser ones. Where that is less than LOOSER times the
-# accuracy of the last step, there is nothing to gain. The last step is exact.
-FORCING, LOOSEST, LOOSER = 0.03, 1e-3, 1e3
 
 
 def solve(
@@ -56,15 +54,15 @@ def solve(
     ----------
     loaded : LoadedNonsymmetric
     constraints : Constraints
-        See `friction.solve`; without compliance but `softness` and `tangential_softness`.
+        See `friction.solve`; without compliance except `softness` and `tangential_softness`.
     closed : ndarray of bool (m,)
-        Constraints to start from as closed and sticking.
+        Constraints that are closed and sticking at first.
     accuracy : Accuracy
-        Its residual is that of the linear solutions.
+        Accuracy, whose residual is that of the linear solutions.
     u : ndarray (n,)
-        Unknowns to start from [length].
+        Initial unknowns [length].
     forces : ndarray (1 + k, m), optional
-        Forces to start from [force].
+        Initial forces [force].
     """
     tolerance, steps = accuracy.residual or 0.0, accuracy.max_newton_steps
     problem = Eliminated(loaded, constraints, u, tolerance, inexact=steps is None)
@@ -76,9 +74,9 @@ def solve(
             state = sticking if equality is None else sticking | equality, sticking
         else:
             state = problem.law.state(y, gaps)
-        # At least once, for forces and displacement to start from are not in balance.
+        # At least once, because initial forces and displacements are not in balance.
         y, gaps = problem.step(y, gaps, *state)
-        if not state[0].any():  # what closes was not known: the bodies lie as if there were no contact
+        if not state[0].any():  # no constraint was closed: start from the displacements without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(EXACT, ENOUGH * tolerance)
         iterate = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
@@ -91,7 +89,7 @@ def solve(
             iterate = replace(iterate, settled=iterate.settled or iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
                 return None
-        if iterate.y is not problem.reached:  # between two steps: displacements are known at their ends
+        if iterate.y is not problem.reached:  # between two steps: displacements are only known at their ends
             problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
     except ConvergenceError:
         return None
@@ -104,9 +102,9 @@ class Eliminated:
     Attributes
     ----------
     u : ndarray (n,)
-        Displacement that the last step led to.
+        Displacement at the end of the last step.
     reached : ndarray (1 + k, m)
-        Forces that it led to, scaled.
+        Scaled forces at the end of the last step.
     """
 
     def __init__(
@@ -120,13 +118,13 @@ class Eliminated:
         k, m = len(rows) - 1, len(constraints)
         yielding = np.divide(1.0, diagonal := loaded.diagonal(), out=np.zeros(len(u)), where=diagonal > 0.0)
         self._gives = diagonal_compliance(constraints)
-        compliance = self._own(rows, yielding)
+        compliance = self._compliance_of_rows(rows, yielding)
         self._turn = aligning(compliance, constraints.directions) if k == 2 else None
         if self._turn is not None:
             turned = csr_array(self._turn @ vstack(rows, format="csr"))
             rows = tuple(turned[a * m : (a + 1) * m] for a in range(3))
             free = (self._turn @ free.ravel()).reshape(free.shape)
-            compliance = self._own(rows, yielding)
+            compliance = self._compliance_of_rows(rows, yielding)
         still = idle(compliance)
         moved = still & constraints.moved_past(np.arange(m), self._turn)
         self._gives[1:][moved] += np.broadcast_to(GIVING * compliance[0, 0], still.shape)[moved]
@@ -143,15 +141,15 @@ class Eliminated:
             16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)
         )
 
-    def _own(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
-        """Return `compliance_of_rows` plus the own tangential compliance: directions with compliance are not idle."""
+    def _compliance_of_rows(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
+        """Return `compliance_of_rows` plus the tangential compliance: directions with compliance are not idle."""
         compliance = compliance_of_rows(rows, yielding)
         slips = np.arange(1, len(rows))
         compliance[slips, slips] += self._gives[1:]
         return compliance
 
     def start(self, forces: Array | None) -> tuple[Array, Array]:
-        """Return forces and gaps of the displacement to start from, scaled."""
+        """Return scaled forces and gaps of the initial displacement."""
         y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
         if self._turn is not None:
             y = (self._turn @ y.ravel()).reshape(y.shape)
@@ -160,7 +158,7 @@ class Eliminated:
         return self.reached, self._scaled(self._gaps(self.u, y))
 
     def unscaled(self, scaled: Forces) -> Forces:
-        """Return forces and gaps along the tangents as they were given."""
+        """Return unscaled forces and gaps along the original tangents."""
         y = self.reached * self._unit
         gaps = self._gaps(self.u, y)
         if self._turn is not None:
@@ -198,16 +196,19 @@ class Eliminated:
         return self.reached, self._scaled(self._gaps(u, new))
 
     def _accuracy(self, y: Array, gaps: Array) -> float:
-        """Return the relative residual of the linear solution of a step from forces `y` and `gaps`, see FORCING."""
+        """Return the relative residual of the linear solution of a step from forces `y` and `gaps`.
+
+        Steps follow the residual of the friction law, as the solutions of pairings do, up to LOOSEST: looser steps change the
+        directions of slips that hardly move. The last step is exact.
+        """
         if not self._inexact:
             return self._tolerance
         size = float(np.abs(y).max(initial=0.0))
         off = float(np.abs(self.law.residual(y, gaps)).max(initial=0.0))
-        worth = min(FORCING * off / size, LOOSEST) if size else LOOSEST
-        return worth if worth > LOOSER * self._tolerance else self._tolerance
+        return max(self._tolerance, min(RESIDUAL * off / size, LOOSEST) if size else LOOSEST)
 
     def finish(self) -> bool:
-        """Let further steps be exact; return whether the last one was not."""
+        """Make further steps exact; return whether the last one was inexact."""
         self._inexact = False
         return self._last > self._tolerance
 
@@ -220,7 +221,7 @@ class Eliminated:
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
-        spring = spring / (1.0 + spring * self._gives[1, at])  # behind that of the constraint itself
+        spring = spring / (1.0 + spring * self._gives[1, at])  # in series with that of the constraint
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )
@@ -241,7 +242,7 @@ class Eliminated:
 
 
 def diagonal_compliance(constraints: Constraints) -> Array:
-    """Return the own compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
+    """Return the diagonal compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
     compliance = np.zeros((1 + len(constraints.tangents), len(constraints)))
     if constraints.softness is not None:
         compliance[0] = constraints.softness
@@ -252,7 +253,7 @@ def diagonal_compliance(constraints: Constraints) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Across:
-    """Springs across slips: along (k, q), and slips (q,) across at u = 0."""
+    """Springs perpendicular to slips: directions (k, q), and perpendicular slips (q,) at u = 0."""
 
     along: Array
     springs: Springs
@@ -261,7 +262,7 @@ class _Across:
 
 @dataclass(frozen=True, eq=False)
 class _Sliding:
-    """Constraints `at` (q,) that slide: tangential over normal forces (k, q), and springs in three dimensions."""
+    """Sliding constraints `at` (q,): tangential over normal forces (k, q), and springs in three dimensions."""
 
     at: Indices
     pull: Array

@@ -11,22 +11,22 @@ from fastcontact.round_off import ROUND_OFF
 def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
     """Return z (n,) with ``w = M z + q, w >= 0, z >= 0, w.T z = 0`` by complementary pivots from a ray (Lemke, 1965).
 
-    They end with a solution if M is copositive, q not negative along the solutions of the problem without it, and no
-    basis degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
+    The pivots end with a solution if M is copositive, q is not negative along the solutions of the homogeneous problem,
+    and no basis is degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
 
     Parameters
     ----------
     M : ndarray (n, n)
     q : ndarray (n,)
     most : int
-        Pivots allowed.
+        Largest number of pivots.
 
     Returns
     -------
     z : ndarray (n,) or None
-        None where the pivots end on a ray, or do not end.
+        None where the pivots end on a ray, or exceed `most`.
     count : int
-        Pivots made.
+        Number of pivots.
     """
     n, z = len(q), np.zeros(len(q))
     if not (q < 0.0).any():
@@ -40,8 +40,8 @@ def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
         leaving = int(basic[row])
         basic[row], others[column] = others[column], leaving
         if leaving == 2 * n:
-            own = basic >= n
-            z[basic[own] - n] = np.maximum(table[own, -1], 0.0)
+            in_basis = basic >= n
+            z[basic[in_basis] - n] = np.maximum(table[in_basis, -1], 0.0)
             return z, count
         column = int(np.flatnonzero(others == (leaving + n if leaving < n else leaving - n))[0])
         blocking = _blocking(table, basic, column)
@@ -63,7 +63,7 @@ def _exchange(table: Array, row: int, column: int) -> None:
 def _blocking(table: Array, basic: Indices, column: int) -> int | None:
     """Return the row whose variable vanishes first as that of the column grows, None if none does.
 
-    Of equal ones that of the artificial variable, then that with the largest pivot.
+    Among equals, the artificial variable is chosen first, then the one with the largest pivot.
     """
     slope = -table[:, column]
     falling = np.flatnonzero(slope > ROUND_OFF * np.abs(slope).max())

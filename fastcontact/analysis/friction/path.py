@@ -1,12 +1,13 @@
 """Coulomb friction along the path of a load step, in increments on one Delassus operator.
 
-A step that is solved at once counts the slip of a constraint from its beginning, although one that closes within it slides
-from where it touches only. Here the forces that the step changes are applied in equal parts, the geometry and the Delassus
-operator F being those of its end. With gaps and slips ``(g, s) = free + F y`` at the end, and gaps g0 and forces y0 at the
-beginning, where s = 0, those at a part p of the step are ``free + (1 - p) ((g0, 0) - free - F y0) + F y``. In s closing is no
-slip, however normals lean: a correction for all of g0 is part of `free`, and each increment has that for the gap it closes.
+A step solved at once counts the slip of a constraint from the beginning of the step, although a constraint that closes within
+the step only slides from first touch on. Here the load increment is applied in equal parts, with the geometry and the
+Delassus operator F of the end of the step. With gaps and slips ``(g, s) = free + F y`` at the end, and gaps g0 and
+forces y0 at the beginning, where s = 0, those at a fraction p of the step are ``free + (1 - p) ((g0, 0) - free - F y0) +
+F y``. Closing is no slip where normals are inclined: the correction for closing g0 is part of `free`, and each increment
+counts the part that belongs to what it closes of the gap.
 
-The last increment depends on the others by the slips before it alone. They stay as they are while the geometry settles.
+The last increment depends on the earlier ones only through their slips, which stay fixed while the geometry converges.
 """
 
 from __future__ import annotations
@@ -30,16 +31,14 @@ def along(
     Parameters
     ----------
     lag : ndarray (1 + k, m)
-        What gaps and slips at the beginning are above those at the end under the forces of the beginning [length].
-    begin : ndarray (1 + k, m)
-        Gaps at the beginning, and by how much slips are corrected for closing them, see `Path.closed` [length].
+        Gaps and slips at the beginning minus those at the end under the forces of the beginning [length].
     begin : ndarray (1 + k, m)
         Gaps at the beginning, and what slips at the end contain for closing them, see `Path.closed` [length].
     y : ndarray (1 + k, m)
         Forces at the beginning [force].
     parts : int
     solve : callable
-        Returns the forces for gaps and slips beside those of the end, closed constraints and forces to start from.
+        Function of additional gaps and slips, initially closed constraints and initial forces that returns the forces.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
     gap, closing = begin[0], np.where(begin[0] > 0.0, begin[1:], 0.0)
@@ -61,10 +60,11 @@ def along(
 
 
 def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
-    """Return the work of friction of constraints (2, m) in an increment, and what of it those do that close in it.
+    """Return the frictional work of constraints in an increment, and that of constraints that close in it, both (2, m).
 
-    Under tangential forces (k, m) times the mean of the normal forces (m,) at both ends over those at the end, `before` being
-    those at the beginning: friction that slides is at its limit. Slips are (k, m).
+    The mean tangential forces are those at the end (k, m) times the ratio of the mean of the normal forces at both ends
+    to that at the end (m,), because sliding friction is at its limit; `before` are the normal forces at the beginning.
+    Slips are (k, m).
     """
     once = -0.5 * (tangential * slip).sum(axis=0)
     ratio = np.divide(before, normal, out=np.zeros_like(normal), where=normal > 0.0)
@@ -72,7 +72,7 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
 
 
 def shifted(constraints: Constraints, slid: Slid) -> Constraints:
-    """Return constraints whose slips count from the last increment on."""
+    """Return constraints whose slips are measured from the last increment on."""
     before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in constraints.directions])
     return replace(constraints, slip0=-before if constraints.slip0 is None else constraints.slip0 - before)
 

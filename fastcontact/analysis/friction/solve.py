@@ -2,9 +2,9 @@
 
 With normal forces n >= 0 and tangential forces t of all constraints as unknowns, gaps and slips of the step are
 ``(g, s) = (g, s)_free + F (n, t)`` with ``F = R K^-1 R.T + C``, R the normal and tangential rows and C the compliance of
-the constraints themselves. `dense` solves that: stick holds the slip of the step at zero exactly, slip returns to the
-cone exactly. Where the linear solver eliminates constraints, `eliminated` is tried first: the same law with the stiffness in
-place of the compliance.
+the constraints themselves. `dense` solves this: in stick the slip of the step is exactly zero, in slip the force lies exactly
+on the cone. Where the linear solver eliminates constraints, `eliminated` is tried first: the same law with the stiffness
+instead of the compliance.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
-# Of increments of a step where constraints are eliminated: the last one is solved again as accurately as the step is.
+# Accuracy of the increments of a step with eliminated constraints: the last one is solved again to that of the step.
 ROUGH = Accuracy(0.0, residual=1e-4)
 
 
@@ -38,9 +38,9 @@ def solve(
 ) -> FrictionalEquilibrium:  # fmt: skip
     """Find displacement and contact forces under contact and friction.
 
-    Constraints that nothing presses together are left out, for each costs columns of the inverse stiffness: the problem
-    begins with those that were closed, and takes up others as they are found to penetrate. What is left out in the end is
-    open and free of forces, so nothing is lost. Constraints that a compliance of their own couples are taken all at once.
+    Open constraints are left out, because each costs columns of the inverse stiffness: the problem begins with those
+    that were closed, and adds others when they penetrate. Constraints left out in the end are open and free of forces,
+    so the result is complete. Constraints coupled by a compliance are included all at once.
 
     Parameters
     ----------
@@ -49,14 +49,14 @@ def solve(
         Rows for the unknowns of the solver; `Constraints.slip0` (k, m) is the slip at zero unknowns, minus that at the
         beginning of the step [length].
     closed : ndarray of bool (m,)
-        Constraints to start from as closed and sticking.
+        Constraints that are closed and sticking at first.
     accuracy : Accuracy
     u : ndarray (n,)
-        Unknowns that stay where no constraint acts, see `Loaded.involved_solution`; iterative solvers start there [length].
+        Unknowns that constraints do not change, see `Loaded.involved_solution`; initial guess of iterative solvers [length].
     guess : FrictionalEquilibrium, optional
-        A solution with nearly the same forces; one of other constraints is passed over.
+        A solution with nearly the same forces; ignored if its constraints are different.
     path : Path, optional
-        To solve along, in increments.
+        Path along which to solve in increments.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
     together = constraints.coupled
@@ -135,12 +135,12 @@ def _among(
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
-    if constraints.tangential_softness is not None:  # before held slips are sought: compliant ones are not held
+    if constraints.tangential_softness is not None:  # before the search for held slips: compliant ones are not held
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
-    own = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
-    idle_slips = idle(own)
+    C = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
+    idle_slips = idle(C)
     still = np.flatnonzero(idle_slips) + len(rows)
     _add_compliance(F, constraints, rows)
     free = free.reshape(1 + k, -1) + at_rest[:, rows]
@@ -150,12 +150,12 @@ def _among(
         begin, closing = path.forces(constraints.directions, rows), path.closed(constraints.directions, rows)
     if Q is not None:
         F = np.asarray(Q @ (Q @ F).T)
-        free, begin, closing = ((Q @ own.ravel()).reshape(free.shape) for own in (free, begin, closing))
+        free, begin, closing = ((Q @ C.ravel()).reshape(free.shape) for C in (free, begin, closing))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
         moved = idle_slips & constraints.moved_past(rows, Q)
         F[still], F[:, still] = 0.0, 0.0
-        F[still, still] = np.where(moved, GIVING * own[0, 0], np.diag(F).max())[idle_slips]
+        F[still, still] = np.where(moved, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
         begin[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
@@ -173,7 +173,7 @@ def _among(
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
-    full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([own @ u for own in (constraints.B, *constraints.tangents)])
+    full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([C @ u for C in (constraints.B, *constraints.tangents)])
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
@@ -184,7 +184,7 @@ def _among(
 
 
 def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints) -> Slid:
-    """Return slips (k, r), works (2, r) and normal forces (r,) of `path.along` at all constraints, Q turned back."""
+    """Return slips (k, r), works (2, r) and normal forces (r,) of `path.along` at all constraints, rotated back by Q."""
     slip, work, normal = before
     if Q is not None:
         slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
@@ -198,7 +198,7 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
-    """Add, in place, the own compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
+    """Add, in place, the compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
     if constraints.compliance is not None and len(rows):
         frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
         F += _turned(constraints.compliance.block(rows), frame)
@@ -233,7 +233,7 @@ def _on_delassus_operator(
 def _turned(C: Array, along: Array) -> Array:
     """Return the compliance of normal and tangential forces ((1 + k) m, (1 + k) m), C (m, m) being that of vectors.
 
-    Frames turn from one constraint to the next: what C couples are the forces, not their components.
+    Tangents vary from one constraint to the next: C couples force vectors, not their components.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def _turned(C: Array, along: Array) -> Array:
         Tangents, zero without friction.
     """
     normal = normals(list(along))
-    normal[~along.any(axis=(0, 2)), 0] = 1.0  # where nothing turns
+    normal[~along.any(axis=(0, 2)), 0] = 1.0  # where there is no friction
     frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
     parts = len(along) + 1
     return np.asarray(np.tile(C, (parts, parts)) * (frame @ frame.T))

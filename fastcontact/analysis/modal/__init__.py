@@ -1,1 +1,1 @@
-"""Small vibrations about a settled load step."""
+"""Small vibrations about a converged load step."""

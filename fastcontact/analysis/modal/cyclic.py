@@ -1,8 +1,8 @@
 """Waves round a ring of equal sectors, of which one is modelled (Thomas, Int. J. Numer. Meth. Engng 14, 1979).
 
-A mode of d nodal diameters is a wave: the displacement of sector k is that of the first one, turned k times and times
-``exp(2 pi i d k / N)``. Complex matrices A are real ones of twice the size, ``[[Re A, -Im A], [Im A, Re A]]``, but for d = 0
-and d = N / 2, where nothing is complex.
+A mode of d nodal diameters is a wave: the displacement of sector k is that of the first one, rotated k times and
+multiplied by ``exp(2 pi i d k / N)``. Complex matrices A are represented by real ones of twice the size, ``[[Re A, -Im
+A], [Im A, Re A]]``, except for d = 0 and d = N / 2, where the phase factors are real.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ class Sectors:
     Attributes
     ----------
     number : int
-        N, of the whole ring.
+        Number N of sectors in the ring.
     turn : ndarray (dim, dim)
-        Of vectors, from one sector to the next [-].
+        Rotation of vectors from one sector to the next [-].
     periodic_interfaces : list of PeriodicInterface
         Ends of the modelled sector.
     centre : ndarray (dim,)
@@ -46,7 +46,7 @@ class Sectors:
 
     @classmethod
     def of(cls, model: Model) -> Sectors | None:
-        """Return those of a model; None without cyclic symmetry. ModelError if it has several axes."""
+        """Return the sectors of a model; None without cyclic symmetry. ModelError if it has several axes."""
         periodic_interfaces = [interface for interface in model.periodic_interfaces if interface.turn is not None]
         if not periodic_interfaces:
             return None
@@ -63,22 +63,22 @@ class Sectors:
             first.sectors, first.turn, periodic_interfaces, np.linalg.lstsq(np.eye(len(off)) - first.turn, off)[0]
         )
 
-    def diameters(self, asked: int | str | Sequence[int]) -> list[int]:
+    def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
         """Return the nodal diameters asked for, ascending; ModelError if the ring has none of that number."""
         most = self.number // 2
-        if isinstance(asked, str):
-            if asked != "all":
-                raise ModelError(f"nodal_diameters = '{asked}': write \"all\", or whole numbers from 0 to {most}")
+        if isinstance(chosen, str):
+            if chosen != "all":
+                raise ModelError(f"nodal_diameters = '{chosen}': write \"all\", or whole numbers from 0 to {most}")
             return list(range(most + 1))
-        diameters = sorted({asked} if isinstance(asked, int) else set(asked))
+        diameters = sorted({chosen} if isinstance(chosen, int) else set(chosen))
         wrong = [d for d in diameters if not 0 <= d <= most]
         if wrong or not diameters:
-            raise ModelError(f"nodal_diameters = {asked}: a ring of {self.number} sectors has those from 0 to {most}")
+            raise ModelError(f"nodal_diameters = {chosen}: a ring of {self.number} sectors has those from 0 to {most}")
         return diameters
 
 
 def _sense(interface: PeriodicInterface, turn: Array) -> int:
-    """Return 1 where an interface turns as `turn` (dim, dim) does, -1 where it turns back, 0 where it does neither."""
+    """Return 1 if the rotation of an interface is `turn` (dim, dim), -1 if it is the inverse, else 0."""
     assert interface.turn is not None
     if np.allclose(interface.turn, turn, atol=LENGTH_ROUND_OFF):
         return 1
@@ -94,16 +94,16 @@ class Wave:
 
     @property
     def angle(self) -> float:
-        """Phase from a sector to the next [radian]."""
+        """Phase angle from a sector to the next [radian]."""
         return 2.0 * np.pi * self.diameters / self.sectors.number
 
     @property
     def single(self) -> bool:
-        """Whether it stands: modes of others come in pairs, a quarter of a wave apart."""
+        """Whether the wave is a standing one; other modes come in pairs, a quarter of a wave apart."""
         return 2 * self.diameters in (0, self.sectors.number)
 
     def phase(self, interface: PeriodicInterface) -> complex:
-        """Return what the second end of an interface has more than the first one, beside the turn [-]."""
+        """Return the phase factor from the first to the second end of an interface, in addition to the rotation [-]."""
         if self.single:
             return 1.0 if self.diameters == 0 else -1.0
         return complex(np.exp(1j * _sense(interface, self.sectors.turn) * self.angle))
@@ -128,20 +128,20 @@ class Wave:
         return values if self.single else np.concatenate([values, values])
 
     def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
-        """Return the relations of real and imaginary parts: `others`, and those of the ends of the sector with phases."""
+        """Return the constraints of real and imaginary parts: `others`, and those of the ends of the sector with phases."""
         ends = [
             MultiPointConstraint(
                 "cyclic symmetry", self.real(turned_rows(interface, self.phase(interface), model.mesh))
             )
             for interface in self.sectors.periodic_interfaces
         ]
-        return [*(MultiPointConstraint(own.name, self.real(own.rows)) for own in others), *ends]
+        return [*(MultiPointConstraint(constraint.name, self.real(constraint.rows)) for constraint in others), *ends]
 
     def joined(self, held: Conditions) -> Conditions:
-        """Return conditions of contact in the real form, one at each place of the ring.
+        """Return contact conditions in the real form, one at each point of the ring.
 
-        The function that tests a condition at the end of a sector goes on in the next one, whose part is at the other end; at
-        the axis it goes round all sectors.
+        The test function of a condition at one end of a sector extends into the next sector, which is represented by the
+        other end; at the axis it extends over all sectors.
         """
         P, kept = self._combined(held)
         nodes = held.nodes[kept]
@@ -151,12 +151,12 @@ class Wave:
         return Conditions(self.real(P @ held.rows), twins, self.both(held.areas[kept]), compliance=compliance)
 
     def _combined(self, held: Conditions) -> tuple[csr_array, Indices]:
-        """Return the matrix (k, q) from conditions to those of the ring, and the condition (k,) that each is most like."""
+        """Return the matrix (k, q) from conditions to those of the ring, and the main condition (k,) of each."""
         left, blocks = np.ones(len(held.nodes), bool), []
         for interface in self.sectors.periodic_interfaces:
-            own = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
+            on_interface = np.flatnonzero(np.isin(held.nodes, interface.first) | np.isin(held.nodes, interface.second))
             for a, b in zip(interface.first.tolist(), interface.second.tolist(), strict=True):
-                here, there = own[held.nodes[own] == a], own[held.nodes[own] == b]
+                here, there = on_interface[held.nodes[on_interface] == a], on_interface[held.nodes[on_interface] == b]
                 if a == b and len(here):
                     blocks.append((self._around(held, here), here, here))
                     left[here] = False
@@ -177,7 +177,7 @@ class Wave:
         return csr_array(coo_array(entries, shape=(count, len(held.nodes)))), np.concatenate(kept)
 
     def _across(self, held: Conditions, interface: PeriodicInterface, here: Indices, there: Indices) -> AnyArray:
-        """Return the part (k, k + l) of conditions at both nodes of an interface; the sector of the second one is behind."""
+        """Return the part (k, k + l) of conditions at both nodes of an interface; that of the second node comes last."""
         assert interface.turn is not None
         share = np.nan_to_num(held.areas[np.concatenate([here, there])], posinf=0.0)
         first, second = share[: len(here)].max(), share[len(here) :].max()
@@ -188,7 +188,7 @@ class Wave:
         return np.hstack([part * np.eye(len(here)), (1.0 - part) * np.conj(self.phase(interface)) * alike])
 
     def _around(self, held: Conditions, here: Indices) -> AnyArray:
-        """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel round the ring."""
+        """Return the combinations (k, q) of the conditions of a node on the axis that do not cancel over the ring."""
         directions = None if held.directions is None else held.directions[here]
         total, turn = np.zeros((len(here), len(here)), complex), np.eye(len(self.sectors.turn))
         for k in range(self.sectors.number):
@@ -200,7 +200,7 @@ class Wave:
 
 
 def without_ends(model: Model, sectors: Sectors) -> Model:
-    """Return the model without the relations of the ends of its sector."""
+    """Return the model without the constraints between the ends of its sector."""
     made = copy.copy(model)
     made.relations = [
         relation
@@ -213,8 +213,8 @@ def without_ends(model: Model, sectors: Sectors) -> Model:
 def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array, AnyArray]:
     """Return the n lowest eigenvalues (n,) and complex vectors (size, n) in the span of real forms (2 size, k).
 
-    Each is there twice, a quarter of a wave apart, or once where an iteration has missed its twin: which is the same complex
-    vector. Rayleigh and Ritz; of unit modal mass, the largest component real and positive.
+    Each pair appears twice, a quarter of a wave apart, or once if an iteration has missed its twin; both are the same complex
+    vector. By the Rayleigh-Ritz method, normalised to unit modal mass and a real positive largest component.
     """
     Z = _complex(vectors)
     stiff, heavy = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))

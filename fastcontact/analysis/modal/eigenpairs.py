@@ -1,8 +1,8 @@
 """The lowest eigenpairs of ``K v = eigenvalue M v``, by factors of a shifted matrix or by multigrid.
 
-With factors of ``K + s M`` by the Lanczos method on its inverse (Ericsson and Ruhe, Math. Comp. 35, 1980); where factors cost
-too much, by the locally optimal block preconditioned conjugate gradients of Knyazev (SIAM J. Sci. Comput. 23, 2001), with one
-cycle of the multigrid hierarchy as preconditioner.
+With a factorisation of ``K + s M``, the Lanczos method is applied to its inverse (Ericsson and Ruhe, Math. Comp. 35, 1980);
+where a factorisation is too expensive, the locally optimal block preconditioned conjugate gradient method (LOBPCG; Knyazev,
+SIAM J. Sci. Comput. 23, 2001) is used, with one multigrid cycle as preconditioner.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from fastcontact.linear.multigrid.hierarchy import COARSEST
 from fastcontact.linear.multigrid.solver import Multigrid
 from fastcontact.linear.protocol import LinearSolver
 
-# Error of vectors, to the square of which eigenvalues are right.
+# Error of vectors; the error of eigenvalues is its square.
 ACCURACY = 1e-5
 UNSTABLE = (
     "the settled step is not stable, small motions grow by themselves: where nodes slide, as round a tightened bolt, "
     "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
     "(stress_stiffening=False)"
 )
-# Iterations until that is looked at, and how often.
+# Iterations between checks of the error, and the number of checks.
 ROUND, ROUNDS = 20, 15
 
 
@@ -41,11 +41,11 @@ def lowest(
     ----------
     solver : LinearSolver
     matrices : (bsr_array (size, size), bsr_array (size, size))
-        K, whose rows of unknowns that are not free have the diagonal alone, and M, which has none there.
+        K, with only the diagonal in rows that are not free, and M, whose rows are empty there.
     near_nullspace : ndarray (size, k)
-        Vectors that cost little energy.
+        Near null space of K.
     free : ndarray of bool (size,)
-        The unknowns.
+        Unknowns that are free.
     n : int
     shift : float
         s, such that ``K + s M`` is positive definite.
@@ -53,9 +53,9 @@ def lowest(
     Raises
     ------
     ModelError
-        If it is not.
+        If ``K + s M`` is not positive definite.
     ConvergenceError
-        If the iteration does not end.
+        If the iteration does not converge.
     """
     K, M = matrices
     if free.sum() < max(COARSEST, 3 * n):
@@ -80,7 +80,7 @@ def lowest(
 
 
 def _of_few(K: bsr_array, M: bsr_array, free: Indices, n: int, shift: float) -> tuple[Array, Array]:
-    """Return what `lowest` does for so few unknowns `free` (k,) that all eigenvalues are found at once."""
+    """Return the result of `lowest` for few unknowns `free` (k,), by a dense eigenvalue problem."""
     stiff, heavy = (np.asarray(matrix.tocsr()[free][:, free].todense()) for matrix in (K, M))
     try:  # the inverse eigenvalues, since M may be singular
         inverse, modes = eigh(heavy, stiff + shift * heavy, subset_by_index=[len(free) - n, len(free) - 1])
@@ -116,10 +116,10 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
     vectors = start
     for _ in range(ROUNDS):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # it tells that a round is short
+            warnings.simplefilter("ignore", UserWarning)  # a warning that a round has few iterations
             values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
         residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
-        # By the energy of the error, whatever the units: eigenvalues are off by its square.
+        # Measured by the energy of the error, independent of units: the error of eigenvalues is its square.
         if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= ACCURACY**2 * values[:n]).all():
             return np.asarray(vectors)
     raise ConvergenceError(

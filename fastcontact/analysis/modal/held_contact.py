@@ -1,7 +1,7 @@
-"""The contact of a settled step as linear conditions on small motions about it.
+"""The contact of a converged step as linear conditions on small motions about it.
 
-What is closed stays closed, and what sticks does not slip either; what is open or slides is free (Wriggers, Computational
-Contact Mechanics, 2006, section 5.3: the active set held). Penalties are springs.
+The active set is fixed: closed constraints stay closed, sticking ones do not slip, open and sliding ones are free (Wriggers,
+Computational Contact Mechanics, 2006, section 5.3). Penalties are springs.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ class Conditions:
     nodes : ndarray of int (m,)
         The secondary node of each.
     areas : ndarray (m,)
-        That each stands for, as far as known [area].
+        Area of each condition, where known [area].
     directions : ndarray (m, dim), optional
-        Along tangents, the tangents [-].
+        Tangents, for conditions along them [-].
     compliance : csr_array (m, m), optional
-        Of the conditions themselves [length / force].
+        Compliance of the conditions [length / force].
     """
 
     rows: csr_array
@@ -76,29 +76,29 @@ class HeldContact:
 
 
 def joined(
-    held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda own: own
+    held: Sequence[Conditions], n_dofs: int, join: Callable[[Conditions], Conditions] = lambda conditions: conditions
 ) -> HeldContact:
-    """Return conditions as one, for `n_dofs` displacements, after `join` has made those of a whole ring of each."""
+    """Return all conditions as one, for `n_dofs` displacements; `join` first maps each to conditions of a whole ring."""
     equations, nodes, springs = [csr_array((0, n_dofs))], [np.empty(0, np.intp)], []
-    for own in map(join, held):
-        kept = np.flatnonzero(np.diff(own.rows.indptr) > 0)
-        if own.compliance is None:
-            equations.append(csr_array(own.rows[kept]))
-            nodes.append(own.nodes[kept])
+    for conditions in map(join, held):
+        kept = np.flatnonzero(np.diff(conditions.rows.indptr) > 0)
+        if conditions.compliance is None:
+            equations.append(csr_array(conditions.rows[kept]))
+            nodes.append(conditions.nodes[kept])
         elif len(kept):
-            springs.append((csr_array(own.rows[kept]), own.compliance.toarray()[np.ix_(kept, kept)]))
+            springs.append((csr_array(conditions.rows[kept]), conditions.compliance.toarray()[np.ix_(kept, kept)]))
     return HeldContact(csr_array(vstack(equations, format="csr")), np.concatenate(nodes), springs)
 
 
 def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_sliding: bool) -> list[Conditions]:
-    """Return the conditions of all pairs at the end of a step; without one those of tied and bilateral pairs, at rest."""
+    """Return the conditions of all pairs at the end of a step; without a step, those of tied and bilateral pairs."""
     conditions: list[Conditions] = []
     for pair in model.contact:
         bound, contact = model.bind(pair, held, sectors_alike=False), None if step is None else step.contact[pair.name]
         if bound.options.gap_only:
             continue
         if bound.options.cohesion is not None:
-            raise ModelError(f"modes know no cohesion or adhesion: tie contact '{pair.name}', or leave it out")
+            raise ModelError(f"modes do not support cohesion or adhesion: tie contact '{pair.name}', or leave it out")
         at = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
         if contact is not None and contact.wear is not None:
             at = replace(at, worn=at_points(contact.points, contact.wear, model.mesh.n_points))
@@ -113,7 +113,7 @@ def _conditions(
 ) -> Iterator[Conditions]:
     """Yield conditions along the normals and along the tangents.
 
-    They are tested with the formulation's multipliers, as those of tied pairs are, see `contact.tied`.
+    The test functions are the formulation's multipliers, as for tied pairs, see `contact.tied`.
     """
     tied = part.tied if isinstance(part.tied, TiedPair) else None
     moments, areas = moments_of(part) if tied is None else (tied.moments, tied.areas)
@@ -121,7 +121,7 @@ def _conditions(
     owners, n = pair.secondary.points[node].astype(np.intp), len(node)
     areas = np.ones(n) if areas is None else areas
     along = part.directions if tied is None else tied.directions
-    directions = [np.asarray(moments @ own) for own in along]
+    directions = [np.asarray(moments @ component) for component in along]
     if tied is not None:
         yield Conditions(tied.rows[0], owners, areas)
         if directions:
@@ -141,7 +141,7 @@ def _conditions(
     )
     if part.tangents:
         tested = csr_array(moments[stuck])
-        rows, give = [tested @ own for own in part.tangents], _compliance(tested, part.tangential_softness)
+        rows, give = [tested @ component for component in part.tangents], _compliance(tested, part.tangential_softness)
         yield _along(directions, rows, stuck, owners, areas, give)
 
 
@@ -149,11 +149,11 @@ def _along(
     directions: Sequence[Array], rows: Sequence[csr_array], kept: Indices, owners: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions along all tangents, of rows (k, n_dofs) that are the `kept` (k,) of owners and areas (q,)."""
+    """Return the conditions along all tangents, of rows (k, n_dofs), the `kept` (k,) of those with owners and areas (q,)."""
     count = len(rows)
     give = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))
-    tangents = np.concatenate([own[kept] for own in directions])
+    tangents = np.concatenate([direction[kept] for direction in directions])
     return Conditions(stacked, np.tile(owners[kept], count), np.tile(areas[kept], count), tangents, give)
 
 

@@ -19,20 +19,21 @@ class Reduced:
     Parameters
     ----------
     system : System
-        With supports and relations.
+        System with supports and multi-point constraints.
     mass : bsr_array (n, n)
         [mass].
     rows : csr_array (m, n)
-        They may be linearly dependent [-].
+        Equations, possibly linearly dependent [-].
     nodes : ndarray of int (m,)
-        A node that each row belongs to: a hint which unknowns to eliminate.
+        A node of each row, whose unknowns are preferred for elimination.
 
     Attributes
     ----------
     K, M : bsr_array (n, n)
-        Stiffness [force / length] and mass [mass] of v; where nothing is free K has its diagonal alone, and M nothing.
+        Stiffness [force / length] and mass [mass] of v; rows that are not free have only the diagonal in K, and are
+        empty in M.
     free : ndarray of bool (n,)
-        Which of v are unknowns.
+        Components of v that are unknowns.
     """
 
     def __init__(self, system: System, mass: bsr_array, rows: csr_array, nodes: Indices) -> None:
@@ -60,7 +61,7 @@ class Reduced:
 def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, csr_array]:
     """Return the unknowns (p,) that equations (m, n) eliminate, and their weights (p, n) of the others.
 
-    Where the equations repeat each other, as at corners where several sides meet, those that are independent.
+    Linearly dependent equations, as at corners where several sides meet, are dropped.
     """
     try:
         elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)

@@ -1,4 +1,4 @@
-"""What `fastcontact.modes` returns: frequencies and shapes, of the model and of the whole ring that a sector stands for."""
+"""Result of `fastcontact.modes`: frequencies and shapes, of the model and of the whole ring that a sector represents."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 class Shapes(Sequence[StepResult]):
-    """A sequence of shapes, each a step: its displacement, the stress of that, and the frequency as load factor."""
+    """A sequence of mode shapes, each as a step: displacement, its stress, and the frequency as load factor."""
 
     @abstractmethod
     def _step(self, number: int) -> StepResult: ...
@@ -50,9 +50,9 @@ class Shapes(Sequence[StepResult]):
         Parameters
         ----------
         number : int
-            Of the mode, from 0.
+            Number of the mode, from 0.
         count : int
-            How many steps; their load factors are the phases, from 0 to 1.
+            Number of steps; their load factors are the phases, from 0 to 1.
         """
         return phases(self[number], count)
 
@@ -60,31 +60,33 @@ class Shapes(Sequence[StepResult]):
 def _as_step(number: int, frequency: float, u: Array, stress: Array) -> StepResult:
     equivalent = recovery.von_mises(stress)
     signed = recovery.von_mises_signed(stress, equivalent)
-    return StepResult(number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u))
+    kind = {"parameter": "frequency"}
+    return StepResult(number + 1, float(frequency), u, stress, equivalent, signed, np.zeros_like(u), iterations=kind)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Modes(Shapes):
-    """Modes of a model: a sequence of shapes, each a `StepResult` for pictures and files, that prints as a table.
+    """Modes of a model: a sequence of mode shapes as `StepResult`, for pictures and files, that prints as a table.
 
     Attributes
     ----------
     frequencies : ndarray (n,)
-        Ascending, for each number of nodal diameters [1 / time]; about zero for rigid motions, negative for shapes that
-        grow by themselves.
+        Ascending, for each number of nodal diameters [1 / time]; about zero for rigid-body modes, negative for
+        unstable modes.
     eigenvalues : ndarray (n,)
         Squares of the angular frequencies [1 / time^2].
     shapes : ndarray (n, n_points, dim)
-        Displacements of unit modal mass, ``shape . M shape = 1``, of the whole ring where nodal diameters were asked for
-        [1 / mass^(1/2)].
+        Mode shapes of unit modal mass, ``shape . M shape = 1``; with nodal diameters, M is that of the whole ring [1 /
+        mass^(1/2)].
     participation : ndarray (n, dim)
-        Of a uniform acceleration along each axis: ``shape . M e`` [mass^(1/2)].
+        Participation factors ``shape . M e`` along each axis e [mass^(1/2)].
     mass : ndarray (dim,)
-        Of all that moves along each axis [mass]; in axisymmetry zero along the radius.
+        Mass that can move along each axis [mass]; in axisymmetry zero along the radius.
     nodal_diameters : ndarray of int (n,), optional
-        Of each mode; None where none were asked for.
+        Number of nodal diameters of each mode; None if none were requested.
     twins : ndarray of int (n,), optional
-        The mode of the same frequency a quarter of a wave further round the ring; the mode itself where it is alone.
+        Number of the mode of equal frequency that is shifted by a quarter of a wave; the number of the mode itself if
+        its frequency is simple.
 
     Examples
     --------
@@ -125,7 +127,7 @@ class Modes(Shapes):
         return _as_step(number, self.frequencies[number], u.copy(), stress)
 
     def whole_ring(self) -> RingModes:
-        """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were asked for."""
+        """Return the same modes on the mesh of the whole ring; ModelError if no nodal diameters were requested."""
         if self._sectors is None:
             raise ModelError(
                 "shapes of the whole ring need modes with nodal_diameters, of a model with cyclic symmetry"
@@ -172,7 +174,7 @@ class RingModes(Shapes):
     Attributes
     ----------
     modes : Modes
-        Of the sector.
+        Modes of the sector.
     mesh : Mesh
         All sectors, the modelled one first; their ends are not merged.
     kinematics : str
@@ -223,7 +225,7 @@ class RingModes(Shapes):
 
 
 def _turned(stress: Array, turn: Array) -> Array:
-    """Return stresses (n, 4 or 6) of a body that is turned with them by a rotation (dim, dim) [pressure]."""
+    """Return stresses (n, 4 or 6) of a body rotated by a rotation matrix (dim, dim) [pressure]."""
     Q, size = np.eye(3), stress.shape[1]
     Q[: len(turn), : len(turn)] = turn
     return np.asarray(stress @ rotations(Q.T[None])[0, :size, :size].T)

@@ -1,8 +1,8 @@
 """Adjoint solution of a converged load step.
 
 With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric matrix of the step: stiffness
-and active constraints as the linear solver has them. E holds what pairing on the deformed configuration adds, and takes away
-the springs of bodies that contact alone holds. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
+and active constraints of the linear solver. E contains the derivatives of the pairing on the deformed configuration, and
+subtracts the springs of floating bodies. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError
 
-# What GMRES may leave of s, and how many solutions it may take.
+# Relative residual of GMRES for s, and its largest number of solutions.
 LEFT, SOLUTIONS = 1e-10, 200
 
 
@@ -29,13 +29,13 @@ class Gradient:
     ----------
     value : float
     displacement : ndarray (n_dofs,)
-        By all displacements, contact kept [unit of the quantity / length].
+        Derivative with respect to all displacements, at fixed pairing [unit of the quantity / length].
     multiplier : ndarray (k,)
-        By the multipliers of active constraints [unit of the quantity / force].
+        Derivative with respect to the multipliers of active constraints [unit of the quantity / force].
     sample : ndarray, optional
-        By `Sample.all`, for what depends on where surfaces are paired; None for nothing.
+        Derivative with respect to `Sample.all`, which depends on the pairing; None for zero.
     reaction : ndarray (n_dofs,), optional
-        By the forces of supports [unit of the quantity / force]; None for nothing.
+        Derivative with respect to the forces of supports [unit of the quantity / force]; None for zero.
     """
 
     value: float
@@ -52,11 +52,11 @@ class Change:
     Attributes
     ----------
     out : ndarray (n_dofs,)
-        Internal minus external forces, those of contact left out [force / unit of the parameter].
+        Internal minus external forces, without contact forces [force / unit of the parameter].
     lift : ndarray (n_dofs,)
         Prescribed displacements [length / unit of the parameter].
     sample : ndarray
-        `Sample.all`, by its own unit.
+        `Sample.all` [its unit / unit of the parameter].
     """
 
     out: Array
@@ -72,7 +72,7 @@ class Adjoint:
     contact : MovingContact
     gradient : Gradient
     moving : csr_array
-        Derivative of `Sample.all` by where the surfaces are paired.
+        Derivative of `Sample.all` with respect to the displacements at which surfaces are paired.
     """
 
     def __init__(self, contact: MovingContact, gradient: Gradient, moving: csr_array) -> None:
@@ -92,7 +92,7 @@ class Adjoint:
         self._w, self._mu = self._solve()
 
     def derivative(self, change: Change) -> float:
-        """Return the derivative of the quantity by a parameter."""
+        """Return the derivative of the quantity with respect to a parameter."""
         gradient, n = self._gradient, len(self._contact.u)
         sample = change.sample + self._moving @ change.lift
         out = change.out + self._system.K @ change.lift - sample[:n]
@@ -105,7 +105,7 @@ class Adjoint:
         return float(derivative)
 
     def _right(self) -> tuple[Array, Array]:
-        """Return the derivatives of the quantity by all unknowns (n,) and by the multipliers (k,)."""
+        """Return the derivatives of the quantity with respect to all unknowns (n,) and the multipliers (k,)."""
         gradient = self._gradient
         whole, multiplier = gradient.displacement.copy(), gradient.multiplier.copy()
         if gradient.sample is not None:
@@ -117,14 +117,14 @@ class Adjoint:
 
     def _solve(self) -> tuple[Array, Array]:
         right, multiplier = self._right()
-        w, mu = self._kept(right, multiplier)
+        w, mu = self._solve_transposed(right, multiplier)
         first = self._transposed(w, mu)
         if not first.any():
             return w, mu
         none = np.zeros(self._k)
 
         def product(s: Array) -> Array:
-            return s + self._transposed(*self._kept(s, none))
+            return s + self._transposed(*self._solve_transposed(s, none))
 
         n = len(right)
         s, info = gmres(LinearOperator((n, n), product), first, rtol=LEFT, atol=0.0, restart=SOLUTIONS, maxiter=1)
@@ -133,9 +133,9 @@ class Adjoint:
                 f"the adjoint equations of the moving contact geometry are not solved after {self.solutions} solutions: "
                 "keep the pairing (Criteria(keep_pairing=True)), or take differences of two solutions"
             )
-        return self._kept(right - s, multiplier)
+        return self._solve_transposed(right - s, multiplier)
 
-    def _kept(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
+    def _solve_transposed(self, right: Array, multiplier: Array) -> tuple[Array, Array]:
         """Return ``J0^-T`` applied to right-hand sides (n,) and (k,), by the linear solver of the analysis."""
         self.solutions += 1
         loaded = self._solver.load(np.ascontiguousarray(right))

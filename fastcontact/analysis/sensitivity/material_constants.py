@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
-from fastcontact.analysis.sensitivity.quantities import Asked
+from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.arrays import Array
 from fastcontact.elasticity.anisotropic_materials import NAMES, Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic, Material
@@ -19,14 +19,14 @@ from fastcontact.errors import ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import combined
 
-# Constants, and how the components of an orthotropic material's are called.
+# Constants, and the names of their components for an orthotropic material.
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 
 
-def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | None]:
+def by_constant(contact: MovingContact, parameter: Label) -> tuple[Array, Array | None]:
     """Return the derivatives of `Change.out` (n_dofs,) and `Change.sample` with respect to a constant, None for zero."""
-    model, name = contact.problem.model, str(asked[0])
-    number, material, component = _found(model, asked)
+    model, name = contact.problem.model, str(parameter[0])
+    number, material, component = _constant_of(model, parameter)
     step = CHANGED * _room(material, name, component)
 
     def at(by: float) -> MovingContact:
@@ -37,48 +37,48 @@ def by_constant(contact: MovingContact, asked: Asked) -> tuple[Array, Array | No
         ]
         return replace(contact, problem=_with_model(contact.problem, made))
 
-    # Of the fourth order: what is left is the step to the fourth power.
-    parts = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
-    return (parts[0] + parts[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
+    # Fourth order: the error is proportional to the fourth power of the step.
+    forces = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
+    return (forces[0] + forces[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
 
 
-def check_constant(model: Model, asked: Asked) -> None:
-    """Raise ModelError if no material has such a constant, or one that varies."""
-    _found(model, asked)
+def check_constant(model: Model, parameter: Label) -> None:
+    """Raise ModelError if no material has such a constant, or the constant varies."""
+    _constant_of(model, parameter)
 
 
-def _found(model: Model, asked: Asked) -> tuple[int, Material, int | None]:
-    """Return the number of a material in the model, itself, and which of several components is asked for."""
+def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | None]:
+    """Return the number of a material in the model, the material, and the requested component."""
     matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)
-        if asked[1] == i or (groups is not None and asked[1] in groups)
+        if parameter[1] == i or (groups is not None and parameter[1] in groups)
     ]  # fmt: skip
     if not matches:
         names = [name for _, groups in model.materials for name in groups or ()]
-        raise ModelError(unknown("material", str(asked[1]), [*names, *map(str, range(len(model.materials)))]))
-    (number, material), name = matches[0], str(asked[0])
+        raise ModelError(unknown("material", str(parameter[1]), [*names, *map(str, range(len(model.materials)))]))
+    (number, material), name = matches[0], str(parameter[0])
     value = getattr(material, name, None)
     components = value if isinstance(value, tuple) else (value,)
     if value is None or any(map(varying, components)):
         raise ModelError(
-            f"the material {asked[1]!r} has no {name}, or one that varies: there is no sensitivity by that"
+            f"the material {parameter[1]!r} has no {name}, or one that varies: there is no sensitivity to it"
         )
-    return number, material, _component(asked, list(CONSTANTS[name]) if len(components) > 1 else [])
+    return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 
 
-def _component(asked: Asked, names: Sequence[str]) -> int | None:
-    """Return the number of the component that is asked for; None where a constant has but one, or all are."""
-    if len(asked) == 2 and (not names or asked[0] == "expansion"):
+def _component(parameter: Label, names: Sequence[str]) -> int | None:
+    """Return the number of the requested component; None if a constant has only one, or all are requested."""
+    if len(parameter) == 2 and (not names or parameter[0] == "expansion"):
         return None
-    if len(asked) == 2:
-        raise ModelError(f"{asked[0]} of the material {asked[1]!r} has components: ask for (..., '{names[0]}')")
-    if str(asked[2]) not in names:
-        raise ModelError(unknown(f"component of {asked[0]}", str(asked[2]), names))
-    return names.index(str(asked[2]))
+    if len(parameter) == 2:
+        raise ModelError(f"{parameter[0]} of the material {parameter[1]!r} has components: ask for (..., '{names[0]}')")
+    if str(parameter[2]) not in names:
+        raise ModelError(unknown(f"component of {parameter[0]}", str(parameter[2]), names))
+    return names.index(str(parameter[2]))
 
 
 def _room(material: Material, name: str, component: int | None) -> float:
-    """Return by how much about a constant may change, all others kept."""
+    """Return the approximate range by which a constant may change, with all others fixed."""
     value = getattr(material, name)
     if name == "expansion":  # forces are linear in it
         return 1.0 / CHANGED
@@ -95,7 +95,7 @@ def _room(material: Material, name: str, component: int | None) -> float:
 
 
 def _changed(material: Material, name: str, component: int | None, by: float) -> Material:
-    """Return the material with a constant, or one of its components, changed by a number."""
+    """Return the material with a constant, or one of its components, changed by `by`."""
     value = getattr(material, name)
     if isinstance(value, tuple):
         value = tuple(v + by * (component in (None, i)) for i, v in enumerate(value))
@@ -116,7 +116,7 @@ def _with_model(problem: Problem, model: Model) -> Problem:
 
 
 def _inside(contact: MovingContact) -> Array:
-    """Return the internal forces of the materials (n_dofs,) less those of heat and initial states [force]."""
+    """Return the internal forces of the materials (n_dofs,) minus those of heat and initial states [force]."""
     problem = contact.problem
     model = problem.model
     force = np.zeros(len(contact.u))

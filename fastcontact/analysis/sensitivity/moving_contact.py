@@ -1,10 +1,10 @@
-"""Contact forces and gaps as functions of the configuration in which surfaces are paired, and their derivatives.
+"""Contact forces and gaps as functions of the configuration of the pairing, and their derivatives.
 
 Contact is paired on the deformed configuration: forces ``B.T multiplier`` and gaps ``gap0 + B u`` also depend on the
 displacement through B and gap0 (Wriggers, Computational Contact Mechanics, 2006, chapter 6). These derivatives are taken by
-central differences of the pairing alone, which is cheap and smooth; no load step is solved again for them. A point of a
-surface reaches only the constraints around it, so that points far from each other are moved at the same time (Curtis, Powell
-and Reid, J. Inst. Math. Appl. 13, 1974).
+central differences of the pairing alone, which is cheap and smooth; no load step is solved again. A point of a surface only
+affects the constraints around it, so that distant points are moved simultaneously (Curtis, Powell and Reid, J. Inst. Math.
+Appl. 13, 1974).
 """
 
 from __future__ import annotations
@@ -25,17 +25,16 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
+from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
-# By how much points are moved, in units of the shortest edge: what central differences leave is then about 1e-10.
-MOVED = 1e-5
 # By how much constants and forces are changed, relative to what is allowed, or to the largest.
 CHANGED = 1e-3
-# What differences to either side may differ by where they are smooth, relative to what turning a facet by an edge makes.
+# Largest difference of one-sided derivatives where they are smooth, over the effect of rotating a facet by an edge.
 SMOOTH = 1e-3
-# So many components are moved one by one.
+# Up to this number, components are moved one by one.
 FEW = 60
-# What moving points together may be off by, relative to the largest number, before they are moved one by one.
+# Largest error of simultaneous moves, relative to the largest number; above it points are moved one by one.
 TOGETHER = 1e-5
 
 
@@ -50,7 +49,7 @@ class Sample:
     gap : ndarray (k,)
         Gaps of the active constraints, compliance included [length].
     pressure : ndarray (n_nodes,)
-        Nodal pressures of one pair, empty where none is asked for [pressure].
+        Nodal pressures of one pair, empty if not requested [pressure].
     """
 
     force: Array
@@ -59,30 +58,30 @@ class Sample:
 
     @property
     def all(self) -> Array:
-        """All numbers, one behind the other."""
+        """All values, concatenated."""
         return np.concatenate([self.force, self.gap, self.pressure])
 
 
 @dataclass(frozen=True, eq=False)
 class MovingContact:
-    """The contact of a load step with its multipliers held, wherever its surfaces are paired.
+    """The contact of a load step with fixed multipliers, for any pairing of its surfaces.
 
     Attributes
     ----------
     problem : Problem
     state : State
-        At the beginning of the step.
+        State at the beginning of the step.
     load : StepLoad
     instant : float
-        The pseudo-time of its end.
+        Pseudo-time at the end of the step.
     u : ndarray (n_dofs,)
         Displacements of the step [length].
     solution : Solution
         Multipliers and active set of the step.
     closed : ndarray of bool (n_nodes,), optional
-        The closed nodes of the contact pair whose pressures are asked for.
+        Closed nodes of the contact pair whose pressures are requested.
     pair : str
-        That pair; empty for none.
+        Name of that pair; empty for none.
     """
 
     problem: Problem
@@ -109,7 +108,7 @@ class MovingContact:
         return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
 
     def at(self, u: Array) -> Sample:
-        """Return forces, gaps and pressures of surfaces paired at u (n_dofs,), the displacements kept [length]."""
+        """Return forces, gaps and pressures of surfaces paired at u (n_dofs,), at fixed displacements [length]."""
         constraints, multiplier = self.constraints_at(u), self.solution.multiplier
         if len(constraints) != len(multiplier):
             raise ModelError(
@@ -131,26 +130,27 @@ class MovingContact:
         return nodal_pressure(self.problem.pairs[self.pair], constraints.parts[self.pair], forces, self.closed)
 
     def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
-        """Return the derivative of `Sample.all` by a parameter; `changed` is the contact with it changed by a number."""
+        """Return the derivative of `Sample.all`; `changed` returns the contact with the parameter changed by a number."""
         return np.asarray((changed(by).at(self.u).all - changed(-by).at(self.u).all) / (2.0 * by))
 
     @cached_property
     def step(self) -> float:
-        """By how much points are moved [length]."""
+        """Step by which points are moved [length]."""
         edges = [np.inf]
         for block in (block for side in self._surfaces() for block in side.blocks):
             corners = self.problem.model.mesh.points[block.facets]
             edges.append(float(np.linalg.norm(np.ptp(corners, axis=1), axis=1).min()))
-        return MOVED * min(edges)
+        return DIFFERENCES * min(edges)
 
     def _surfaces(self) -> list[Surface]:
         pairs = self.problem.pairs.values()
         return [side for pair in pairs for side in (pair.secondary, pair.primary) if isinstance(side, Surface)]
 
     def derivatives(self) -> tuple[csr_array, csr_array]:
-        """Return the derivatives (n, n_dofs) of `Sample.all` by where the surfaces are paired, forward and backward.
+        """Return forward and backward derivatives (n, n_dofs) of `Sample.all` with respect to the paired configuration.
 
-        Their mean is the derivative. Where they differ by more than the step, a point lies on the line between two facets.
+        Their mean is the derivative. Where they differ by more than the effect of the step, a point lies on the line
+        between two facets.
         """
         n = len(self.u)
         size = n + len(self.active) + (len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0)
@@ -160,23 +160,21 @@ class MovingContact:
             return csr_array((size, n)), csr_array((size, n))
         if len(dofs) > FEW:
             owner = self._reached()
-            derivatives = self._differences(_apart(dofs, owner, self.problem.model.mesh.dim), owner)
+            derivatives = self._differences(_independent_groups(dofs, owner, self.problem.model.mesh.dim), owner)
             if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
                 return derivatives
         return self._differences([np.array([dof]) for dof in dofs], None)
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
-        """Return half of what the two `derivatives` differ by where that is no matter of the step: where points lie on the
-        line between two facets.
-        """
-        apart, n = csr_array(0.5 * (forward - backward)), len(self.u)
-        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * MOVED / self.step
-        row = np.repeat(np.arange(apart.shape[0]), np.diff(apart.indptr))
-        # Pressures follow forces: where those have no kink, they have none.
+        """Return half the difference of the two `derivatives` where points lie on the line between two facets."""
+        jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
+        force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
+        row = np.repeat(np.arange(jump.shape[0]), np.diff(jump.indptr))
+        # Pressures follow from forces: they are smooth where forces are.
         size = np.where(row < n, force, np.where(row < n + len(self.active), 1.0, np.inf))
-        apart.data[np.abs(apart.data) <= SMOOTH * size] = 0.0
-        apart.eliminate_zeros()
-        return apart
+        jump.data[np.abs(jump.data) <= SMOOTH * size] = 0.0
+        jump.eliminate_zeros()
+        return jump
 
     def _moving_dofs(self) -> Indices:
         """Return the displacement components that active constraints may depend on."""
@@ -188,7 +186,7 @@ class MovingContact:
 
     @cached_property
     def _involved(self) -> csr_array:
-        """Which points (n_points,) active constraints (k,) involve, 1 or 0."""
+        """Incidence (0 or 1) of active constraints (k,) and the points (n_points,) that they involve."""
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
         row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))[keep]
@@ -199,7 +197,7 @@ class MovingContact:
         return _ones(pattern)
 
     def _reached(self) -> csr_array:
-        """Return which points (n_points,) active constraints (k,) may depend on: those they involve, and those around."""
+        """Return the points (n_points,) on which active constraints (k,) may depend: those involved, and their neighbours."""
         n = self.problem.model.mesh.n_points
         near = eye_array(n, format="csr")
         for side in self._surfaces():
@@ -232,7 +230,7 @@ class MovingContact:
         return forward, backward
 
     def _owners(self, rows: Indices, dofs: Indices, owner: csr_array) -> Indices:
-        """Return which of the components `dofs`, moved together, has changed each of the numbers `rows`."""
+        """Return which of the components `dofs`, moved together, has changed each of the values `rows`."""
         dim, n = self.problem.model.mesh.dim, len(self.u)
         by_constraint = np.full(owner.shape[0], dofs[0])
         by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
@@ -250,7 +248,7 @@ class MovingContact:
         return everywhere[rows].astype(np.intp)
 
     def _agrees(self, derivative: csr_array, dofs: Indices) -> bool:
-        """Return whether the derivative is that along a direction in which all points move at once."""
+        """Return whether the derivative agrees with that along a direction in which all points move."""
         shift = np.zeros(len(self.u))
         shift[dofs] = np.random.default_rng(0).uniform(-1.0, 1.0, len(dofs))
         difference = (self.at(self.u + self.step * shift).all - self.at(self.u - self.step * shift).all) / (
@@ -262,8 +260,8 @@ class MovingContact:
         return all(off[p].max(initial=0.0) <= TOGETHER * np.abs(difference[p]).max(initial=0.0) for p in parts)
 
 
-def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
-    """Return the components in groups of which no two reach the same constraint, or constraints of common points."""
+def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
+    """Return groups of components of which no two affect the same constraint, or constraints of common points."""
     n_points = reached.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)
     around = _ones(csr_array(reached.T @ reached))
@@ -271,8 +269,8 @@ def _apart(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
     colour: dict[int, int] = {}
     for point in points.tolist():
         neighbours = further.indices[further.indptr[point] : further.indptr[point + 1]].tolist()
-        taken = {colour[other] for other in neighbours if other in colour}
-        colour[point] = next(c for c in range(len(points)) if c not in taken)
+        used = {colour[other] for other in neighbours if other in colour}
+        colour[point] = next(c for c in range(len(points)) if c not in used)
     groups: list[Indices] = []
     for c in range(max(colour.values(), default=-1) + 1):
         group = np.array([p for p, c_of_node in colour.items() if c_of_node == c], np.intp)

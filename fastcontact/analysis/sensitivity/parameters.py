@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
-from fastcontact.analysis.sensitivity.quantities import Asked
+from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.analysis.wear import Worn
 from fastcontact.arrays import Array
 from fastcontact.elasticity.inertia_loads import Centrifugal
@@ -42,9 +42,9 @@ FORMS = {
 WITH_COMPONENT = (*CONSTANTS, "prescribed")
 
 
-def check_parameter(model: Model, asked: Asked) -> None:
+def check_parameter(model: Model, parameter: Label) -> None:
     """Raise ModelError if a model has no such parameter."""
-    kind = str(asked[0]) if asked else ""
+    kind = str(parameter[0]) if parameter else ""
     if kind == "friction":
         raise ModelError(
             "results have no sensitivity by friction: where all sticks they do not depend on it, and where it slides they "
@@ -52,21 +52,21 @@ def check_parameter(model: Model, asked: Asked) -> None:
         )
     if kind not in FORMS:
         raise ModelError(unknown("parameter", kind, FORMS))
-    if len(asked) not in (2, 3 if kind in WITH_COMPONENT else 2):
-        raise ModelError(f"the parameter {asked} must have the form {FORMS[kind]}")
-    KINDS[kind][0](model, asked)
+    if len(parameter) not in (2, 3 if kind in WITH_COMPONENT else 2):
+        raise ModelError(f"the parameter {parameter} must have the form {FORMS[kind]}")
+    KINDS[kind][0](model, parameter)
 
 
-def change_by(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change of the residual by a parameter that `check_parameter` has accepted."""
-    return KINDS[str(asked[0])][1](contact, asked)
+def change_by(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change of the residual with a parameter that `check_parameter` has accepted."""
+    return KINDS[str(parameter[0])][1](contact, parameter)
 
 
-def _one(kind: str, known: Mapping[str, Any], asked: Asked) -> Any:
+def _item(kind: str, known: Mapping[str, Any], parameter: Label) -> Any:
     """Return the item of a given name; ModelError if there is none."""
-    if asked[1] not in known:
-        raise ModelError(unknown(kind, str(asked[1]), known))
-    return known[str(asked[1])]
+    if parameter[1] not in known:
+        raise ModelError(unknown(kind, str(parameter[1]), known))
+    return known[str(parameter[1])]
 
 
 def _nothing(contact: MovingContact) -> Change:
@@ -76,26 +76,26 @@ def _nothing(contact: MovingContact) -> Change:
 
 
 def _on(items: Sequence[Item], group: str) -> list[Item]:
-    """Return the loads or temperatures that act on a group, of those that act on others as well the part on it."""
+    """Return the loads or temperatures that act on a group, restricted to it."""
     return [
         item if len(item.places) == 1 else replace(item, groups=(group,))  # type: ignore[type-var]
         for item in items if group in item.places
     ]  # fmt: skip
 
 
-def _named(kind: str, items: Sequence[Item], asked: Asked, others: Sequence[str] = ()) -> list[Item]:
-    """Return the loads or temperatures on a group; ModelError if there are none, and no other thing has that name."""
-    items_of_group = _on(items, str(asked[1]))
-    if not items_of_group and asked[1] not in others:
+def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
+    """Return the loads or temperatures on a group; ModelError if there are none, and `others` lack the name."""
+    items_of_group = _on(items, str(parameter[1]))
+    if not items_of_group and parameter[1] not in others:
         names = [place for item in items for place in item.places]
-        raise ModelError(unknown(kind, str(asked[1]), list(dict.fromkeys([*names, *others]))))
+        raise ModelError(unknown(kind, str(parameter[1]), list(dict.fromkeys([*names, *others]))))
     return items_of_group
 
 
-def _loads(model: Model, asked: Asked) -> list[Load]:
-    """Return the loads on a group; none for a rigid obstacle that a force drives."""
+def _loads(model: Model, parameter: Label) -> list[Load]:
+    """Return the loads on a group; none for a force-driven obstacle."""
     driven = [pair.name for pair in model.force_driven.pairs]
-    return _named("group with a load, or obstacle with a force,", model.loads, asked, driven)
+    return _named("group with a load, or obstacle with a force,", model.loads, parameter, driven)
 
 
 def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
@@ -107,11 +107,11 @@ def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
     return force
 
 
-def _of_load(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the loads on a group, or of the force on an obstacle."""
+def _of_load(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with the factor of the loads on a group, or of the force on an obstacle."""
     problem = contact.problem
-    driven = problem.force_driven.number(str(asked[1]))
-    out = -_forces(contact, _loads(problem.model, asked))
+    driven = problem.force_driven.number(str(parameter[1]))
+    out = -_forces(contact, _loads(problem.model, parameter))
     if driven is not None:
         pair = problem.force_driven.pairs[driven]
         force = [value or 0.0 for value in pair.force]
@@ -120,44 +120,44 @@ def _of_load(contact: MovingContact, asked: Asked) -> Change:
     return replace(_nothing(contact), out=out)
 
 
-def _speeds(model: Model, asked: Asked) -> list[Centrifugal]:
+def _speeds(model: Model, parameter: Label) -> list[Centrifugal]:
     """Return the centrifugal forces on a group."""
     turning = [load for load in model.loads if isinstance(load, Centrifugal)]
-    return _named("group with a centrifugal force", turning, asked)
+    return _named("group with a centrifugal force", turning, parameter)
 
 
-def _of_speed(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the angular speed of a group, with whose square its forces grow."""
-    loads = [load for load in _speeds(contact.problem.model, asked) if load.speed]
+def _of_speed(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with the angular speed of a group; forces are proportional to its square."""
+    loads = [load for load in _speeds(contact.problem.model, parameter) if load.speed]
     out = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
     return replace(_nothing(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
 
 
-def _temperatures(model: Model, asked: Asked) -> list[Temperature]:
+def _temperatures(model: Model, parameter: Label) -> list[Temperature]:
     """Return the temperatures of a group."""
-    return _named("group with a temperature", model.temperatures, asked)
+    return _named("group with a temperature", model.temperatures, parameter)
 
 
-def _of_temperature(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the rise of the temperatures of a group."""
+def _of_temperature(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with the factor of the temperature rise of a group."""
     problem, change = contact.problem, _nothing(contact)
     heated = copy.copy(problem.model)
-    heated.temperatures = _temperatures(heated, asked)
+    heated.temperatures = _temperatures(heated, parameter)
     forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, heated.mesh.points.shape)
     change.out[: heated.n_dofs] = -forces.ravel()
     return change
 
 
-def _pretension(model: Model, asked: Asked) -> Pretension:
+def _pretension(model: Model, parameter: Label) -> Pretension:
     """Return a pretension section."""
-    section: Pretension = _one("pretension", {item.label: item for item in model.pretensions}, asked)
+    section: Pretension = _item("pretension", {item.label: item for item in model.pretensions}, parameter)
     return section
 
 
-def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the force of a pretension section, or of its shortening."""
+def _of_pretension(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with the factor of the force of a pretension section, or of its shortening."""
     model = contact.problem.model
-    section = _pretension(model, asked)
+    section = _pretension(model, parameter)
     if section.shortening is not None:
         along = [i for i, relation in enumerate(model.relations) if relation.name == section.prescribed]
         return _lifted(contact, np.zeros(contact.problem.shape), along)
@@ -165,27 +165,27 @@ def _of_pretension(contact: MovingContact, asked: Asked) -> Change:
     return replace(_nothing(contact), out=-_forces(contact, forces))
 
 
-def _prescribing(model: Model, asked: Asked) -> tuple[list[Support], list[int]]:
-    """Return the supports on a group, and the numbers of relations that prescribe its displacement along normals."""
-    group, only = asked[1], "xyz".find(str(asked[2])) if len(asked) == 3 else None
+def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[int]]:
+    """Return the supports on a group, and the numbers of constraints that prescribe its displacement along normals."""
+    group, only = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
-    kinds = ("normal", "x", "y", "z") if only is None else (str(asked[2]),)
+    kinds = ("normal", "x", "y", "z") if only is None else (str(parameter[2]),)
     names = [f"the displacement {kind} prescribed on '{group}'" for kind in kinds]
     wanted = {*(name for name in names if "normal" in name.split()[2]), *(f"{name} along axes" for name in names)}
     along = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
     if not (supports or along):
         known = list(dict.fromkeys(s.group for s in model.supports))
-        raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, asked[1:])), known))
+        raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, parameter[1:])), known))
     return supports, along
 
 
-def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the load factor of prescribed displacements of a group."""
+def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with the load factor of prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
-    supports, along = _prescribing(model, asked)
+    supports, along = _prescribing(model, parameter)
     if any(support.rotation is not None for support in supports):
-        raise ModelError(f"results are not linear in the rotation of '{asked[1]}': no sensitivity by it is there")
+        raise ModelError(f"results are not linear in the rotation of '{parameter[1]}': no sensitivity by it is there")
     values = np.zeros(problem.shape)
     for support in supports:
         nodes = model.mesh.points_of(support.group)
@@ -197,7 +197,7 @@ def _of_prescribed(contact: MovingContact, asked: Asked) -> Change:
 
 
 def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Change:
-    """Return the change by prescribed displacements (n_points, dim) [length] and the values of some relations."""
+    """Return the change with prescribed displacements (n_points, dim) [length] and the values of some constraints."""
     problem = contact.problem
     factors = [
         multiplier(relation.ramp, problem.ramp, contact.instant) if i in along else 0.0
@@ -207,17 +207,17 @@ def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Chan
     return replace(_nothing(contact), lift=lift)
 
 
-def _moved(model: Model, asked: Asked) -> ContactPair:
-    """Return the pair of a rigid obstacle that is moved."""
+def _moved(model: Model, parameter: Label) -> ContactPair:
+    """Return the pair of a rigid obstacle with a prescribed motion."""
     moved = {pair.name: pair for pair in model.contact if any(pair.motion)}
-    obstacle: ContactPair = _one("rigid obstacle with a motion", moved, asked)
+    obstacle: ContactPair = _item("rigid obstacle with a motion", moved, parameter)
     return obstacle
 
 
-def _of_motion(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by the factor of the motion of a rigid obstacle."""
-    problem, name = contact.problem, str(asked[1])
-    pair = _moved(problem.model, asked)
+def _of_motion(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with the factor of the motion of a rigid obstacle."""
+    problem, name = contact.problem, str(parameter[1])
+    pair = _moved(problem.model, parameter)
     motion = np.array(pair.motion) * multiplier(pair.ramp, problem.ramp, contact.instant)
     number = problem.force_driven.number(name)
     if number is not None:
@@ -236,15 +236,15 @@ def _of_motion(contact: MovingContact, asked: Asked) -> Change:
     return replace(_nothing(contact), sample=contact.along(changed, contact.step / size))
 
 
-def _opened(model: Model, asked: Asked) -> None:
-    """Refuse clearances of pairs that are not there, or tied."""
-    if _one("contact pair", {pair.name: pair for pair in model.contact}, asked).options.get("kind") == "tied":
-        raise ModelError(f"contact '{asked[1]}' is tied: it keeps its gaps, and has no clearance")
+def _opened(model: Model, parameter: Label) -> None:
+    """Refuse clearances of pairs that do not exist or are tied."""
+    if _item("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
+        raise ModelError(f"contact '{parameter[1]}' is tied: it keeps its gaps, and has no clearance")
 
 
-def _of_clearance(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by a length that is added to the gap of a contact pair."""
-    name = str(asked[1])
+def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with a length added to the gap of a contact pair."""
+    name = str(parameter[1])
     pair = contact.problem.pairs[name]
     count = len(pair.secondary.points)
 
@@ -255,15 +255,15 @@ def _of_clearance(contact: MovingContact, asked: Asked) -> Change:
     return replace(_nothing(contact), sample=contact.along(changed, contact.step))
 
 
-def _of_constant(contact: MovingContact, asked: Asked) -> Change:
-    """Return the change by a constant of a material."""
+def _of_constant(contact: MovingContact, parameter: Label) -> Change:
+    """Return the change with a constant of a material."""
     nothing = _nothing(contact)
-    out, sample = by_constant(contact, asked)
+    out, sample = by_constant(contact, parameter)
     return replace(nothing, out=out, sample=nothing.sample if sample is None else sample)
 
 
-# By kind: what raises ModelError if there is no such parameter, and what it changes.
-KINDS: dict[str, tuple[Callable[[Model, Asked], object], Callable[[MovingContact, Asked], Change]]] = {
+# By kind: a check that raises ModelError if there is no such parameter, and the change of the residual.
+KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
     **dict.fromkeys(CONSTANTS, (check_constant, _of_constant)),
     "load": (_loads, _of_load),
     "speed": (_speeds, _of_speed),

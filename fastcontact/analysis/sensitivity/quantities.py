@@ -14,7 +14,7 @@ from fastcontact.model.model import Model
 from fastcontact.results.step import StepResult
 
 Array = NDArray[np.float64]
-Asked = tuple[str | int, ...]
+Label = tuple[str | int, ...]
 FORMS = {
     "displacement": '("displacement", point, "y")',
     "reaction": '("reaction", group, "y")',
@@ -24,52 +24,52 @@ FORMS = {
 }
 
 
-def check_quantity(model: Model, asked: Asked) -> None:
+def check_quantity(model: Model, quantity: Label) -> None:
     """Raise ModelError or MeshError if there is no such quantity of a model."""
-    kind = str(asked[0]) if asked else ""
+    kind = str(quantity[0]) if quantity else ""
     if kind not in FORMS:
         raise ModelError(unknown("quantity", kind, FORMS))
-    if len(asked) != FORMS[kind].count(",") + 1:
-        raise ModelError(f"the quantity {asked} must have the form {FORMS[kind]}")
+    if len(quantity) != FORMS[kind].count(",") + 1:
+        raise ModelError(f"the quantity {quantity} must have the form {FORMS[kind]}")
     if kind == "displacement":
-        _point(model, asked[1])
+        _point(model, quantity[1])
     elif kind == "reaction":
-        model.mesh.points_of(str(asked[1]))
-    elif asked[1] not in [pair.name for pair in model.contact]:
-        raise ModelError(unknown("contact pair", str(asked[1]), [pair.name for pair in model.contact]))
+        model.mesh.points_of(str(quantity[1]))
+    elif quantity[1] not in [pair.name for pair in model.contact]:
+        raise ModelError(unknown("contact pair", str(quantity[1]), [pair.name for pair in model.contact]))
     if kind == "pressure":
-        _point(model, asked[2])
+        _point(model, quantity[2])
     if kind in ("displacement", "reaction", "contact_force"):
-        _axis(model, asked)
+        _axis(model, quantity)
 
 
-def with_gradient(contact: MovingContact, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
-    """Return the gradient of a quantity that `check_quantity` has found, and the contact whose samples it needs.
+def with_gradient(contact: MovingContact, step: StepResult, quantity: Label) -> tuple[MovingContact, Gradient]:
+    """Return the gradient of a quantity that `check_quantity` has accepted, and the contact whose samples it needs.
 
-    ModelError if it has no sensitivities in this state.
+    Raises ModelError if the quantity has no sensitivities in this state.
     """
     none = Gradient(0.0, np.zeros(len(contact.u)), np.zeros(len(contact.active)))
-    if asked[0] == "displacement":
+    if quantity[0] == "displacement":
         model = contact.problem.model
-        dof = _point(model, asked[1]) * model.mesh.dim + _axis(model, asked)
+        dof = _point(model, quantity[1]) * model.mesh.dim + _axis(model, quantity)
         none.displacement[dof] = 1.0
         return contact, replace(none, value=float(contact.u[dof]))
-    if asked[0] == "reaction":
-        return contact, _reaction(contact, none, asked)
-    if asked[0] == "contact_force":
-        return contact, _contact_force(contact, none, step, asked)
-    return _pressure(contact, none, step, asked)
+    if quantity[0] == "reaction":
+        return contact, _reaction(contact, none, quantity)
+    if quantity[0] == "contact_force":
+        return contact, _contact_force(contact, none, step, quantity)
+    return _pressure(contact, none, step, quantity)
 
 
-def _axis(model: Model, asked: Asked) -> int:
+def _axis(model: Model, quantity: Label) -> int:
     axes = "xyz"[: model.mesh.dim]
-    if asked[-1] not in list(axes):
-        raise ModelError(unknown(f"component of the quantity {asked}", str(asked[-1]), list(axes)))
-    return axes.index(str(asked[-1]))
+    if quantity[-1] not in list(axes):
+        raise ModelError(unknown(f"component of the quantity {quantity}", str(quantity[-1]), list(axes)))
+    return axes.index(str(quantity[-1]))
 
 
 def _point(model: Model, point: str | int) -> int:
-    """Return a point, by its number or the name of a group that holds it alone."""
+    """Return a point, given by its number or the name of a group of one point."""
     if isinstance(point, str):
         return int(model.mesh.point(point))
     if not 0 <= point < model.mesh.n_points:
@@ -77,9 +77,9 @@ def _point(model: Model, point: str | int) -> int:
     return point
 
 
-def _reaction(contact: MovingContact, none: Gradient, asked: Asked) -> Gradient:
+def _reaction(contact: MovingContact, none: Gradient, quantity: Label) -> Gradient:
     model = contact.problem.model
-    axis, points = _axis(model, asked), model.mesh.points_of(str(asked[1]))
+    axis, points = _axis(model, quantity), model.mesh.points_of(str(quantity[1]))
     if model.springs:
         raise ModelError(
             "reactions of a model with springs have no sensitivities: ask for a displacement or a contact force"
@@ -88,22 +88,22 @@ def _reaction(contact: MovingContact, none: Gradient, asked: Asked) -> Gradient:
     whole[points * model.mesh.dim + axis] = 1.0
     balance = contact.problem.system.balance(whole)[0]
     if not balance.any():
-        raise ModelError(f"no support acts along {asked[-1]} on group '{asked[1]}': its reaction is zero")
+        raise ModelError(f"no support acts along {quantity[-1]} on group '{quantity[1]}': its reaction is zero")
     force = contact.at(contact.u).force if contact.problem.pairs else 0.0
     out = contact.problem.system.K @ contact.u - contact.load.force - force
     return replace(none, value=float(balance @ out), reaction=balance)
 
 
-def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, asked: Asked) -> Gradient:
-    contact_of_step, axis = step.contact[str(asked[1])], _axis(contact.problem.model, asked)
-    others = [name for name in contact.problem.pairs if name != asked[1]]
+def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, quantity: Label) -> Gradient:
+    contact_of_step, axis = step.contact[str(quantity[1])], _axis(contact.problem.model, quantity)
+    others = [name for name in contact.problem.pairs if name != quantity[1]]
     nodes = np.setdiff1d(contact_of_step.points, contact_of_step.primary_points)
     for name in others:
-        theirs = contact.problem.pairs[name]
-        shared = np.intersect1d(nodes, [*theirs.secondary.points, *getattr(theirs.primary, "points", ())])
+        other_pair = contact.problem.pairs[name]
+        shared = np.intersect1d(nodes, [*other_pair.secondary.points, *getattr(other_pair.primary, "points", ())])
         if len(shared):
             raise ModelError(
-                f"point {shared[0]} carries forces of both contact '{asked[1]}' and contact '{name}': the force of one of "
+                f"point {shared[0]} carries forces of both contact '{quantity[1]}' and contact '{name}': the force of one of "
                 "them has no sensitivity here; let the pairs share no nodes"
             )
     dim, n = contact.problem.model.mesh.dim, len(contact.u)
@@ -114,14 +114,14 @@ def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, ask
     return replace(none, value=float(contact_of_step.force[axis]), multiplier=rows @ sample[:n], sample=sample)
 
 
-def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: Asked) -> tuple[MovingContact, Gradient]:
+def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: Label) -> tuple[MovingContact, Gradient]:
     name, result = str(asked[1]), step.contact[str(asked[1])]
     row = int(result.pressure.argmax())
     if asked[0] == "pressure":
         point = _point(contact.problem.model, asked[2])
         places = np.flatnonzero(result.points == point)
         if not len(places):
-            raise ModelError(f"point {point} is no node of the secondary side of contact '{name}'")
+            raise ModelError(f"point {point} is not a node of the secondary side of contact '{name}'")
         row = int(places[0])
     if not result.active[row]:
         raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")

@@ -29,7 +29,7 @@ def settled_step(
     Raises
     ------
     ModelError
-        If the step is of another case, or depends on those before it.
+        If the step belongs to another case, or depends on earlier ones.
     """
     _check_path(model, step, criteria)
     case = restart.identity(model, ramp, criteria)
@@ -62,7 +62,7 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
                     f"of one. Take differences of two solutions, or leave out {option}"
                 )
         if pair.fluid is not None:
-            raise ModelError(f"contact '{pair.name}' has a fluid, whose place sensitivities do not know: leave it out")
+            raise ModelError(f"contact '{pair.name}' has a fluid, which sensitivities do not support: leave it out")
         if pair.options.get("kind") == "bilateral_once_closed":
             raise ModelError(
                 f"contact '{pair.name}' never opens what was closed in earlier load steps: sensitivities are those of one "
@@ -81,12 +81,12 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
 
 
 def checked_margin(contact: MovingContact, least: float) -> float:
-    """Return how near the active set is to a change, see `Sensitivities.margin`.
+    """Return the distance of the active set from a change, see `Sensitivities.margin`.
 
     Raises
     ------
     ModelError
-        If that is less than the `least` one.
+        If it is less than `least`.
     """
     constraints, solution = contact.constraints, contact.solution
     size = float(np.abs(contact.u).max(initial=0.0))
@@ -94,7 +94,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
     near = np.full(len(constraints), np.inf)
     for name, rows in constraints.rows().items():
         active, usable = solution.active[rows], constraints.usable[rows]
-        # By area: a constraint that stands for a tiny one has a tiny force.
+        # Per area: a constraint with a tiny area has a tiny force.
         areas = constraints.parts[name].areas
         force = solution.multiplier[rows] / (1.0 if areas is None else areas)
         largest = float(np.abs(force).max(initial=0.0)) or 1.0

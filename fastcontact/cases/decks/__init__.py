@@ -1,1 +1,1 @@
-"""Input decks of Abaqus and CalculiX: from keyword blocks to a model with a ramp, nothing dropped without a word."""
+"""Input decks of Abaqus and CalculiX: from keyword blocks to a model with a ramp; nothing is dropped silently."""

@@ -1,4 +1,4 @@
-"""The assembly of a deck: points in order, cells, and sets and surfaces resolved to them."""
+"""The assembly of a deck: its points and elements, and the sets and surfaces resolved to them."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.cases.decks.refusals import defined
 from fastcontact.mesh import elements
 
-# Names of sets that a message lists, and characters that it shows of one.
+# Number of set names that a message lists, and number of characters that it shows of each.
 SHOWN = 12
 LONGEST = 80
 
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of an instance: as the deck has it, its type, None for what is no solid, and its points.
+    """An element of an instance: its cell in the deck, its type (None unless it is a solid), and its points.
 
-    `row` is its place among the solids of its type, `section` what gives it its material.
+    `row` is its index among the solids of its type; its `section` assigns the material.
     """
 
     scope: str
@@ -39,13 +39,13 @@ class Element:
 
     @property
     def solid(self) -> ElementType:
-        """The type of a solid."""
+        """The element type of a solid."""
         assert self.type is not None
         return self.type
 
     @property
     def given_section(self) -> Section:
-        """The section of a solid, which every one has once sections are checked."""
+        """The section of a solid; every solid has one once sections are checked."""
         assert self.section is not None
         return self.section
 
@@ -141,7 +141,7 @@ class Assembled:
     def _entry(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         scope = entry.instance or scope
         if scope:
-            defined("instance", scope, self.content.instances, entry.location)
+            defined("instance", scope, self.content.instances, entry)
         if entry.name:
             return self._named(kind, scope, entry)
         numbers = entry.numbers
@@ -153,7 +153,7 @@ class Assembled:
         ]
         if len(numbers_there) < len(numbers):
             absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
-            self.content.note(entry.location, f"{absent} are no {kind}s and left out")
+            self.content.note(entry, f"{absent} are no {kind}s and left out")
         return (there[n] for n in numbers_there)
 
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
@@ -173,7 +173,7 @@ class Assembled:
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
     def _there(self, kind: str, scope: str) -> Mapping[int, Any]:
-        """Return the points or elements of an instance by their numbers."""
+        """Return the points or elements of an instance by number."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
     def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
@@ -192,19 +192,19 @@ class Assembled:
         return self.members("element", name, location)
 
     def node(self, name: str, location: Location) -> int:
-        """Return the only point of a node set, or of a number; errors as for `keys`, or if there are several."""
+        """Return the point of a node number, or the only one of a node set; errors as for `keys`, or if there are several."""
         nodes = self.nodes(name, location)
         if len(nodes) != 1:
             raise location.refuse(f"'{name}' holds {len(nodes)} nodes where one is needed")
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
-        """Return the elements of a surface and the place of each face among the facets of its element."""
+        """Return the elements of a surface, each with the index of its face among the facets of the element."""
         definition, scope = self.surface(name, location)
         if definition.of_nodes:
             whole, _, left = self.faces_of_nodes(definition, scope)
             if left:
-                raise definition.location.refuse(
+                raise definition.refuse(
                     f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none "
                     f"(first: node {self.number_of(left[0])}), and *{location.keyword} in line {location.line} "
                     "needs faces, TYPE=ELEMENT"
@@ -225,20 +225,20 @@ class Assembled:
         return self.surfaces[label]
 
     def surface(self, name: str, location: Location) -> tuple[SurfaceDefinition, str]:
-        """Return the definition of a surface and the instance it stands in; CaseError if there is none."""
+        """Return the definition of a surface and the instance that contains it; raises CaseError if there is none."""
         scope, rest = self.place_of(name)
         surfaces = self.part(scope).surfaces
         if rest not in surfaces:
             known = ", ".join(sorted(other.name for other in surfaces.values())) or "none"
             raise location.refuse(f"surface '{name[:80]}' is not defined; surfaces: {known}")
         if not surfaces[rest].faces:
-            raise surfaces[rest].location.refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
+            raise surfaces[rest].refuse(f"surface '{surfaces[rest].name[:80]}' has no faces")
         return surfaces[rest], scope
 
     def facet(self, element: Element, label: int, location: Location) -> int:
-        """Return the place of the face with a label, 1 and up, among the facets of its element."""
+        """Return the index of the face with a label, counted from 1, among the facets of its element."""
         if element.type is None:
-            raise location.refuse(f"element {element.number} is no solid, so it has no faces")
+            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         faces = element.type.faces
         if not 1 <= label <= len(faces):
             raise location.refuse(
@@ -249,14 +249,14 @@ class Assembled:
     def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
         """Yield the faces of an element that no other one shares."""
         if element.type is None:
-            raise location.refuse(f"element {element.number} is no solid, so it has no faces")
+            raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         facets = matching(element.type.element)
         for label in np.flatnonzero(self.free[element.type.element][element.row]).tolist():
             yield element, facets[label]
 
     @cached_property
     def free(self) -> dict[str, Mask]:
-        """Which faces (n_elements, n_faces), by label, of the solids of each kind no other solid shares."""
+        """Masks (n_elements, n_faces), by label, of the faces that no other solid shares, for each kind of solid."""
         corners, shapes = [], {}
         for name, members in self.by_kind.items():
             points = np.array([element.points for element in members], np.int32)
@@ -273,7 +273,7 @@ class Assembled:
 
     @cached_property
     def by_kind(self) -> dict[str, list[Element]]:
-        """The solids by the element that they become, each at its `row`."""
+        """The solids by type of the mesh element, each at its `row`."""
         elements: dict[str, list[Element]] = {}
         for element in self.solids:
             elements.setdefault(element.solid.element, []).append(element)
@@ -281,7 +281,7 @@ class Assembled:
 
     @cached_property
     def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
-        """Which outer faces the points have, each with its corners."""
+        """The outer faces at each point, each with its corners."""
         by_part: dict[int, list[tuple[Face, frozenset[int]]]] = {}
         for name, members in self.by_kind.items():
             facets, faces = matching(name), members[0].solid.faces
@@ -293,7 +293,7 @@ class Assembled:
         return by_part
 
     def faces_within(self, points: set[int]) -> list[Face]:
-        """Return the outer faces all of whose corners are among points."""
+        """Return the outer faces with all corners among the points."""
         near = dict.fromkeys(face for point in sorted(points) for face in self.outer.get(point, ()))
         return [face for face, corners in near if corners <= points]
 
@@ -303,7 +303,7 @@ class Assembled:
         return list(dict.fromkeys(point for name, location in given for point in self.nodes(name, location)))
 
     def number_of(self, point: int) -> str:
-        """Return how the deck names the node of a point."""
+        """Return the name of the node of a point in the deck."""
         for scope, nodes in self.index.items():
             for number, index in nodes.items():
                 if index == point:
@@ -311,7 +311,7 @@ class Assembled:
         return "of a rotation"
 
     def faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> tuple[list[Face], list[Face], list[int]]:
-        """Return the outer faces all of whose corners a surface of nodes has, those with most for other nodes, and these."""
+        """Return the outer faces within a surface of nodes, those that hold most of its other nodes, and these nodes."""
         chosen = set(self.surface_nodes(definition, scope))
         whole: list[tuple[Face, set[int]]] = []
         others: list[tuple[Face, set[int]]] = []
@@ -335,7 +335,7 @@ MATCHING: dict[str, tuple[int, ...]] = {}
 
 
 def matching(element: str) -> tuple[int, ...]:
-    """Return the facet of an element for each face that labels 1, 2, ... name."""
+    """Return the facet of an element for each of the face labels 1, 2, ..."""
     if element not in MATCHING:
         kind = ElementType("", element, "")
         facets = [frozenset(facet) for facet in elements.get(element).facets]
@@ -346,7 +346,7 @@ def matching(element: str) -> tuple[int, ...]:
 
 
 def assembled(content: Content) -> Assembled:
-    """Return the points and elements of all instances; CaseError where an element uses a node that is not there."""
+    """Return the points and elements of all instances; raises CaseError if an element uses an undefined node."""
     made, total, counts = Assembled(content), 0, {}  # type: tuple[Assembled, int, dict[str, int]]
     places = []
     for scope in made.scopes:
@@ -359,9 +359,7 @@ def assembled(content: Content) -> Assembled:
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
-                raise cell.location.refuse(
-                    f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined"
-                )
+                raise cell.refuse(f"element {number} uses node {cell.nodes[points.index(-1)]}, which is not defined")
             kind = element_type(cell.type)
             row = -1 if kind is None else counts.setdefault(kind.element, 0)
             if kind is not None:

@@ -1,4 +1,4 @@
-"""Keyword blocks of a deck: keyword, parameters and data lines, each with its file and line; included files in place."""
+"""Keyword blocks of a deck: keyword, parameters and data lines, with file and line numbers; included files in place."""
 
 from __future__ import annotations
 
@@ -10,35 +10,49 @@ from typing import NamedTuple
 
 from fastcontact.errors import CaseError, FileError
 
-# Bytes of a deck and all files it includes, and how many these are: more is an error of whoever wrote it.
+# Largest number of bytes of a deck with all included files, and of such files: a deck with more is taken for an error.
 LARGEST = 1 << 28
 MOST_FILES = 200
-# Characters of a line, a keyword with the lines on which it goes on: both programs end theirs far below.
+# Largest number of characters of a line, or of a keyword with its continuation lines; both programs allow far fewer.
 LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
 LONGEST_QUOTED = 80
-LARGEST_WHOLE = 1 << 53  # beyond, floating-point numbers leave some out
+LARGEST_WHOLE = 1 << 53  # beyond, not every integer is a floating-point number
 
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """A line of a file, and the keyword to which it belongs."""
+    """A line of a file, with the keyword it belongs to."""
 
     file: str
     line: int
     keyword: str
 
     def refuse(self, text: str) -> CaseError:
-        """Return the error that says what is wrong here."""
+        """Return the error for this location with a text."""
         return CaseError(f"{self}: {text}")
 
     def __str__(self) -> str:
         return f"{self.file}, line {self.line}, *{self.keyword}"
 
 
+class Located:
+    """Base class of deck items with a `location`, which error messages name."""
+
+    __slots__ = ()
+    location: Location
+
+    def refuse(self, text: str) -> CaseError:
+        """Return an error at the location of the item."""
+        return self.location.refuse(text)
+
+    def __str__(self) -> str:
+        return str(self.location)
+
+
 @dataclass(frozen=True, slots=True)
-class Row:
-    """A data line: its entries without blanks around them, and its place."""
+class Row(Located):
+    """A data line: its entries without surrounding blanks, and its location."""
 
     location: Location
     entries: tuple[str, ...]
@@ -49,11 +63,11 @@ class Row:
         return self.entries[index] if index < len(self.entries) else ""
 
     def number(self, index: int, default: float | None = None) -> float:
-        """Return an entry as a number, `default` where there is none; CaseError if it is no number or missing."""
+        """Return an entry as a number, or `default` where it is empty; raises CaseError if it is missing or no number."""
         text = self.text(index)
         if not text:
             if default is None:
-                raise self.location.refuse(f"entry {index + 1} is missing: a number is needed")
+                raise self.refuse(f"entry {index + 1} is missing: a number is needed")
             return default
         return as_number(self.location, text)
 
@@ -61,20 +75,20 @@ class Row:
         """Return an entry as a whole number; errors as for `number`."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_WHOLE:
-            raise self.location.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is no whole number")
+            raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
     def positive(self, index: int, quantity: str) -> float:
-        """Return an entry as a positive number; `quantity` it is says the error."""
+        """Return an entry as a positive number; the error names the `quantity`."""
         value = self.number(index)
         if not value > 0:
-            raise self.location.refuse(f"the {quantity} {value:g} must be positive")
+            raise self.refuse(f"the {quantity} {value:g} must be positive")
         return value
 
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The data lines of a keyword in the contents of a file, from a line number on: rows are made when they are asked for."""
+    """The data lines of a keyword in the contents of a file, from a line number on; rows are made on demand."""
 
     location: Location
     contents: bytes = field(repr=False)
@@ -88,7 +102,7 @@ class Lines:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class Block(Located):
     """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
 
     location: Location
@@ -102,44 +116,48 @@ class Block:
 
     @property
     def rows(self) -> list[Row]:
-        """Return the data lines that hold anything."""
+        """Return the data lines that are not empty."""
         return list(self.each())
 
     def each(self) -> Iterator[Row]:
         """Yield `rows`, one at a time."""
         return (row for row in self.lines if any(row.entries))
 
+    def numbers(self) -> list[float]:
+        """Return the entries of all data lines, which are numbers."""
+        return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
+
     def only(self, why: str = "") -> Row:
-        """Return the only data line; CaseError if there are others: constants that depend on `why`."""
+        """Return the only data line; raises CaseError if there are several: constants that depend on `why`."""
         rows = self.rows
         if len(rows) != 1:
             text = f"{len(rows)} data lines where one is needed"
-            raise self.location.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
+            raise self.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
         return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
-        """Return the value of a parameter, `default` where it is not given or has none."""
+        """Return the value of a parameter, or `default` where it is missing or has no value."""
         return self.parameters.get(name) or default
 
     def choice(self, name: str, known: tuple[str, ...]) -> str:
-        """Return the value of a parameter in upper case, the first of `known` by default; CaseError if it is another."""
+        """Return the value of a parameter in upper case, by default the first of `known`; raises CaseError for any other."""
         value = self.get(name, known[0]).upper()
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
                 return option
-        raise self.location.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
+        raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
-        """Return the value of a parameter; CaseError if there is none."""
+        """Return the value of a parameter; raises CaseError if there is none."""
         value = self.parameters.get(name)
         if not value:
-            raise self.location.refuse(f"the parameter {name} is missing")
+            raise self.refuse(f"the parameter {name} is missing")
         return value
 
 
 @dataclass
 class Source:
-    """The deck that is read: its folder, whether data lines are kept, what was read so far, and which files are open."""
+    """State of reading a deck: its folder, whether data lines are kept, the bytes and files read, and the open files."""
 
     folder: Path
     with_data: bool = True
@@ -149,23 +167,23 @@ class Source:
 
 
 def as_number(location: Location, text: str) -> float:
-    """Return a text as a finite number, also as Fortran writes it (1.D5); CaseError otherwise."""
+    """Return a text as a finite number, also in Fortran notation (1.D5); raises CaseError if it is none."""
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
-        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is no number") from None
+        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is not a number") from None
     if "_" in text or value != value or value in (float("inf"), float("-inf")):
-        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is no number that could be used")
+        raise location.refuse(f"'{text[:LONGEST_QUOTED]}' is not a usable number")
     return value
 
 
 def unquoted(text: str) -> str:
-    """Return a name without the quotation marks around it."""
+    """Return a name without its quotation marks."""
     return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
 
 
 def folded(name: str) -> str:
-    """Return a name as sets and others are looked up: in upper case, without quotation marks."""
+    """Return a name in the form used for look-up: in upper case, without quotation marks."""
     return name.replace('"', "").strip().upper()
 
 
@@ -184,7 +202,7 @@ def read_blocks(path: Path) -> Iterator[Block]:
 
 
 def files_of_deck(path: Path) -> list[Path]:
-    """Return a deck and the files that it includes, in the order in which they are read; raises like `read_blocks`."""
+    """Return a deck and the files that it includes, in reading order; errors as for `read_blocks`."""
     source = Source(path.resolve().parent, with_data=False)
     for _ in _blocks(path, path.name, source):
         pass
@@ -192,7 +210,7 @@ def files_of_deck(path: Path) -> list[Path]:
 
 
 class _Line(NamedTuple):
-    """A line without blanks around it: its number, and where it begins and the next one does."""
+    """A line without surrounding blanks, with its number and the offsets at which it and the next line begin."""
 
     number: int
     begin: int
@@ -201,7 +219,7 @@ class _Line(NamedTuple):
 
 
 def _contents(path: Path, source: Source) -> bytes:
-    """Return the bytes of a file, with lines that end as those of Unix do."""
+    """Return the bytes of a file with Unix line ends."""
     source.files.append(path)
     try:
         source.size += path.stat().st_size
@@ -216,7 +234,7 @@ def _contents(path: Path, source: Source) -> bytes:
 
 
 def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_Line]:
-    """Yield the lines between two places, one at a time: a list of all would take several times their length."""
+    """Yield the lines between two offsets, one at a time: a list of all would take several times their memory."""
     while begin < end:
         after = contents.find(b"\n", begin, end) + 1 or end
         yield _Line(number, begin, after, contents[begin:after].decode("utf-8", "replace").strip())
@@ -224,12 +242,12 @@ def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_
 
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of one file; data lines at its beginning belong to no keyword and are refused."""
+    """Yield the blocks of one file; data lines before the first keyword are refused."""
     source.open.append(path.resolve())
     current: Block | None = None
     contents = _contents(path, source)
     lines = _lines(contents, 0, len(contents))
-    last = _Line(0, 0, 0, "")  # of the current keyword
+    last = _Line(0, 0, 0, "")  # last line of the current keyword
     for line in lines:
         if line.text.startswith("**"):
             continue
@@ -254,7 +272,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
 
 
 def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: Source) -> Block:
-    """Return a block with the lines from the last one of its keyword to a place."""
+    """Return a block with the data lines from the last line of its keyword up to an offset."""
     if not source.with_data or last.end >= end:
         return block
     location = Location(block.location.file, last.number + 1, block.keyword)
@@ -262,7 +280,7 @@ def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: So
 
 
 def _continued(location: Location, line: _Line, lines: Iterator[_Line]) -> _Line:
-    """Return a keyword line with the lines on which it goes on, after a comma, as one that ends where the last one does."""
+    """Return a keyword line joined with its continuation lines, which follow a line that ends with a comma."""
     while line.text.endswith(","):
         more = next(lines, None)
         if more is None:
@@ -281,7 +299,7 @@ def _keyword(line: str) -> str:
 
 
 def _parts(line: str) -> list[str]:
-    """Return what stands between the commas of a line, without blanks around; quoted names keep their commas."""
+    """Return the entries between the commas of a line, without surrounding blanks; quoted names keep their commas."""
     if '"' not in line:
         return [part.strip() for part in line.split(",")]
     parts = [""]
@@ -301,7 +319,7 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
         key, equal, value = part.partition("=")
         key = " ".join(key.upper().split())
         if key in parameters:
-            raise location.refuse(f"the parameter {key} stands there twice")
+            raise location.refuse(f"the parameter {key} is given twice")
         if key:
             parameters[key] = unquoted(value.strip()) if equal else None
     return parameters
@@ -313,25 +331,25 @@ def _row(location: Location, line: str) -> Row:
 
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of the file that *INCLUDE names, which must lie below the folder of the deck."""
+    """Yield the blocks of the file that *INCLUDE names; it must lie below the folder of the deck."""
     given = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
-            raise block.location.refuse(f"the parameter {parameter} is not supported")
+            raise block.refuse(f"the parameter {parameter} is not supported")
     shown, path = given[:LONGEST_QUOTED], source.folder / given.replace("\\", "/")
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
         there = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
-        raise block.location.refuse(f"'{shown}' is no name of a file") from None
+        raise block.refuse(f"'{shown}' is not a file name") from None
     if not inside:
-        raise block.location.refuse(
+        raise block.refuse(
             f"'{shown}' is outside of the folder of the deck: refused, copy the file below '{source.folder}'"
         )
     if not there:
-        raise block.location.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
+        raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"
-        raise block.location.refuse(f"{target_name} includes itself")
+        raise block.refuse(f"{target_name} includes itself")
     yield from _blocks(target, given, source)

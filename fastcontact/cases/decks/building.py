@@ -1,8 +1,7 @@
-"""From the content of a deck to a model and a ramp."""
+"""Building of a model and a ramp from the content of a deck."""
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
@@ -10,8 +9,8 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array, vstack
-from scipy.spatial import cKDTree
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembled, Element, assembled
 from fastcontact.cases.decks.blocks import folded
@@ -40,28 +39,28 @@ from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 
-# What a gap of the undeformed sides may be, relative to the size of the model, and still count as none.
+# Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
 TOUCHING = 1e-6
 LONGEST_RAMP = 100_000
 
 
 class Building:
-    """A model in the making.
+    """A model under construction.
 
     Attributes
     ----------
-    made, found : the assembly and its mesh
+    made, found : the assembly and its mesh under construction
     model : Model
     thickness : float
-        Of a plane model; forces of the model are those of a unit of it [length].
+        Thickness of a plane model; the forces of the model are per unit thickness [length].
     local_supports : list of MultiPointConstraint
-        Relations that are supports: those along local axes, and those that come or go between steps.
+        Constraints that are supports: those along local axes, and those that do not act in all steps.
     linearised : str
-        Why small strains are solved although a step has NLGEOM; empty where not.
+        Reason why small strains are solved although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
-        Motions of the nodes of gap elements that belong to no solid, by point and component [length].
+        Prescribed motions of gap-element nodes that belong to no solid, by point and component [length].
     gap_ends : dict of str to dict of int to int
-        By the name of a contact made of gap elements: its nodes, and the nodes behind the gaps.
+        By name of a contact made of gap elements: the node behind the gap for each of its nodes.
     """
 
     def __init__(self, content: Content, case_text: str) -> None:
@@ -101,7 +100,7 @@ class Building:
         self.ramp = self._ramp(conditions)
 
     def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Any, Table]]) -> None:
-        """Add supports, relations, loads, temperatures and springs to the model."""
+        """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
         self.links += relations_of(self.found, self.model.mesh)
         self.model.relations += self.links
@@ -115,7 +114,7 @@ class Building:
         self._springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
-        """Return materials with groups of solids, and the thickness; every solid needs a section."""
+        """Return the materials with their groups of solids, and the thickness; every solid needs a section."""
         thickness: float | None = None
         for scope in self.made.scopes:
             for section in self.made.part(scope).sections:
@@ -123,14 +122,14 @@ class Building:
                 if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and section_thickness != thickness:
-                        raise section.location.refuse(
+                        raise section.refuse(
                             f"thickness {section_thickness:g} after {thickness:g}: plane models have one thickness"
                         )
                     thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
                 for element in self.made.elements_of(name, section.location):
                     if element.section not in (None, section):
-                        raise section.location.refuse(
+                        raise section.refuse(
                             f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
@@ -155,13 +154,13 @@ class Building:
         return materials, thickness or 1.0
 
     def _axes(self, section: Section, members: Sequence[Element]) -> Any:
-        """Return the axes of the material of a section with its elements, None for those of the mesh."""
+        """Return the material axes of a section with its elements, None for the axes of the mesh."""
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
         for element in members:
             if axes.part is not self.content.root and self.made.turned(element.scope):
-                raise axes.location.refuse(
+                raise axes.refuse(
                     "axes of a part whose instance is turned are not supported: give them in the assembly"
                 )
         if axes.distribution:
@@ -172,9 +171,9 @@ class Building:
         return tuple(tuple(row) for row in local_axes(axes, np.zeros(3)).tolist())
 
     def _material(self, section: Section) -> Material:
-        material: Material = defined("material", section.material, self.content.materials, section.location)
+        material: Material = defined("material", section.material, self.content.materials, section)
         if material.law is None and self.content.heat != "alone":
-            raise material.location.refuse(f"material '{material.name}' has no *ELASTIC")
+            raise material.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
 
     def _check_sections(self) -> None:
@@ -183,22 +182,22 @@ class Building:
             cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
             named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.location.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
+            raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
-        """Refuse pairs whose surfaces or interaction are not there."""
+        """Refuse pairs with undefined surfaces or an undefined interaction."""
         seen: set[str] = set()
         for pair in self.content.pairs:
             secondary_group(self.found, pair.secondary, pair.location)
             self.made.faces(pair.primary, pair.location)
             if not pair.tied:
-                defined("surface interaction", pair.interaction, self.content.interactions, pair.location)
+                defined("surface interaction", pair.interaction, self.content.interactions, pair)
             if folded(pair.name) in seen:
-                raise pair.location.refuse(f"the pair {pair.name} stands there twice")
+                raise pair.refuse(f"the pair {pair.name} is given twice")
             seen.add(folded(pair.name))
 
     def _groups(self, conditions: Conditions) -> list[tuple[str, Any, Table]]:
-        """Make groups of the facets whose pressures change alike; return them with their values and histories."""
+        """Make groups of the facets whose pressures have the same history; return them with values and histories."""
         alike = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
             for name in names:
@@ -209,7 +208,7 @@ class Building:
         return [(group, value, table) for group, _, _, value, table in loads]
 
     def _point_group(self, kind: str, points: Iterable[int]) -> str:
-        """Return the name of a group of points of the mesh, which is made where there is none."""
+        """Return the name of a group of points of the mesh; it is made if there is none."""
         before = len(self.found.point_groups)
         name = self.found.add_points(f"{kind} {before}", points)
         if name not in self.model.mesh.point_groups:
@@ -242,7 +241,7 @@ class Building:
             self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
 
     def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
-        """Add the supports that come or go between steps: those alike as one relation."""
+        """Add the supports that do not act in all steps; those with the same times become one constraint."""
         alike: dict[tuple[Acting, Table], list[Component]] = {}
         for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
@@ -264,7 +263,7 @@ class Building:
         self.model.relations.append(made)
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
-        """Return the row (1, n_dofs) of the displacement that a support prescribes [-]."""
+        """Return the constraint row (1, n_dofs) of the displacement that a support prescribes [-]."""
         point, axis, local = name
         dim = self.found.dim
         direction = (conditions.directions[point] if local else np.eye(3))[axis][:dim]
@@ -322,26 +321,26 @@ class Building:
         for name, (location, stiffness) in self.content.springs.items():
             for element in self.made.elements_of(name, location):
                 if element.cell.type != "SPRINGA":
-                    raise location.refuse(f"element {element.number} is no spring of type SPRINGA")
+                    raise location.refuse(f"element {element.number} is not a spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
         check_discrete(self.made, "SPRINGA", self.content.springs, "*SPRING")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-            with refusing(pair.location):
+            with refusing(pair):
                 options = self._tied(pair) if pair.tied else self._options(pair)
                 if secondary in self.found.loose:
                     options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
-        """Return the options by which some nodes alone of the facets around them are in contact."""
+        """Return the options that restrict contact to some nodes of the facets around them."""
         options: dict[str, Any] = {"excluded": self._point_group("without contact", self.found.loose[secondary])}
         if all(map(all_nodes_carry, self.found.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
-            pair.location, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
+            pair, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
             "them are in contact"
         )  # fmt: skip
         return options
@@ -355,7 +354,7 @@ class Building:
             return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
-                raise law.location.refuse(f"friction with {law.kind} contact is not supported")
+                raise law.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
@@ -365,16 +364,16 @@ class Building:
         return {**options, **self._fitted(pair)}
 
     def _tied(self, pair: Pair) -> dict[str, Any]:
-        """Return the options of a tie, through which heat passes where it is computed."""
+        """Return the options of a tie, with a conductance where heat is computed."""
         if not self.content.heat:
             return {"kind": "tied"}
         kind = "gap_only" if self.content.heat == "alone" else "tied"
         return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
-        """Return the clearance that brings the sides to where ADJUST or *CLEARANCE say; refused where no number does.
+        """Return the clearance that closes the sides as ADJUST or *CLEARANCE prescribe; refused where one number cannot.
 
-        CaseError where sides that are `glued` are apart, which they would not be where they do not touch.
+        Raises CaseError if `glued` sides have a gap, across which the layer would not act.
         """
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
@@ -383,13 +382,11 @@ class Building:
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
             if gaps.max() > size or pair.clearance is not None:
-                raise pair.location.refuse(
-                    f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported"
-                )
+                raise pair.refuse(f"a cohesive layer between sides that are {gaps.max():.6g} apart is not supported")
             return {}
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
-                raise pair.location.refuse(
+                raise pair.refuse(
                     f"*CLEARANCE is supported between sides of one distance, these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
@@ -397,7 +394,7 @@ class Building:
         try:
             within = float(pair.adjust)
         except ValueError:
-            raise pair.location.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
+            raise pair.refuse(f"ADJUST={pair.adjust[:40]}: only a distance is supported") from None
         moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
         if not len(moved):
             return {}
@@ -406,14 +403,14 @@ class Building:
             if np.ptp(gaps) <= size
             else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
         )
-        self.content.note(pair.location, f"ADJUST: the distance {apart} of the sides counts as none")
+        self.content.note(pair, f"ADJUST: the distance {apart} of the sides counts as none")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
-        nodes, closing = cKDTree(places), -np.where(gaps <= within, gaps, 0.0)
-        return {"clearance": lambda points: closing[nodes.query(points)[1]]}
+        closing = -np.where(gaps <= within, gaps, 0.0)
+        return {"clearance": lambda points: closing[nearest(places, points)[1]]}
 
     def _ramp(self, conditions: Conditions) -> Ramp:
-        """Return the ends of all steps, of the increments of steps with friction, and the corners of all histories."""
+        """Return the ramp: ends of all steps, of increments of steps with friction, and the corners of all histories."""
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
         if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
@@ -424,23 +421,23 @@ class Building:
             for track in histories.distinct():
                 instants.update(round(time, 12) for time, _ in track.points if abs(time - round(time)) > 1e-6)
         if len(instants) > LONGEST_RAMP:
-            raise steps[0].location.refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
+            raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
 
 
 def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the options of a pair for its friction, which *CHANGE FRICTION changes at the beginning of steps."""
+    """Return the friction options of a pair; *CHANGE FRICTION changes them at the beginning of steps."""
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.location.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+            raise changed.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
         table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
         sticks |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
     if not largest:
         return {}
     if len(sticks) > 1:
-        raise law.changes[0][1].location.refuse("a stick slope that changes is not supported: give the same one")
+        raise law.changes[0][1].refuse("a stick slope that changes is not supported: give the same one")
     options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
@@ -449,74 +446,61 @@ def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
 
 
 def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model along axes, with its expansion and incompatible modes where elements have them."""
+    """Return the material of the model along axes, with its expansion, and with incompatible modes if elements have them."""
     if content.heat == "alone":
         return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
     law, expansion = material.law(axes), material.expansion
+    law = replace(law, density=material.density)
     if isinstance(law, NonlinearElastic) and modes:
-        content.note(
-            material.location, f"material '{material.name}': incompatible modes are left out, since it is nonlinear"
-        )
-        modes = False
-    law = _with(law, incompatible_modes=modes, density=material.density)
+        content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
+    elif modes:
+        law = replace(law, incompatible_modes=True)
     if content.heat or material.conductivity is not None:
         law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
-            content.note(
-                material.location, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it"
-            )
-        return _with(law, expansion=0.0) if heated else law
+            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+        return replace(law, expansion=0.0) if heated else law
     if not heated:
-        content.note(material.location, f"material '{material.name}': without temperatures the expansion has no effect")
+        content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
     return _with_axes(material, law, axes, expansion=expansion)
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; CaseError where heat is computed and there is none."""
+    """Return the conductivity of a material; raises CaseError if heat is computed and there is none."""
     block = material.conductivity
     if content.heat:
         if block is None:
-            raise material.location.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+            raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
         return conductivity_of(material, block)
     if block is not None:
-        content.note(block.location, f"material '{material.name}': no effect, temperatures are given, not computed")
+        content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
     return None
 
 
-def _with(law: Any, **constants: Any) -> Any:
-    """Return a material with further constants; hyperelastic ones are not made from their fields."""
-    if not isinstance(law, NonlinearElastic):
-        return replace(law, **constants)
-    law = copy.copy(law)
-    for name, value in constants.items():
-        object.__setattr__(law, name, value)
-    return law
-
-
 def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
-    """Return a material with further constants, orthotropic where these differ along the axes."""
+    """Return a material with further constants; it becomes orthotropic where they differ along the axes."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, NonlinearElastic):
-            raise material.location.refuse(
+            raise material.refuse(
                 f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
         kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
         law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
-    return _with(law, **constants)
+    return replace(law, **constants)
 
 
 def _parts(step: Step) -> list[float]:
-    """Return the ends of equal increments inside of a step, of its length."""
+    """Return the ends of the equal increments inside a step, as fractions of its length."""
     count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
     return [k / count for k in range(1, count)]
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
-    """Return the components of a body force at the value 1 of its history, of cells with the factor `value`."""
+    """Return the components of a body force where its history is 1, for cells with the factor `value`."""
 
     def times(component: Any) -> Any:
         if not callable(value):
@@ -539,9 +523,9 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
 
 
 def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:
-    """Return how far nodes of one side that face the other are from it (n,), and where they are (n, dim) [length].
+    """Return the gaps (n,) of the nodes of one side that face the other, and their positions (n, dim) [length].
 
-    Those `without` contact are left out.
+    Nodes in `without` are left out.
     """
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair

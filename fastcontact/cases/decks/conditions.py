@@ -19,13 +19,13 @@ from fastcontact.cases.decks.temperatures import initial_temperatures
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
-# Point and component from 0; of supports on local axes component from 0 and True.
+# Point and component, counted from 0; supports on local axes have True as a third entry.
 Component = tuple[int, int, bool]
 
 
 @dataclass(frozen=True, slots=True)
 class Distributed:
-    """What a distributed load acts on: its kind, facets or elements, and its direction or axis."""
+    """Target of a distributed load: its kind, its facets or elements, and its direction or axis."""
 
     keyword: str
     kind: str
@@ -36,7 +36,7 @@ class Distributed:
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """When a support acts, as load factors, whether it keeps what it finds, and where it is given if not from the start."""
+    """Load factors between which a support acts, whether it holds the current value, and its line if it starts late."""
 
     location: Location | None
     begins: float
@@ -59,7 +59,7 @@ class Conditions:
         self.loads: Histories[Distributed] = Histories(content)
         initial = initial_temperatures(self.made, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
-        self.acting: dict[Component, Acting] = {}  # where a support acts, if not from the start on
+        self.acting: dict[Component, Acting] = {}  # supports that do not act from the start
         self.over: list[tuple[Component, Acting]] = []
         self.keeping: set[Component] = set()
         self.heat = HeatConditions(mesh, initial)
@@ -95,7 +95,7 @@ class Conditions:
             {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
     def _change(self, number: int) -> None:
-        """Take note of the supports that come and go at the beginning of step `number`."""
+        """Record the supports that begin or end at the beginning of step `number`."""
         begin, changing = number - 1.0, self.supports.changing
         kept = (name for name in self.acting if name in changing and name not in self.keeping)
         moved = dict.fromkeys(name for name in kept if self._acts(name) and self.acting[name].keeps)
@@ -109,16 +109,16 @@ class Conditions:
         self.keeping.clear()
 
     def _acts(self, name: Component) -> bool:
-        """Whether the steps so far have left a support in place."""
+        """Whether a support is still active after the steps so far."""
         track = self.supports.tracks.get(name)
         return track is not None and track.alive
 
     def temporary(self) -> list[tuple[Component, Acting]]:
-        """Return the supports that do not act in all steps, each with when it does."""
+        """Return the supports that do not act in all steps, each with its period."""
         return [*self.over, *((name, acting) for name, acting in self.acting.items() if acting.begins > 0.0)]
 
     def named(self, component: Component) -> str:
-        """Return a component of a point as the deck names it."""
+        """Return the name of a component of a point in the deck."""
         point, axis, _ = component
         if point >= sum(map(len, self.made.index.values())):
             return f"rotation {axis + 1} of a reference node"
@@ -128,7 +128,7 @@ class Conditions:
         block = given.block
         kind = block.get("TYPE", "DISPLACEMENT").upper()
         if kind != "DISPLACEMENT":
-            raise block.location.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
+            raise block.refuse(f"TYPE={kind} is not supported, only DISPLACEMENT")
         if given.new:
             self.supports.forget()
             self.heat.temperatures.forget()
@@ -140,25 +140,25 @@ class Conditions:
             points = self.made.nodes(row.text(0), row.location)
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
-                raise row.location.refuse(f"{row.text(1)} is not supported: give the components")
+                raise row.refuse(f"{row.text(1)} is not supported: give the components")
             first = 1 if named else row.whole(1)
             last = first if named else row.whole(2, first)
             value = 0.0 if named else row.number(3, 0.0)
             if not 1 <= first <= last <= 6:
-                raise row.location.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
+                raise row.refuse(f"components {row.text(1)} to {row.text(2)} are not within 1 to 6")
             driven = driven or bool(before and value)
             components = named or tuple(range(first, last + 1))
             for point in points:
                 for component in components:
                     self._support(given, row, point, component, value)
         if driven:
-            self.made.content.note(block.location, "a displacement before the first step is reached in that step")
+            self.made.content.note(block, "a displacement before the first step is reached in that step")
 
     def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
         name = self._component(point, component)
         if name is None:
             if value:
-                raise row.location.refuse(f"component {component} does not exist at nodes of this model")
+                raise row.refuse(f"component {component} does not exist at nodes of this model")
             return
         if self.locks.take(point, component, "FIXED" in given.block.parameters):
             return
@@ -173,7 +173,7 @@ class Conditions:
         self.supports.give(name, sign * value, given.amplitude, row.location)
 
     def _component(self, point: int, component: int) -> Component | None:
-        """Return the displacement component of a point, or of the point of its rotation; None where there is none."""
+        """Return the displacement component of a point, or of its rotation point; None if there is none."""
         dim = self.mesh.dim
         if component <= dim:
             return point, component - 1, False
@@ -183,7 +183,7 @@ class Conditions:
         return None
 
     def _local(self, point: int, component: int) -> tuple[Component, float]:
-        """Return the component along a local axis: a global one with its sign where the axis is parallel to it."""
+        """Return the component along a local axis: a global component with its sign where the axis is parallel to it."""
         direction = self.directions[point][component - 1]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.mesh.dim:
@@ -198,7 +198,7 @@ class Conditions:
             for point in self.made.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
                 if name is None:
-                    raise row.location.refuse(f"a force cannot act on component {component} of this node")
+                    raise row.refuse(f"a force cannot act on component {component} of this node")
                 self.forces.give(
                     (*name[:2], point in self.directions and component <= 3), value, given.amplitude, row.location
                 )
@@ -215,7 +215,7 @@ class Conditions:
         label = row.text(1).upper()
         if keyword == "DSLOAD":
             if label != "P":
-                raise row.location.refuse(f"load {label[:40]} on a surface is not supported, only P")
+                raise row.refuse(f"load {label[:40]} on a surface is not supported, only P")
             faces, value = self.made.faces(row.text(0), row.location), row.number(2)
             return [(Distributed(keyword, "P", face), value) for face in faces]
         elements = self.made.elements_of(row.text(0), row.location) if row.text(0) else self.made.solids
@@ -224,10 +224,8 @@ class Conditions:
             return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
         size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
         if size is None:
-            raise row.location.refuse(
-                f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ"
-            )
+            raise row.refuse(f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ")
         vector = tuple(row.number(3 + i, 0.0) for i in range(size))
         if size and not any(vector[-3:]):
-            raise row.location.refuse(f"the direction of {label} is missing")
+            raise row.refuse(f"the direction of {label} is missing")
         return [(Distributed(keyword, label, None, tuple(elements), vector), row.number(2))]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from fastcontact.cases.decks.blocks import Block, Row, as_number, unquoted
+from collections.abc import Iterator
+
+from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Equation, Link, MultiPoint, Pair, Pin
 from fastcontact.cases.decks.cyclic_symmetry import sector_ends
 from fastcontact.cases.decks.multi_points import LEAST
 
-# Terms of an equation: more tie everything to everything.
+# Largest number of terms of an equation: more would couple everything to everything.
 MOST_TERMS = 100_000
 
 
@@ -15,21 +17,25 @@ def contact_pair(content: Content, block: Block) -> None:
     """*CONTACT PAIR: the first surface of a line is the secondary side."""
     kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
     if block.choice("TYPE", kinds) == "NODE TO SURFACE":
-        content.note(
-            block.location, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes"
-        )
+        content.note(block, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes")
     if "SMALL SLIDING" in block.parameters:
-        content.note(block.location, "SMALL SLIDING: sides are paired on the deformed shape all the same")
+        content.note(block, "SMALL SLIDING: sides are paired on the deformed shape nevertheless")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
+    content.pairs += [
+        Pair(*sides, block.required("INTERACTION"), adjust=adjust) for sides in _sides(block, "a contact pair")
+    ]
+
+
+def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
+    """Yield the place of each data line, and the secondary and the primary surface that it names."""
     for row in block.each():
         if len([entry for entry in row.entries if entry]) != 2:
-            raise row.location.refuse("a contact pair needs two surfaces, the secondary and the primary one")
-        secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
-        content.pairs.append(Pair(row.location, secondary, primary, block.required("INTERACTION"), adjust=adjust))
+            raise row.refuse(f"{kind} needs two surfaces, the secondary and the primary one")
+        yield row.location, unquoted(row.text(0)), unquoted(row.text(1))
 
 
 def clearance(content: Content, block: Block) -> None:
-    """*CLEARANCE: the initial distance of the sides of a pair, whatever the coordinates say."""
+    """*CLEARANCE: the initial gap between the sides of a pair, irrespective of the coordinates."""
     secondary = block.get("SLAVE") or block.get("SECONDARY")
     primary = block.get("MASTER") or block.get("MAIN")
     value = as_number(block.location, block.required("VALUE"))
@@ -37,11 +43,11 @@ def clearance(content: Content, block: Block) -> None:
         if (pair.secondary.upper(), pair.primary.upper()) == (secondary.upper(), primary.upper()):
             pair.clearance = value
             return
-    raise block.location.refuse(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
+    raise block.refuse(f"there is no contact pair of '{secondary}' and '{primary}' above this line")
 
 
 def tie(content: Content, block: Block) -> None:
-    """*TIE: sides that neither open nor slide."""
+    """*TIE: surfaces that neither open nor slide."""
     if "CYCLIC SYMMETRY" in block.parameters:
         content.sector_ends.append(sector_ends(block))
         return
@@ -50,36 +56,32 @@ def tie(content: Content, block: Block) -> None:
     adjust = block.choice("ADJUST", ("YES", "NO"))
     if value is not None:
         if value < 0.0:
-            raise block.location.refuse(f"POSITION TOLERANCE={value:g} is negative")
+            raise block.refuse(f"POSITION TOLERANCE={value:g} is negative")
         content.note(
-            block.location,
+            block,
             f"POSITION TOLERANCE={value:g}: no effect, the surfaces are tied where they face each other, at any distance, "
             "not node by node",
         )
     if adjust == "YES" and "ADJUST" in block.parameters:
-        content.note(block.location, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
-    for row in block.each():
-        if len([entry for entry in row.entries if entry]) != 2:
-            raise row.location.refuse("a tie needs two surfaces, the secondary and the primary one")
-        secondary, primary = unquoted(row.text(0)), unquoted(row.text(1))
-        content.pairs.append(Pair(row.location, secondary, primary, tied=True, adjust=adjust, tolerance=value))
+        content.note(block, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
+    content.pairs += [Pair(*sides, tied=True, adjust=adjust, tolerance=value) for sides in _sides(block, "a tie")]
 
 
 def equation(content: Content, block: Block) -> None:
-    """*EQUATION: the number of terms, then node, component and coefficient of each."""
+    """*EQUATION: the number of terms, then the node, component and coefficient of each term."""
     rows = block.each()
     for head in rows:
         count = head.whole(0)
         terms: list[tuple[str, int, float]] = []
         if not 1 <= count <= MOST_TERMS:
-            raise head.location.refuse(f"an equation cannot have {count} terms")
+            raise head.refuse(f"an equation cannot have {count} terms")
         while len(terms) < count:
             row = next(rows, None)
             if row is None:
-                raise head.location.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+                raise head.refuse(f"the equation has {len(terms)} terms, {count} are announced")
             terms += [_term(row, start) for start in range(0, len(row.entries), 3) if row.text(start)]
         if len(terms) > count:
-            raise head.location.refuse(f"the equation has {len(terms)} terms, {count} are announced")
+            raise head.refuse(f"the equation has {len(terms)} terms, {count} are announced")
         content.equations.append(Equation(head.location, tuple(terms)))
 
 
@@ -90,7 +92,7 @@ def _term(row: Row, start: int) -> tuple[str, int, float]:
 def multi_point(content: Content, block: Block) -> None:
     """*MPC: PIN and TIE give two nodes the same displacement, BEAM a rigid bar from the first node to the second.
 
-    Those of PLANE, STRAIGHT and MEANROT go on over lines that begin with a number.
+    PLANE, STRAIGHT and MEANROT continue over lines that begin with a number.
     """
     several: list[tuple[Row, str, list[str]]] = []
     for row in block.each():
@@ -101,9 +103,9 @@ def multi_point(content: Content, block: Block) -> None:
             several.append((row, kind, nodes))
         elif kind not in ("PIN", "TIE", "BEAM"):
             known = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
-            raise row.location.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
+            raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
         elif len(nodes) != 2:
-            raise row.location.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
+            raise row.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
         elif kind == "BEAM":
             content.links.append(Link(row.location, nodes[1], nodes[0], "nodes"))
         else:
@@ -112,7 +114,7 @@ def multi_point(content: Content, block: Block) -> None:
 
 
 def rigid_body(content: Content, block: Block) -> None:
-    """*RIGID BODY: nodes that move with a reference node as a whole."""
+    """*RIGID BODY: nodes that move with a reference node as a rigid body."""
     kind = "elements" if block.get("ELSET") else "nodes"
     group = block.get("ELSET") or block.required("NSET")
     content.links.append(Link(block.location, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
@@ -124,7 +126,7 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
     for row in inner.each():
         first, last = row.whole(0), row.whole(1, row.whole(0))
         if not 1 <= first <= last <= 6:
-            raise row.location.refuse(f"the components {first} to {last} are not within 1 to 6")
+            raise row.refuse(f"the components {first} to {last} are not within 1 to 6")
         components.update(range(first, last + 1))
     chosen = tuple(sorted(components)) or (1, 2, 3, 4, 5, 6)
     distributing = inner.keyword == "DISTRIBUTING"
@@ -140,6 +142,6 @@ def transform(content: Content, block: Block) -> None:
     """*TRANSFORM: local axes of nodes."""
     cylindrical = block.choice("TYPE", ("R", "C")) == "C"
     if len(block.rows) != 1:
-        raise block.location.refuse("one data line with six coordinates is needed")
+        raise block.refuse("one data line with six coordinates is needed")
     points = tuple(block.rows[0].number(i) for i in range(6))
     content.axes.append(Axes(block.location, block.required("NSET"), cylindrical, points))

@@ -1,4 +1,4 @@
-"""What a deck says, before it becomes a model: parts with nodes, elements, sets and surfaces; properties; steps."""
+"""Content of a deck before the model is built: parts with nodes, elements, sets and surfaces; properties; steps."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Location, folded
+from fastcontact.cases.decks.blocks import Block, Located, Location, folded
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
-    """An element: its type, the numbers of its nodes, the place of its keyword, and its line."""
+class Cell(Located):
+    """An element: its type, the numbers of its nodes, the location of its keyword, and its line."""
 
     type: str
     nodes: Sequence[int]
@@ -22,16 +22,16 @@ class Cell:
     set: str = ""
 
     @property
-    def location(self) -> Location:
-        """Its place."""
+    def location(self) -> Location:  # type: ignore[override]
+        """Location of the element in the deck."""
         return replace(self.within, line=self.line)
 
 
 @dataclass(frozen=True, slots=True)
-class Members:
-    """Entries of a set: numbers, or the name of another set, in an instance (empty: where it is defined).
+class Members(Located):
+    """Entries of a set: numbers, or the name of another set, in an instance (empty: that of the definition).
 
-    Numbers may be those of several lines: `lines` says where each further one begins, as place among them and line.
+    The numbers may come from several lines: `lines` holds the index of the first number and the line of each further one.
     """
 
     location: Location
@@ -47,14 +47,14 @@ class Members:
         self.numbers.extend(numbers)
 
     def place_of(self, number: int) -> Location:
-        """Return the line that holds a number."""
+        """Return the location of the line that holds a number."""
         row = bisect_right(self.lines[::2], self.numbers.index(number))
         return replace(self.location, line=self.lines[2 * row - 1]) if row else self.location
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """One entry of a surface: an element set or number, or for nodes a node set or number, and the label of the face."""
+    """One entry of a surface: an element set or number and the label of the face, or a node set or number."""
 
     location: Location
     of: str
@@ -62,8 +62,8 @@ class Face:
 
 
 @dataclass
-class SurfaceDefinition:
-    """A surface as the deck has it."""
+class SurfaceDefinition(Located):
+    """A surface as the deck defines it."""
 
     name: str
     location: Location
@@ -72,8 +72,8 @@ class SurfaceDefinition:
 
 
 @dataclass(frozen=True)
-class Section:
-    """Which material the elements of a set have, and how thick they are (None: not given)."""
+class Section(Located):
+    """Material and thickness (None: not given) of the elements of a set."""
 
     location: Location
     elements: str
@@ -86,7 +86,7 @@ class Section:
 class Part:
     """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts.
 
-    `nodes` are rows by number, and `coordinates` three numbers a row.
+    `nodes` are rows by node number; `coordinates` holds three numbers per row.
     """
 
     name: str = ""
@@ -101,7 +101,7 @@ class Part:
     sections: list[Section] = field(default_factory=list)
 
     def add(self, kind: str, name: str, members: list[Members]) -> None:
-        """Add entries to a set, which may be there already."""
+        """Add entries to a set, which may exist already."""
         sets = self.node_sets if kind == "node" else self.element_sets
         sets.setdefault(folded(name), []).extend(members)
         self.set_names.setdefault(folded(name), name)
@@ -109,7 +109,7 @@ class Part:
 
 @dataclass
 class Instance:
-    """Where a part stands in the assembly: moved, then turned about the line through two points by an angle [degree]."""
+    """Placement of a part in the assembly: a translation, then a rotation about a line through two points [degree]."""
 
     name: str
     part: Part
@@ -118,8 +118,8 @@ class Instance:
 
 
 @dataclass
-class Material:
-    """A material of the deck; `law` makes one of the model from axes, None for those of the mesh."""
+class Material(Located):
+    """A material of the deck; `law` returns the material of the model for given axes, None for those of the mesh."""
 
     name: str
     location: Location
@@ -130,8 +130,8 @@ class Material:
 
 
 @dataclass
-class Interaction:
-    """How surfaces touch."""
+class Interaction(Located):
+    """Contact properties of surfaces."""
 
     name: str
     location: Location
@@ -142,11 +142,11 @@ class Interaction:
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Location, float] | None = None
-    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # of friction, by the number of steps before
+    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # (steps before, friction)
 
 
 @dataclass
-class Pair:
+class Pair(Located):
     """A contact pair or a tie."""
 
     location: Location
@@ -165,8 +165,8 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class SectorEnds:
-    """The two ends of a sector that repeats itself round an axis: their surfaces, by the name of the tie."""
+class SectorEnds(Located):
+    """The two end surfaces of a cyclic sector, and the name of their tie."""
 
     location: Location
     name: str
@@ -174,8 +174,8 @@ class SectorEnds:
 
 
 @dataclass(frozen=True)
-class Sectors:
-    """How many sectors make the whole round an axis, by two of its points, and the name of the tie of their ends."""
+class Sectors(Located):
+    """Number of cyclic sectors, two points of their axis, and the name of the tie of their ends."""
 
     location: Location
     count: int
@@ -184,7 +184,7 @@ class Sectors:
 
 
 @dataclass(frozen=True)
-class Equation:
+class Equation(Located):
     """A linear equation: node, component and coefficient of each term."""
 
     location: Location
@@ -192,8 +192,8 @@ class Equation:
 
 
 @dataclass(frozen=True)
-class Pin:
-    """Nodes, one or those of a set, that have the displacement of a further one, or each that of one of a further set."""
+class Pin(Located):
+    """Nodes that follow the displacement of another node, or each of them that of a node in another set."""
 
     location: Location
     first: str
@@ -201,8 +201,8 @@ class Pin:
 
 
 @dataclass(frozen=True)
-class MultiPoint:
-    """Nodes that stay in a plane or on a line, or, with a last one for it, have a mean rotation."""
+class MultiPoint(Located):
+    """Nodes that stay in a plane or on a line, or whose mean rotation is that of the last node."""
 
     location: Location
     kind: str
@@ -210,8 +210,8 @@ class MultiPoint:
 
 
 @dataclass(frozen=True)
-class Link:
-    """A reference node with nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
+class Link(Located):
+    """A reference node with the nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
     location: Location
     reference: str
@@ -220,12 +220,12 @@ class Link:
     components: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     distributing: bool = False
     rotation: str = ""
-    orientation: str = ""  # along whose axes the components count
+    orientation: str = ""  # the components refer to its axes
 
 
 @dataclass(frozen=True)
-class PretensionSection:
-    """A section through a bolt: its surface, the node that has its shortening and its force, and its normal."""
+class PretensionSection(Located):
+    """A pretension section of a bolt: its surface, the node that carries its shortening and force, and its normal."""
 
     location: Location
     surface: str
@@ -234,20 +234,20 @@ class PretensionSection:
 
 
 @dataclass(frozen=True)
-class Axes:
-    """Local axes of nodes or materials: rectangular by points of the first axis and plane, or cylindrical about a line."""
+class Axes(Located):
+    """Local axes of nodes or materials: rectangular, by a point on the first axis and one in the plane, or cylindrical."""
 
     location: Location
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
-    distribution: str = ""  # of material axes by cell, in place of points
-    part: Part | None = None  # where those of materials are defined
+    distribution: str = ""  # name of the distribution of material axes by cell, in place of points
+    part: Part | None = None  # the part that defines axes of materials
 
 
 @dataclass(frozen=True)
 class Amplitude:
-    """Points (time, multiplier), in the time of the step or of the analysis."""
+    """Points (time, multiplier), in step time or in total time."""
 
     location: Location
     times: tuple[float, ...]
@@ -257,7 +257,7 @@ class Amplitude:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Values of supports, loads or temperatures: their block, what remains of earlier steps, their amplitude."""
+    """Given supports, loads or temperatures: their block, whether earlier ones remain, and their amplitude."""
 
     block: Block
     new: bool
@@ -265,7 +265,7 @@ class Given:
 
 
 @dataclass(slots=True)
-class Step:
+class Step(Located):
     """A load step of the deck."""
 
     location: Location
@@ -274,14 +274,14 @@ class Step:
     increment: float = 1.0
     static: bool = False
     perturbation: bool = False
-    heat: str = ""  # "alone", "coupled" with displacements, or not computed
+    heat: str = ""  # "alone", "coupled" with displacements, or empty: not computed
     modes: int = 0
     given: list[Given] = field(default_factory=list)
 
 
 @dataclass
 class Content:
-    """All that a deck says."""
+    """The whole content of a deck."""
 
     title: str = ""
     root: Part = field(default_factory=lambda: Part(flat=True))
@@ -307,11 +307,11 @@ class Content:
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
-    heat: str = ""  # as that of its steps
+    heat: str = ""  # that of its steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)
 
-    def note(self, location: Location, text: str) -> None:
-        """Remember what a line means here, where that is not plain."""
-        self.notes.append(f"{location}: {text}")
+    def note(self, at: Location | Located, text: str) -> None:
+        """Add a note on the interpretation of a line where it is not obvious."""
+        self.notes.append(f"{at}: {text}")

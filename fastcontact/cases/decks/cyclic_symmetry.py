@@ -1,4 +1,4 @@
-"""Cyclic symmetry of a deck: *TIE, CYCLIC SYMMETRY names the ends of a sector, *CYCLIC SYMMETRY MODEL axis and number."""
+"""Cyclic symmetry of a deck: *TIE, CYCLIC SYMMETRY (ends of a sector) and *CYCLIC SYMMETRY MODEL (axis and number)."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.model import Model
 
-# Most sectors: beyond, one is a negligible part of the whole.
+# Largest number of sectors: a smaller sector would be a negligible part of the whole.
 MOST_SECTORS = 100_000
 
 
 def sector_ends(block: Block) -> SectorEnds:
-    """*TIE, CYCLIC SYMMETRY: the surfaces at the two ends of a sector."""
+    """*TIE, CYCLIC SYMMETRY: the end surfaces of a sector."""
     if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
-        raise block.location.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
+        raise block.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
     row = block.rows[0]
     return SectorEnds(block.location, block.get("NAME"), (unquoted(row.text(0)), unquoted(row.text(1))))
 
@@ -27,17 +27,17 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     """*CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
     text = block.required("N")
     if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
-        raise block.location.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
+        raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
     if len(block.rows) != 1:
-        raise block.location.refuse("one data line with two points of the axis is needed")
+        raise block.refuse("one data line with two points of the axis is needed")
     points = tuple(block.rows[0].number(i) for i in range(6))
     if points[:3] == points[3:]:
-        raise block.location.refuse("the two points of the axis are the same")
+        raise block.refuse("the two points of the axis are the same")
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))
 
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
-    """Add the cyclic symmetries of the deck to the model; return their relations."""
+    """Add the cyclic symmetries of the deck to the model; return their constraints."""
     content, before = deck_mesh.made.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
@@ -46,28 +46,26 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
         first, second = np.array(sectors.points[:3]), np.array(sectors.points[3:])
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
-            raise sectors.location.refuse("the axis of a plane model is along z: give two points above each other")
+            raise sectors.refuse("the axis of a plane model is along z: give two points above each other")
         for name in ends.surfaces:
             deck_mesh.made.faces(name, ends.location)
         groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
-        with refusing(sectors.location):
+        with refusing(sectors):
             model.add_cyclic_symmetry(
                 groups[0], groups[1], sectors=sectors.count, origin=tuple(first[: model.mesh.dim].tolist()),
                 direction=tuple(direction.tolist()),
             )  # fmt: skip
     for ends in content.sector_ends:
         if id(ends) not in used:
-            raise ends.location.refuse(
-                "no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis"
-            )
+            raise ends.refuse("no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis")
     return model.relations[before:]
 
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:
-    """Return the ends that a *CYCLIC SYMMETRY MODEL means: those of its tie, or the only ones."""
+    """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of the tie it names, or the only ones."""
     named = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
     if len(named) != 1:
         known = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"
         which = f"TIE={sectors.tie[:80]}" if sectors.tie else "TIE is not given"
-        raise sectors.location.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
+        raise sectors.refuse(f"{which}, and the ties with CYCLIC SYMMETRY are: {known}")
     return named[0]

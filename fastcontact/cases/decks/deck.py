@@ -39,17 +39,17 @@ class Deck:
     title : str
         First line of ``*HEADING``.
     model : Model
-        Contact pairs are named ``SECONDARY/PRIMARY``, groups after the sets and surfaces of the deck. Plane models
-        have a unit of thickness.
+        Contact pairs are named ``SECONDARY/PRIMARY``, groups like the sets and surfaces of the deck. Plane models have
+        unit thickness.
     ramp : Ramp
-        Step k of the deck ends at the load factor k.
+        Step k of the deck ends at load factor k.
     criteria : Criteria
     notes : tuple of str
-        What lines mean here where that is not plain: what has no effect, what is solved in another way.
+        Keywords and parameters without effect, and those that are treated differently from Abaqus or CalculiX.
     thickness : float
-        Of a plane model [length]; forces that `solve` returns are those of all of it.
+        Thickness of a plane model [length]; `solve` returns forces for the whole thickness.
     modes : dict, optional
-        What ``*FREQUENCY`` asks for, as arguments of `fastcontact.modes` about the last step; None without.
+        Arguments of `fastcontact.modes` about the last step, from ``*FREQUENCY``; None without it.
 
     Examples
     --------
@@ -80,11 +80,11 @@ class Deck:
         Returns
         -------
         list of StepResult
-            With the load factor k at the end of step k. Displacements are along the global axes; reactions are the forces of
-            supports alone, without those of equations and couplings; forces of plane models are those of the whole thickness.
+            Step k of the deck ends at load factor k. Displacements are along the global axes; reactions are the forces
+            of supports, without those of equations and couplings; forces of plane models are for the whole thickness.
 
-        Errors and warnings are those of `fastcontact.solve`; where the deck asks for NLGEOM and small strains are solved, a
-        FastcontactWarning tells the largest strain and rotation, which linear kinematics leave out the squares of.
+        Errors and warnings are those of `fastcontact.solve`. If the deck requests NLGEOM but small strains are used, a
+        FastcontactWarning states the largest strain and rotation, whose squares linear kinematics neglect.
         """
         steps: list[StepResult] = []
         for step in self.solve_steps(**options):
@@ -94,14 +94,14 @@ class Deck:
         return steps
 
     def solve_steps(self, **options: Any) -> Iterator[StepResult]:
-        """Solve step by step, as `fastcontact.solve_steps` does; results are those of `solve`."""
+        """Solve step by step, like `fastcontact.solve_steps`; the results are those of `solve`."""
         for step in solve_steps(self.model, self.ramp, **{"criteria": self.criteria, **options}):
             yield self.finished(step)
 
     def points_of(self, name: str) -> Numbers:
-        """Return the sorted point numbers (n,) of a node set, in any case; of sets of parts ``Instance.set``.
+        """Return the sorted point numbers (n,) of a node set, in upper or lower case; for sets of parts ``Instance.set``.
 
-        MeshError if there is none of that name.
+        MeshError if there is no such set.
         """
         wanted = name.replace('"', "").strip().upper()
         for group in self.model.mesh.point_groups:
@@ -132,7 +132,7 @@ class Deck:
             displacement[at] = table_value(table, step.load_factor)
         step = replace(step, displacement=displacement)
         if self.building.content.steps and step.load_factor == self.ramp.instants[-1]:
-            self._tell_nonlinear(step)
+            self._warn_of_large_strains(step)
         t = self.thickness
         if t == 1.0:
             return replace(step, reaction=reaction)
@@ -150,7 +150,7 @@ class Deck:
         )
 
     def _supports_alone(self, reaction: Array, instant: float) -> Array:
-        """Return nodal forces (n_points, dim) without those of relations, found where no support acts [force]."""
+        """Return reactions (n_points, dim) without constraint forces, computed from the unsupported components [force]."""
         links = self.building.links
         if not links:
             return reaction.copy()
@@ -164,7 +164,7 @@ class Deck:
         return reaction - linked.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:
-        """Return the largest equivalent strain of the solid cells, from their nodal stresses [-]."""
+        """Return the largest equivalent strain of the solid cells, computed from nodal stresses [-]."""
         field, largest = self.model.material_field(), 0.0
         for name, block in self.model.mesh.solids.items():
             strains = np.einsum("cij,cnj->cni", field.compliance[field.rows[name]], step.stress[block])
@@ -173,8 +173,8 @@ class Deck:
             )
         return largest
 
-    def _tell_nonlinear(self, step: StepResult) -> None:
-        """Warn with the largest strain and rotation where the deck asks for large ones."""
+    def _warn_of_large_strains(self, step: StepResult) -> None:
+        """Warn with the largest strain and rotation if the deck has NLGEOM but small strains were solved."""
         for asked in (s for s in self.building.content.steps if s.nonlinear and self.building.linearised):
             strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
@@ -189,8 +189,8 @@ class Deck:
 def read_deck(path: PathLike) -> Deck:
     """Read an input deck of Abaqus or CalculiX: static steps of elastic, plastic and hyperelastic bodies in contact.
 
-    Every keyword and parameter is translated, noted as without effect, or refused. Nothing but the deck and what it includes
-    below its own folder is read.
+    Every keyword and parameter is translated, noted as without effect, or refused. Only the deck and included files in
+    its folder and subfolders are read.
 
     Parameters
     ----------
@@ -203,16 +203,16 @@ def read_deck(path: PathLike) -> Deck:
     Raises
     ------
     CaseError
-        If the deck is wrong or asks for what is outside of fastcontact; the message names file, line and keyword.
+        If the deck is invalid or requires an unsupported feature; the message names file, line and keyword.
     FileError
         If a file cannot be read.
     FastcontactError
-        If the model is wrong.
+        If the model is invalid.
 
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM, and small strains are solved nevertheless: with plasticity, couplings.
+        If a step has NLGEOM, but small strains are used, as with plasticity or couplings.
 
     Examples
     --------
@@ -232,7 +232,7 @@ def read_deck(path: PathLike) -> Deck:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
             f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is "
-            "valid only while they stay small, and a warning after the solution tells how large they are"
+            "valid only while they stay small, and a warning after the solution reports how large they are"
         )
     return Deck(
         path=file,
@@ -248,7 +248,7 @@ def read_deck(path: PathLike) -> Deck:
 
 
 def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
-    """Return sums of works or powers, also those by name, times a factor; what counts exchanges stays."""
+    """Return sums of work or power, also those by name, times a factor; counts stay as they are."""
     return {
         name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
         for name, value in sums.items()
@@ -256,7 +256,7 @@ def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _text(path: Path) -> str:
-    """Return the text that result files keep: the title as a case file has it."""
+    """Return the text stored in result files: the title in the form of a case file."""
     return f"# from the deck {path.name}\n"
 
 

@@ -1,4 +1,4 @@
-"""Element types of decks: the element here, the kinematics, and which nodes make the faces that labels name."""
+"""Element types of decks: the element of the mesh, the kinematics, and the nodes of the labelled faces."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ SHAPES = {"tet": TETRAHEDRON, "hex": HEXAHEDRON, "wed": WEDGE, "tri": TRIANGLE, 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20"}
 PLANES = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 FAMILIES = {"CPE": "plane_strain", "CPS": "plane_stress", "CAX": "axisymmetric"}
-# Families of elements that conduct heat alone, and those of the same shape that deform.
+# Families of pure heat conduction elements, and the deformable ones of the same shape.
 CONDUCTING = {"DC3D": "C3D", "DC2D": "CPE", "DCAX": "CAX"}
-# Type names of elements that are no solids, by their beginning.
+# Kinds of elements that are not solids, by the beginning of their type name.
 OTHERS = {
     "S": "shell", "STRI": "shell", "B": "beam", "T": "truss", "M": "membrane", "CPEG": "generalised plane strain",
     "DC": "convective heat transfer", "R": "rigid", "SC": "continuum shell", "C3D8P": "pore pressure", "CONN": "connector",
@@ -27,20 +27,20 @@ OTHERS = {
 
 @dataclass(frozen=True)
 class ElementType:
-    """What a type of the deck becomes.
+    """Translation of an element type of the deck.
 
     Attributes
     ----------
     name, element, kinematics : str
-        Of the deck; of the mesh; of the model.
+        Name in the deck, element of the mesh, kinematics of the model.
     faces : tuple of tuple of int
-        Corners of the faces 1, 2, ..., as places in the connectivity.
+        Corners of the faces 1, 2, ..., as positions in the connectivity.
     note : str
-        How the element here differs, empty where it does not.
+        How the element of the package differs; otherwise empty.
     modes : bool
         Whether it has incompatible modes.
     conducts : bool
-        Whether it conducts heat alone, without displacements.
+        Whether it conducts heat without having displacements.
     """
 
     name: str
@@ -52,13 +52,13 @@ class ElementType:
 
     @property
     def faces(self) -> tuple[tuple[int, ...], ...]:
-        """Corners of the faces 1, 2, ..., as places in the connectivity."""
+        """Corners of the faces 1, 2, ..., as positions in the connectivity."""
         return SHAPES[self.element[:3]]
 
 
 @cache
 def element_type(name: str) -> ElementType | None:
-    """Return what an element type of decks (in upper case) becomes, None for what is no solid known here."""
+    """Return the translation of an element type of decks (in upper case), None unless it is a supported solid."""
     conducts = name[:4] in CONDUCTING
     base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
     note, modes = "", False
@@ -80,6 +80,6 @@ def element_type(name: str) -> ElementType | None:
 
 
 def described(name: str) -> str:
-    """Return what kind of element an unsupported type is, in brackets; empty where that is not known."""
+    """Return the kind of an unsupported element type, in brackets; empty if it is unknown."""
     fitting = [key for key in OTHERS if name.startswith(key)]
     return f" ({OTHERS[max(fitting, key=len)]})" if fitting else ""

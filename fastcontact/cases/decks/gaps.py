@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembled, facet_points
-from fastcontact.cases.decks.blocks import Location
+from fastcontact.cases.decks.blocks import Located, Location
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.refusals import refusing
@@ -23,8 +23,8 @@ TOUCHING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class GapGroup:
-    """Gap elements of a set.
+class GapGroup(Located):
+    """The gap elements of a set.
 
     Attributes
     ----------
@@ -33,11 +33,11 @@ class GapGroup:
     clearance : float
         [length]
     direction : ndarray (dim,)
-        From the first node to the second one [-].
+        Direction from the first node to the second one [-].
     ends : ndarray of int (n, 2)
-        Points.
+        Points of the two nodes.
     facets, opposite : str
-        Groups of the facets around the first nodes, and around the second ones; empty where these belong to no solids.
+        Groups of the facets around the first nodes and around the second ones; empty if these belong to no solid.
     """
 
     name: str
@@ -54,11 +54,11 @@ def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed:
     with_one = {element for name, entry in given.items() for element in made.elements_of(name, entry[0])}
     for element in made.discrete:
         if element.cell.type == kind and element not in with_one:
-            raise element.cell.location.refuse(f"element {element.number} of type {kind} has no {needed}")
+            raise element.cell.refuse(f"element {element.number} of type {kind} has no {needed}")
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
-    """Make groups of the facets around the nodes of gap elements; CaseError where these make up no whole facets."""
+    """Make groups of the facets around the nodes of gap elements; raises CaseError if these do not fill whole facets."""
     made, groups = deck_mesh.made, []
     check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
     for name, (location, clearance, vector) in made.content.gaps.items():
@@ -79,7 +79,7 @@ def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
 
 
 def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
-    """Make a group of the facets all of whose nodes are among points; CaseError where points belong to none of them."""
+    """Make a group of the facets with all nodes among points; raises CaseError if a point belongs to none of them."""
     chosen = set(points.tolist())
     faces = deck_mesh.made.faces_within(chosen)
     if {p for face in faces for p in facet_points(*face)} != chosen:
@@ -90,11 +90,11 @@ def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location)
 
 
 def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
-    """Add the contact of gap elements to a model; return by its name the held nodes behind those of the body."""
+    """Add the contact of gap elements to a model; return, by its name, the held node behind each node of the body."""
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
     if np.ptp(first @ gap.direction) > size:
-        raise gap.location.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+        raise gap.refuse("gap elements are supported where their nodes lie in a plane across their direction")
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
@@ -103,10 +103,10 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
             or np.abs(between - np.outer(along, gap.direction)).max() > size
             or along.mean() < -size
         ):
-            raise gap.location.refuse(
+            raise gap.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )
-        with refusing(gap.location):
+        with refusing(gap):
             model.add_contact(
                 gap.name, secondary=gap.facets, primary=gap.opposite, formulation="node_to_segment",
                 clearance=gap.clearance - float(along.mean()),
@@ -125,7 +125,7 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
 
 
 def _motion(gap: GapGroup, conditions: Conditions) -> Table:
-    """Return how far the second nodes move along the direction; CaseError where they are not driven there, all alike."""
+    """Return the motion of the second nodes along the direction; raises CaseError unless all are driven alike."""
     axes, supports = np.flatnonzero(gap.direction).tolist(), conditions.supports
     temporary = {name for name, _ in conditions.temporary()}
     by_axis: list[tuple[float, Array]] = []
@@ -133,7 +133,7 @@ def _motion(gap: GapGroup, conditions: Conditions) -> Table:
         names = [(end, axis, False) for end in gap.ends[:, 1].tolist()]
         tables = {supports.table(name) for name in names if name in supports.tracks and name not in temporary}
         if len(tables) != 1 or not all(name in supports.tracks and name not in temporary for name in names):
-            raise gap.location.refuse(
+            raise gap.refuse(
                 "gap elements are supported to nodes that are held, or driven as one, along their direction"
             )
         by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))

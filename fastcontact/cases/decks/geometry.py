@@ -9,30 +9,30 @@ from itertools import groupby
 from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
 from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, SurfaceDefinition
 from fastcontact.cases.decks.element_types import described, element_type
-from fastcontact.cases.decks.refusals import check_new, defined
+from fastcontact.cases.decks.refusals import defined, registered
 from fastcontact.mesh import elements
 
-# Elements that are no solids and yet mean something here: numbers of their nodes.
+# Numbers of nodes of the supported elements that are not solids.
 DISCRETE = {"GAPUNI": 2, "SPRINGA": 2}
-# From this number of nodes on an element may go on in the next line without a comma at the end.
+# Elements with at least this number of nodes may continue in the next line without a comma at the end.
 LONG = 15
 
 
 def nodes(content: Content, part: Part, block: Block) -> None:
     """*NODE: numbers and coordinates."""
     if block.get("SYSTEM", "R").upper() != "R":
-        raise block.location.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
+        raise block.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
     numbers = array("q")
     for row in block.each():
         number = row.whole(0)
         if len(row.entries) > 4 and any(row.entries[4:]):
-            raise row.location.refuse(f"node {number} has more than three coordinates")
+            raise row.refuse(f"node {number} has more than three coordinates")
         position = array("d", (row.number(1, 0.0), row.number(2, 0.0), row.number(3, 0.0)))
         known = part.nodes.setdefault(number, len(part.nodes))
         if 3 * known == len(part.coordinates):
             part.coordinates.extend(position)
         elif part.coordinates[3 * known : 3 * known + 3] != position:
-            raise row.location.refuse(f"node {number} is defined twice, at different places")
+            raise row.refuse(f"node {number} is defined twice, at different places")
         numbers.append(number)
     if block.get("NSET"):
         part.add("node", block.get("NSET"), [Members(block.location, numbers)])
@@ -45,25 +45,21 @@ def cells(content: Content, part: Part, block: Block) -> None:
     if kind is None and name not in DISCRETE:
         where = f" in set '{element_set}'" if element_set else ""
         count = sum(1 for _ in _joined(block, 0))
-        raise block.location.refuse(
+        raise block.refuse(
             f"element type {name[:40]}{described(name)} is not supported; {count} element{'s' * (count != 1)}{where}"
         )
     needed = DISCRETE[name] if kind is None else elements.get(kind.element).n_nodes
     if kind is not None and kind.note and f"{name}: " not in "".join(content.notes):
-        content.note(block.location, f"{name}: {kind.note}")
+        content.note(block, f"{name}: {kind.note}")
     members = array("q")
     for row, entries in _joined(block, needed):
         number = row.whole(0)
         whole = Row(row.location, entries)
         connectivity = array("q", (whole.whole(i) for i in range(1, len(entries)) if entries[i]))
         if len(connectivity) != needed:
-            raise row.location.refuse(
-                f"element {number} of type {name} has {len(connectivity)} nodes, {needed} are needed"
-            )
+            raise row.refuse(f"element {number} of type {name} has {len(connectivity)} nodes, {needed} are needed")
         if number in part.cells:
-            raise row.location.refuse(
-                f"element {number} is defined twice, first in line {part.cells[number].location.line}"
-            )
+            raise row.refuse(f"element {number} is defined twice, first in line {part.cells[number].location.line}")
         part.cells[number] = Cell(name, connectivity, block.location, row.location.line, element_set)
         members.append(number)
     if element_set:
@@ -71,7 +67,7 @@ def cells(content: Content, part: Part, block: Block) -> None:
 
 
 def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
-    """Yield the entries of each element, which may go on over lines that end with a comma."""
+    """Yield the entries of each element; they may continue after a line that ends with a comma."""
     first: Row | None = None
     entries: tuple[str, ...] = ()
     for row in block.each():
@@ -105,14 +101,14 @@ def _members(block: Block) -> list[Members]:
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
             if increment < 1 or last < first:
-                raise row.location.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
+                raise row.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
             entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
         for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
                 members = array("q", map(int, group))
                 if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
-                    entries[-1].add(members, row.location.line)  # one entry for the lines that follow each other
+                    entries[-1].add(members, row.location.line)  # one entry for consecutive lines
                 else:
                     entries.append(Members(row.location, members, instance=instance))
             else:
@@ -123,35 +119,29 @@ def _members(block: Block) -> list[Members]:
 def surface(content: Content, part: Part, block: Block) -> None:
     """*SURFACE: faces of elements, or nodes."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
-    check_new("surface", name, part.surfaces, block.location)
-    made = SurfaceDefinition(name, block.location, kind == "NODE")
+    made = registered("surface", name, part.surfaces, SurfaceDefinition(name, block.location, kind == "NODE"), block)
     for row in block.each():
         label = row.text(1).upper()
         if not made.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
-            raise row.location.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
+            raise row.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
         made.faces.append(Face(row.location, row.text(0), "" if made.of_nodes else label))
-    part.surfaces[folded(name)] = made
 
 
 def instance(content: Content, block: Block) -> Instance:
-    """*INSTANCE: a part with its place in the assembly."""
+    """*INSTANCE: a part placed in the assembly."""
     name, of = block.required("NAME"), block.required("PART")
-    made = Instance(name, defined("part", of, content.parts, block.location))
-    check_new("instance", name, content.instances, block.location)
+    made = Instance(name, defined("part", of, content.parts, block))
     rows = block.rows
     if rows:
         made.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
     if len(rows) > 1:
         made.rotation = tuple(rows[1].number(i) for i in range(7))
     if len(rows) > 2:
-        raise rows[2].location.refuse("an instance has at most two data lines: a translation and a rotation")
-    content.instances[folded(name)] = made
-    return made
+        raise rows[2].refuse("an instance has at most two data lines: a translation and a rotation")
+    return registered("instance", name, content.instances, made, block)
 
 
 def new_part(content: Content, block: Block) -> Part:
     """*PART."""
     name = block.required("NAME")
-    check_new("part", name, content.parts, block.location)
-    content.parts[folded(name)] = Part(unquoted(name))
-    return content.parts[folded(name)]
+    return registered("part", name, content.parts, Part(unquoted(name)), block)

@@ -1,4 +1,4 @@
-"""Heat of a deck: conductivity and conductance; temperatures, fluxes and films over its steps as loads of the model."""
+"""Heat conduction of a deck: conductivity and conductance; temperatures, fluxes and films of its steps as loads."""
 
 from __future__ import annotations
 
@@ -22,66 +22,60 @@ from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Keywords of loads of heat.
+# Keywords of heat loads.
 OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
-# Number of the degree of freedom of temperature.
+# Number of the temperature degree of freedom.
 TEMPERATURE = 11
-# Bodies of steps of heat alone, which are held.
+# The bodies in steps of pure heat conduction, which are fixed.
 HELD = LinearElastic(E=1.0, nu=0.0)
-# Conductance of ties, over conductivity by size of the model: temperatures of both sides differ by about its inverse.
+# Conductance of ties relative to conductivity over model size: the sides differ in temperature by about its inverse.
 PERFECT = 1e8
-# Clearance over the last of a table beyond which nothing is conducted.
+# Clearance, relative to the last one of a table, beyond which no heat is conducted.
 BEYOND = 1.0 + 1e-9
 
 
 def conductivity(content: Content, current: Material, block: Block) -> None:
-    """*CONDUCTIVITY: kept until it is known whether heat is computed."""
+    """*CONDUCTIVITY: stored until it is known whether heat is computed."""
     current.conductivity = block
 
 
 def specific_heat(content: Content, current: Material, block: Block) -> None:
-    """*SPECIFIC HEAT: a property that neither static nor steady steps use."""
-    content.note(block.location, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
+    """*SPECIFIC HEAT: without effect in static and steady-state steps."""
+    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def physical_constants(content: Content, block: Block) -> None:
-    """*PHYSICAL CONSTANTS: those of radiation, without effect."""
-    content.note(block.location, "no effect: there is no radiation")
+    """*PHYSICAL CONSTANTS: constants of radiation, without effect."""
+    content.note(block, "no effect: there is no radiation")
 
 
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP CONDUCTANCE: kept until it is known whether heat is computed."""
+    """*GAP CONDUCTANCE: stored until it is known whether heat is computed."""
     current.conductance.append(block)
 
 
 def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP HEAT GENERATION: the share of the work of friction that becomes heat, the same on both sides."""
+    """*GAP HEAT GENERATION: the fraction of the friction work that becomes heat, half of it on each side."""
     row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
-        raise row.location.refuse(
-            f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1"
-        )
+        raise row.refuse(f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1")
     if secondary != 0.5:
-        raise row.location.refuse(
-            f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5"
-        )
+        raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
     if row.number(2, 0.0) > 0.0:
-        raise row.location.refuse("a given velocity is not supported: sides slide by their displacements")
+        raise row.refuse("a given velocity is not supported: sides slide by their displacements")
     current.friction_heat = block.location, share
 
 
 def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the options of a contact pair by which heat crosses it: by pressure or clearance, none without a table."""
+    """Return the conductance options of a contact pair, by pressure or clearance; none without a table."""
     tables: dict[str, Any] = {}
     for block in law.conductance:
         rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
         if len({row.number(2, 0.0) for row in block.rows}) > 1:
-            raise block.location.refuse(
-                "a conductance that depends on the temperature is not supported: give one table"
-            )
+            raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
         if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.location.refuse("needs conductances with pressures or clearances that ascend")
+            raise block.refuse("needs conductances with pressures or clearances that ascend")
         if len(rows) == 1:
             tables["number"] = rows[0][1]
             continue
@@ -91,28 +85,26 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
             meant = (
                 "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
             )
-            content.note(block.location, f"the conductance is by what it {meant}")
+            content.note(block, f"the conductance is by what it {meant}")
         end = (rows[-1][0] * BEYOND, 0.0)
         tables[by] = rows if by == "pressure" else [*rows, end]
         if by == "pressure" and content.heat == "alone":
-            content.note(
-                block.location, "steps of heat alone have no pressures: sides that touch conduct as without any"
-            )
+            content.note(block, "steps of heat alone have no pressures: sides that touch conduct as without any")
     given = tables.pop("number", None)
     if given is not None and tables:
-        raise law.conductance[0].location.refuse("one conductance, and a table besides: give one of them")
+        raise law.conductance[0].refuse("one conductance, and a table besides: give one of them")
     if given is None and not tables:
         return {}
-    with refusing(law.conductance[0].location):
+    with refusing(law.conductance[0]):
         Conductance(law.name, tables or given)
     return {"conductance": tables or given}
 
 
 def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option by which the work of friction heats both sides, by the time of the steps."""
+    """Return the option for frictional heating of both sides, with the step length as time."""
     if law.friction_heat is None:
         if law.conductance:
-            content.note(law.location, "friction makes no heat without *GAP HEAT GENERATION, as in CalculiX")
+            content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
         return {}
     location, share = law.friction_heat
     periods = {step.period for step in content.steps}
@@ -122,7 +114,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie, whatever pressure and gap."""
+    """Return the conductance of a tie, independent of pressure and gap."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
     content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
@@ -130,33 +122,29 @@ def perfect_conductance(content: Content, model: Model, location: Location) -> A
 
 
 def check_steps(content: Content) -> None:
-    """Find out whether the steps of a deck compute heat, alone or with displacements; CaseError where they do not fit."""
+    """Set whether the steps compute heat, alone or with displacements; raises CaseError if they do not match."""
     first = next((step for step in content.steps if step.heat), None)
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
-            raise step.location.refuse(
+            raise step.refuse(
                 "steps of heat alone, of heat with displacements, and static ones after these cannot be in one deck: make "
                 "all *HEAT TRANSFER, or *COUPLED TEMPERATURE-DISPLACEMENT"
             )
         for block in (given.block for given in step.given):
             if block.keyword in OF_HEAT and not step.heat:
-                raise block.location.refuse(
-                    "heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT"
-                )
+                raise block.refuse("heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
-                raise block.location.refuse(
-                    "temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11"
-                )
+                raise block.refuse("temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11")
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
-                raise block.location.refuse(
-                    "is no load of heat: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
+                raise block.refuse(
+                    "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )
 
 
 @dataclass(frozen=True)
 class Exchange:
-    """Where a flux or a film acts: a face or elements; the coefficient of a film, None for a flux."""
+    """Target of a flux or a film: a face or elements; the coefficient of a film, None for a flux."""
 
     keyword: str
     face: Face | None
@@ -165,21 +153,21 @@ class Exchange:
 
 
 class Spans(Generic[Name]):
-    """From which load factor to which things act, in steps that give them and let them go."""
+    """Intervals of the load factor in which loads act, from the steps that give and remove them."""
 
     def __init__(self) -> None:
         self._begun: dict[Name, float] = {}
         self._over: dict[Name, list[tuple[float, float]]] = {}
 
     def advance(self, history: Histories[Name], begin: float) -> None:
-        """Go on to the step that begins at a load factor, before the history does."""
+        """Advance to the step that begins at a load factor; to be called before `history` advances."""
         for name in history.dying:
             self._over.setdefault(name, []).append((self._begun.pop(name), begin))
         for name in (*history.changing, *history.first):
             self._begun.setdefault(name, begin)
 
     def of(self, names: Iterable[Name]) -> dict[tuple[float, float], list[Name]]:
-        """Return the names that act between the same load factors."""
+        """Return the names by the interval of load factors in which they act."""
         alike: dict[tuple[float, float], list[Name]] = {}
         for name in names:
             last = [(self._begun[name], np.inf)] if name in self._begun else []
@@ -189,7 +177,7 @@ class Spans(Generic[Name]):
 
 
 class HeatConditions:
-    """Prescribed temperatures, heat at nodes, fluxes and films of a deck with their histories."""
+    """Prescribed temperatures, nodal heat, fluxes and films of a deck, with their histories."""
 
     def __init__(self, deck_mesh: DeckMesh, initial: Mapping[int, float]) -> None:
         self.found, self.made = deck_mesh, deck_mesh.made
@@ -208,32 +196,28 @@ class HeatConditions:
 
     @property
     def histories(self) -> tuple[Histories[Any], ...]:
-        """All histories of heat."""
+        """All heat histories."""
         return self.temperatures, self.powers, self.fluxes, self.films
 
     def prescribe(self, given: Given, row: Row) -> None:
-        """Prescribe the temperature of nodes by a line of *BOUNDARY."""
+        """Prescribe the temperature of nodes from a line of *BOUNDARY."""
         if not self.made.content.heat:
-            raise row.location.refuse(
-                "component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE"
-            )
+            raise row.refuse("component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE")
         if "FIXED" in given.block.parameters:
-            raise row.location.refuse("FIXED is not supported for temperatures: give them")
+            raise row.refuse("FIXED is not supported for temperatures: give them")
         for point in self._of_solids(row):
             self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
 
     def _of_solids(self, row: Row) -> list[int]:
-        """Return the points of a node set in a line; CaseError if one belongs to no solid."""
+        """Return the points of the node set in a line; raises CaseError if one belongs to no solid."""
         points = self.made.nodes(row.text(0), row.location)
         for point in points:
             if point not in self.made.of_solids:
-                raise row.location.refuse(
-                    f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature"
-                )
+                raise row.refuse(f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature")
         return points
 
     def take(self, given: Given) -> None:
-        """Take the values of a block of heat for the current step."""
+        """Store the values of a block of heat loads for the current step."""
         keyword = given.block.keyword
         by: dict[str, Histories[Any]] = {"CFLUX": self.powers, "FILM": self.films, "SFILM": self.films}
         history = by.get(keyword, self.fluxes)
@@ -242,25 +226,25 @@ class HeatConditions:
         for row in given.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
-                    raise row.location.refuse(f"component {row.text(1)} is not 11, that of heat")
+                    raise row.refuse(f"component {row.text(1)} is not 11, that of heat")
                 for point in self._of_solids(row):
                     self.powers.give(point, row.number(2), given.amplitude, row.location)
                 continue
             film = history is self.films
             if film and row.number(3) < 0.0:
-                raise row.location.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
+                raise row.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
             for name in self._places(keyword, row, row.number(3) if film else None):
                 if film:
                     self._in_place_of_others(name, row)
                 history.give(name, row.number(2), given.amplitude, row.location)
 
     def _in_place_of_others(self, film: Exchange, row: Row) -> None:
-        """Let a film take the place of one with another coefficient on the same face."""
+        """Replace a film that has another coefficient on the same face."""
         self.rest[film] = self.reference
         before = self.film_of.get((film.keyword, film.face))
         if before is not None and before != film:
             if before in self.films.changing:
-                raise row.location.refuse(
+                raise row.refuse(
                     f"{film.coefficient:g} is the second coefficient here in one step, after {before.coefficient:g}"
                 )
             if before in self.films.tracks and self.films.tracks[before].alive:
@@ -268,11 +252,11 @@ class HeatConditions:
         self.film_of[film.keyword, film.face] = film
 
     def _places(self, keyword: str, row: Row, coefficient: float | None) -> list[Exchange]:
-        """Return where a line of fluxes or films acts."""
+        """Return the targets of a line of fluxes or films."""
         label, letter = row.text(1).upper(), "S" if coefficient is None else "F"
         if keyword in ("DSFLUX", "SFILM"):
             if label != letter:
-                raise row.location.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
+                raise row.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
             return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
         elements = self.made.elements_of(row.text(0), row.location)
         if label[:1] == letter and label[1:].isdigit():
@@ -281,10 +265,10 @@ class HeatConditions:
         if label == "BF" and keyword == "DFLUX":
             return [Exchange(keyword, None, tuple(elements))]
         known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
-        raise row.location.refuse(f"{label[:40]} is not supported; known are {known}")
+        raise row.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
-        """Go on to the end of step `number`, from 1."""
+        """Advance to the end of step `number`, counted from 1."""
         begin = float(number - 1) if self.begun else -np.inf
         self.fixed.advance(self.temperatures, begin)
         self.blown.advance(self.films, begin)
@@ -293,7 +277,7 @@ class HeatConditions:
         self.begun = self.begun or bool(step.heat)
 
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
-        """Make the groups of all loads of heat in the mesh; return what adds each of them to a model."""
+        """Make the mesh groups of all heat loads; return functions that add them to a model."""
         found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
         risen = ByShape[int]()
@@ -335,7 +319,7 @@ class HeatConditions:
         return made
 
     def _risen(self, table: Table) -> Table:
-        """Return the rise of a history of temperatures over the reference."""
+        """Return a temperature history relative to the reference temperature."""
         return tuple((time, value - self.reference) for time, value in table)
 
     def _film(self, group: str, coefficient: float, table: Table) -> Callable[[Model], None]:
@@ -347,12 +331,12 @@ class HeatConditions:
 
 
 def _between(span: tuple[float, float]) -> dict[str, float]:
-    """Return the arguments of a model's methods for what acts between two load factors."""
+    """Return the arguments `begins` and `ends` of the model's methods for an interval of load factors."""
     return {name: at for name, at in zip(("begins", "ends"), span, strict=True) if np.isfinite(at)}
 
 
 def _above(value: Any, reference: float) -> Any:
-    """Return temperatures that rise over the reference by a number, or by what a function returns."""
+    """Return a temperature, a number or a function of the position, relative to the reference."""
 
     def risen(points: Array) -> Array:
         return np.asarray(value(points) + reference)
@@ -361,7 +345,7 @@ def _above(value: Any, reference: float) -> Any:
 
 
 def _reference(made: Assembled, initial: Mapping[int, float]) -> float:
-    """Return the initial temperature of all solids; zero where they differ and nothing expands."""
+    """Return the initial temperature of all solids; zero if it varies and no material expands."""
     content = made.content
     values = {initial.get(point, 0.0) for point in made.of_solids}
     if len(values) == 1:

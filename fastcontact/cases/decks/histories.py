@@ -17,18 +17,18 @@ from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
-# How long a jump lasts at the beginning of a step, of its length.
+# Duration of a jump at the beginning of a step, relative to the step.
 JUMP = 1e-9
-# Digits to which histories must agree, up to a factor, to count as one.
+# Number of digits to which histories must agree, up to a factor, to be merged.
 ALIKE = 12
 
 
 @dataclass(slots=True)
 class Track:
-    """The value of quantities that were always given together, through the steps.
+    """The history of quantities that were always given together.
 
-    `numbers` are load factor and value of each point in turn: every node may have a track of its own, and pairs would take
-    three times as much.
+    `numbers` alternates load factor and value of the points: every node may have its own track, and pairs would take three
+    times the memory.
     """
 
     numbers: array[float]
@@ -48,7 +48,7 @@ class Track:
         return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     def add(self, points: Iterable[tuple[float, float]]) -> None:
-        """Go on with further points; one at the time of the last point and of another value becomes a jump."""
+        """Append points; one at the time of the last point but with another value becomes a jump."""
         for time, value in points:
             end, before = self.numbers[-2:]
             if time <= end:
@@ -60,9 +60,9 @@ class Track:
 
 @dataclass
 class Values(Generic[Name]):
-    """Values of a step by what they are given for: their rows in columns of values, line numbers, and lines they stand below.
+    """Values of a step by name: the rows in columns of values, line numbers, and block lines.
 
-    Every node may have a value of its own, and an object for each would take several times the line that gives it.
+    Every node may have its own value, and an object for each would take several times the memory of its line.
     """
 
     rows: dict[Name, int] = field(default_factory=dict)
@@ -80,7 +80,7 @@ class Values(Generic[Name]):
         return iter(self.rows)
 
     def put(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Take a value; the last one for a name counts."""
+        """Store a value; the last one for a name counts."""
         block = self.blocks[-1] if self.blocks else None
         if block is None or (amplitude, location.file, location.keyword) != (block[0], block[1].file, block[1].keyword):
             self.blocks.append((amplitude, location))
@@ -93,13 +93,13 @@ class Values(Generic[Name]):
         self.rows[name] = self.row
 
     def get(self, name: Name) -> tuple[float, str, Location]:
-        """Return the value for a name, its amplitude and its place."""
+        """Return the value for a name, its amplitude and its location."""
         row = self.rows[name]
         amplitude, location = self.blocks[self.origins[row]]
         return self.values[row], amplitude, replace(location, line=self.lines[row])
 
     def update(self, other: Values[Name]) -> None:
-        """Take all values of others."""
+        """Store all values of another table."""
         for name in other:
             self.put(name, *other.get(name))
 
@@ -112,12 +112,12 @@ class Values(Generic[Name]):
 
 @dataclass
 class Histories(Generic[Name]):
-    """Histories by what they act on.
+    """Histories of loads or supports by name.
 
-    `changing` are those given in the current step, with the place of each, `dying` those that earlier steps gave and this one
-    lets go; `rest` what quantities have before they are given, zero where it does not say; `first` what was given before all
-    steps for the first one, unless that says otherwise; `time` where the current step begins; `lasting` the tracks whose
-    amplitudes go on in total time.
+    `changing` holds the values given in the current step, with their locations, and `dying` the earlier ones that this step
+    removes. `rest` holds the values before any are given (default zero), `first` those given before all steps, which hold for
+    the first step unless it gives others. `time` is the beginning of the current step, and `lasting` holds the tracks whose
+    amplitudes are in total time.
     """
 
     content: Content
@@ -130,7 +130,7 @@ class Histories(Generic[Name]):
     lasting: dict[int, Track] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Give a value for the current step; CaseError if the step has another one for the same."""
+        """Set a value for the current step; raises CaseError if the step has set a different one."""
         if name in self.changing:
             first, other, before = self.changing.get(name)
             if (first, other) != (value, amplitude):
@@ -142,13 +142,13 @@ class Histories(Generic[Name]):
         self.dying.pop(name, None)
 
     def hold(self, name: Name, location: Location) -> None:
-        """Keep the value that the last step ended with."""
+        """Hold the value at the end of the last step."""
         if name in self.tracks:
             self.changing.put(name, self.tracks[name].last, "", location)
             self.dying.pop(name, None)
 
     def begin(self) -> None:
-        """Take what was given before all steps as there from the beginning, at rest, and reached in the first step."""
+        """Start the values given before all steps at their rest values, to be reached in the first step."""
         alike: dict[float, list[Name]] = {}
         for name in self.changing:
             alike.setdefault(self.rest.get(name, 0.0), []).append(name)
@@ -158,14 +158,14 @@ class Histories(Generic[Name]):
         self.first, self.changing = self.changing, Values()
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
-        """Drop what earlier steps gave."""
+        """Remove the values that earlier steps gave."""
         self.first = Values()
         for name, track in self.tracks.items():
             if track.alive and name not in self.changing and which(name):
                 self.dying[name] = None
 
     def advance(self, number: int, step: Step) -> None:
-        """Go on to the end of step `number`, from 1."""
+        """Advance to the end of step `number`, counted from 1."""
         begin, start = float(number - 1), self.time
         self.time += step.period
         given = self.first if self.first.rows else self.changing
@@ -198,7 +198,7 @@ class Histories(Generic[Name]):
         self.changing, self.first, self.dying = Values(), Values(), {}
 
     def _track(self, names: list[Name], rest: float, given: Values[Name]) -> Track:
-        """Return the track that these names alone have: theirs, a new one, or one apart from others that had the same."""
+        """Return a track of these names alone: the existing one, a new one, or a copy split from a shared one."""
         track = self.tracks.get(names[0])
         if track is not None and track.size == len(names):
             return track
@@ -215,12 +215,12 @@ class Histories(Generic[Name]):
         return list({id(track): track for track in self.tracks.values()}.values())
 
     def table(self, name: Name) -> Table:
-        """Return the whole history as a table of load factor and value."""
+        """Return the whole history as a table of load factors and values."""
         points, end = self.tracks[name].points, float(len(self.content.steps))
         return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
 
     def alike(self) -> Iterator[tuple[Table, list[Name]]]:
-        """Yield all histories, each once, with what has it."""
+        """Yield all histories, each once, with the names that share it."""
         members: dict[bytes, list[Name]] = {}
         for name, track in self.tracks.items():
             members.setdefault(track.numbers.tobytes(), []).append(name)
@@ -229,7 +229,7 @@ class Histories(Generic[Name]):
 
 
 def _equal(*columns: AnyArray) -> Iterator[Indices]:
-    """Yield the rows in which columns (n,) have the same entries, in the order of the first ones."""
+    """Yield groups of rows with equal entries in all columns (n,), in order of first occurrence."""
     order = np.lexsort(columns)
     differs = np.zeros(max(len(order) - 1, 0), bool)
     for column in columns:
@@ -241,16 +241,16 @@ def _equal(*columns: AnyArray) -> Iterator[Indices]:
 
 
 def shape_of(table: Table) -> tuple[float, Table]:
-    """Return the largest value of a history by size, and the history over it."""
+    """Return the value of a history that is largest in magnitude, and the history divided by it."""
     size = max((value for _, value in table), key=abs)
     return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
 
 
 class ByShape(Generic[Name]):
-    """Histories of points along axes, grouped by axis and shape: what is given node by node becomes few loads.
+    """Histories of points along axes, grouped by axis and shape: nodal values become a few loads.
 
-    Body forces are cells' by their kind. Iterating yields axis, points, value and history. The value is 1, or a function
-    that returns those of the points, ascending, where they differ.
+    For body forces, points are cells and axes are kinds of force. Iteration yields axis, points, value and history. The value
+    is 1, or a function that returns the values of the ascending points if they differ.
     """
 
     def __init__(self) -> None:
@@ -265,7 +265,7 @@ class ByShape(Generic[Name]):
 
     @staticmethod
     def of(alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
-        """Return histories of points that have no axis: 0."""
+        """Return the histories of points without axis; the axis is 0."""
         made = ByShape[int]()
         for table, points in alike:
             made.add(0, table, points)
@@ -276,12 +276,12 @@ class ByShape(Generic[Name]):
             points, which = np.unique(members, return_inverse=True)
             if len(points) == len(members) and min(sizes) == max(sizes):
                 yield axis, np.asarray(members), 1.0, table
-            else:  # what acts twice on a point adds up
+            else:  # values at the same point add up
                 yield axis, points, partial(given_values, np.bincount(which, sizes).astype(float)), shape
 
 
 def given_values(values: Array, positions: Array) -> Array:
-    """Return values (n,) that nodes, or cells, have whatever their positions, or those of their points, (k n, dim)."""
+    """Return given values (n,), repeated to the number of positions (k n, dim), which do not matter otherwise."""
     return np.repeat(values, len(positions) // len(values))
 
 

@@ -1,4 +1,4 @@
-"""Initial stresses of a deck, by element or set, as Abaqus takes them."""
+"""Initial stresses of a deck by element or element set, with the conventions of Abaqus."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
 
-# Components in the order of a data line, by how many there are.
+# Components in the order of a data line, by their number.
 ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
-    """Add the initial stresses to a model; the last line of several for an element counts."""
+    """Add the initial stresses to a model; of several lines for an element, the last one counts."""
     content, names = deck_mesh.made.content, ORDER[deck_mesh.dim]
     if not content.stresses:
         return
@@ -24,16 +24,16 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     for block in content.stresses:
         for row in block.each():
             if len(row.entries) != 1 + len(names):
-                raise row.location.refuse(
+                raise row.refuse(
                     f"{len(row.entries)} entries where {1 + len(names)} are needed: an element or a set, and the components "
                     f"{', '.join(names)} of its stress; stresses by integration point are not supported"
                 )
             numbers = [row.number(index) for index in range(1, 1 + len(names))]
             for element in deck_mesh.made.elements_of(row.text(0), row.location):
                 if element.type is None:
-                    raise row.location.refuse(f"element {element.number} is no solid, so it has no initial stress")
+                    raise row.refuse(f"element {element.number} is not a solid, so it has no initial stress")
                 if element.section is not None and element.section.orientation:
-                    raise row.location.refuse(
+                    raise row.refuse(
                         f"element {element.number} has an *ORIENTATION: initial stresses along such axes are not supported"
                     )
                 values[starts[element.type.element] + element.row] = numbers

@@ -1,4 +1,4 @@
-"""The keywords of decks: where each may stand, what reads it, the parameters it takes, and what is outside of fastcontact."""
+"""The keywords of decks: their context, the function that reads them, their parameters; and the unsupported keywords."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from fastcontact.cases.decks import (
 )
 from fastcontact.cases.decks.blocks import Block
 
-# In place of the parameters of a keyword that may have any.
+# Placeholder for a keyword that accepts any parameter.
 ANYTHING = "*"
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """Where a keyword may stand, what reads it there, and its parameters: with a meaning here, or without effect."""
+    """Context of a keyword, the function that reads it, and its parameters: those in use and those without effect."""
 
     place: Literal["deck", "part", "material", "interaction", "model", "step", "procedure"]
     read: Callable[..., None] | None = None
@@ -36,15 +36,15 @@ class Keyword:
 
     @property
     def parameters(self) -> set[str]:
-        """All that it takes."""
+        """All accepted parameters."""
         return {*self.used.split("; "), *self.harmless.split("; ")} - {""}
 
 
-# Parameters of steps that steer their solution.
+# Parameters of steps that control their solution.
 STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
-# Keywords that are translated.
+# Supported keywords.
 TRANSLATED = {
-    # What the reader itself opens and closes.
+    # Keywords handled by the reader itself.
     "ASSEMBLY": Keyword("deck", None, "NAME"),
     "CHANGE FRICTION": Keyword("deck", None, "INTERACTION"),
     "COUPLING": Keyword("deck", None, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
@@ -62,7 +62,7 @@ TRANSLATED = {
         "deck", None, "NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
     ),
     "SURFACE INTERACTION": Keyword("deck", None, "NAME"),
-    # In parts, or in decks without any.
+    # In parts, or in decks without parts.
     "DISTRIBUTION": Keyword("part", properties.distribution, "NAME; LOCATION", "TABLE"),
     "DISTRIBUTION TABLE": Keyword("part", properties.distribution_table, ANYTHING),
     "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
@@ -91,7 +91,7 @@ TRANSLATED = {
     "GAP CONDUCTANCE": Keyword("interaction", heat.gap_conductance, "PRESSURE"),
     "GAP HEAT GENERATION": Keyword("interaction", heat.gap_heat_generation),
     "SURFACE BEHAVIOR": Keyword("interaction", properties.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
-    # Of the whole model.
+    # In the whole model.
     "AMPLITUDE": Keyword("model", properties.amplitude, "NAME; TIME; DEFINITION; VALUE"),
     "CLEARANCE": Keyword("model", connections.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
     "CONTACT PAIR": Keyword("model", connections.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
@@ -106,7 +106,7 @@ TRANSLATED = {
     "SPRING": Keyword("model", properties.spring, "ELSET"),
     "TIE": Keyword("model", connections.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": Keyword("model", connections.transform, "NSET; TYPE"),
-    # Supports and loads, in steps.
+    # Supports and loads in steps.
     "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
     "CFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
     "CLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
@@ -124,14 +124,14 @@ TRANSLATED = {
     "STATIC": Keyword("procedure", stepping.static, "", STEERING),
     "UNCOUPLED TEMPERATURE-DISPLACEMENT": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
 }
-# Requests for output, all of which is in the results, and controls of convergence, which has criteria of its own.
+# Output requests, since results contain all output, and convergence controls, since the package has its own criteria.
 OUTPUT = (
     "CONTACT FILE", "CONTACT OUTPUT", "CONTACT PRINT", "EL FILE", "EL PRINT", "ELEMENT OUTPUT", "ENERGY FILE",
     "ENERGY OUTPUT",
     "ENERGY PRINT", "FACE PRINT", "FILE FORMAT", "FILE OUTPUT", "MONITOR", "NODE FILE", "NODE OUTPUT", "NODE PRINT", "OUTPUT",
     "PREPRINT", "PRINT", "RESTART", "SECTION FILE", "SECTION PRINT", "TIME POINTS", "CONTROLS",
 )  # fmt: skip
-# Why other keywords of the format are refused.
+# Reasons why other keywords of the format are refused.
 LINEAR = "is outside of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
 STATIC = "is outside of fastcontact (quasi-static: *STATIC, steady heat, and *FREQUENCY behind them)"
 SOLIDS = "is outside of fastcontact (solid elements only)"
@@ -170,7 +170,7 @@ _SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFU
 
 
 def spelled(block: Block) -> Block:
-    """Return a block with blanks in its keyword and parameters where they belong: CalculiX reads it without any."""
+    """Return a block with the usual blanks in its keyword and parameters: CalculiX accepts them without blanks."""
     keyword = _SPELLED.get(block.keyword.replace(" ", ""), block.keyword)
     known = TRANSLATED.get(keyword)
     names = {name.replace(" ", ""): name for name in known.parameters} if known else {}
@@ -179,20 +179,20 @@ def spelled(block: Block) -> Block:
 
 
 def checked(block: Block, about: str) -> Keyword:
-    """Return what a keyword is; refuse unknown ones, those outside of fastcontact, and such parameters.
+    """Return the entry of a keyword; refuse unknown and unsupported keywords and parameters.
 
-    `about` names a material.
+    `about` names the material in messages.
     """
     keyword = block.keyword
     if keyword in REFUSED:
-        raise block.location.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
+        raise block.refuse(f"{about}*{keyword} {REFUSED[keyword]}")
     known = TRANSLATED.get(keyword)
     if known is None:
         near = difflib.get_close_matches(keyword, [*TRANSLATED, *OUTPUT, *REFUSED, "INCLUDE"], n=1, cutoff=0.6)
         meant = f"; is *{near[0]} meant?" if near else ""
-        raise block.location.refuse(f"unknown keyword *{keyword}{meant}")
+        raise block.refuse(f"unknown keyword *{keyword}{meant}")
     for name in block.parameters:
         if known.used != ANYTHING and name not in known.parameters:
             takes = ", ".join(sorted(known.parameters)) or "none"
-            raise block.location.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
+            raise block.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
     return known

@@ -14,7 +14,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def local_directions(made: Assembled) -> dict[int, Array]:
-    """Return the local axes (3, 3), in rows, of the points of all nodes with *TRANSFORM [-]."""
+    """Return the local axes (3, 3), as rows, of the points of all nodes with *TRANSFORM [-]."""
     return {
         point: local_axes(axes, made.points[point])
         for axes in made.content.axes
@@ -23,7 +23,7 @@ def local_directions(made: Assembled) -> dict[int, Array]:
 
 
 def orientation_of(content: Content, name: str, location: Location) -> Axes:
-    """Return the axes of an *ORIENTATION; CaseError if there is none of that name."""
+    """Return the axes of an *ORIENTATION; raises CaseError if there is none of that name."""
     axes = content.orientations.get(folded(name))
     if axes is None:
         known = ", ".join(content.orientations).lower() or "none"
@@ -34,13 +34,13 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
 
 
 def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Array:
-    """Return the axes (n, 3, 3) of the solids of the mesh, by the *DISTRIBUTION of those of elements [-].
+    """Return the axes (n, 3, 3) of the solids of the mesh, for `members` from a *DISTRIBUTION [-].
 
-    Others have those of the mesh. CaseError if an element has none, and there is no line for all.
+    Other solids have the axes of the mesh. Raises CaseError if an element has no axes and there is no default line.
     """
     block = made.content.distributions.get(folded(axes.distribution))
     if block is None:
-        raise axes.location.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
+        raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
     scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
     default, given = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():
@@ -57,7 +57,7 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
     for element in members:
         axes_here = given.get(id(element), default)
         if axes_here is None:
-            raise block.location.refuse(
+            raise block.refuse(
                 f"element {element.number} has no axes, and no line without an element gives those of others"
             )
         frames[first[element.solid.element] + element.row] = axes_here
@@ -65,7 +65,7 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
 
 
 def local_axes(axes: Axes, point: Array) -> Array:
-    """Return the local axes (3, 3) at a point as rows [-]; CaseError if they are not defined there."""
+    """Return the local axes (3, 3) at a point as rows [-]; raises CaseError if they are not defined there."""
     a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
     if axes.cylindrical:
         third, first = b - a, point - a
@@ -75,6 +75,6 @@ def local_axes(axes: Axes, point: Array) -> Array:
         first, third = a, np.cross(a, b)
     lengths = np.linalg.norm(first), np.linalg.norm(third)
     if min(lengths) <= LENGTH_ROUND_OFF * max(1.0, float(np.abs(axes.points).max()) if not axes.cylindrical else 0.0):
-        raise axes.location.refuse(f"the local axes are not defined at the point {point.tolist()}")
+        raise axes.refuse(f"the local axes are not defined at the point {point.tolist()}")
     first, third = first / lengths[0], third / lengths[1]
     return np.array([first, np.cross(third, first), third])

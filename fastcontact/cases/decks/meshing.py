@@ -1,4 +1,4 @@
-"""The mesh of a deck: solids, the facets of its surfaces, groups, and a further point for each rotation."""
+"""The mesh of a deck: solids, facets of its surfaces, groups, and an extra point for each rotation."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
 FACETS = {2: {2: "line2", 3: "line3"}, 3: {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}}
-# How far points of a plane model may leave the plane, relative to its size.
+# Largest distance of the points of a plane model from the plane, relative to its size.
 FLAT = 1e-9
 
 
 @dataclass
 class DeckMesh:
-    """A mesh in the making.
+    """A mesh under construction.
 
     Attributes
     ----------
@@ -29,15 +29,15 @@ class DeckMesh:
     kinematics : str
     dim : int
     rotations : dict of int to int
-        By reference point the point whose displacement is its rotation [radian]; in the plane the first component.
+        By reference point: the point whose displacement is its rotation [radian], in the plane its first component.
     facets : dict of str to list of tuple of int
-        Facets by element, each once.
+        Facets by facet type, each once.
     groups : dict of str to dict of str to list of int
-        Groups of cells, as rows by element.
+        Groups of cells, as rows by element type.
     point_groups : dict of str to ndarray (n,) of int
         Ascending.
     loose : dict of str to list of int
-        By group of facets around nodes that make up no whole faces, the points that are none of these.
+        By group of the facets around a surface of nodes: the facet points that are not in the surface.
     """
 
     made: Assembled
@@ -51,12 +51,12 @@ class DeckMesh:
     loose: dict[str, list[int]] = field(default_factory=dict)
 
     def add_facets(self, group: str, faces: Iterable[Face]) -> str:
-        """Make a group of facets, given by element and place among its facets; return its name."""
+        """Make a group of facets, given as elements and indices of their facets; return its name."""
         self.groups[group] = self.facet_rows(faces)
         return group
 
     def facet_rows(self, faces: Iterable[Face]) -> dict[str, list[int]]:
-        """Return the rows of facets by their type, those that are new made."""
+        """Return the rows of facets by type; missing facets are made."""
         members: dict[str, list[int]] = {}
         for face in faces:
             points = facet_points(*face)
@@ -74,7 +74,7 @@ class DeckMesh:
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
-        """Make a group of points, or find the group that holds the same ones; return its name."""
+        """Make a group of points, or find the group with the same points; return its name."""
         wanted = ascending(points)
         for name, members in self.point_groups.items():
             if np.array_equal(members, wanted):
@@ -83,14 +83,14 @@ class DeckMesh:
         return group
 
     def rotation(self, point: int) -> int:
-        """Return the point that carries the rotation of a reference point, which is made where there is none."""
+        """Return the point that carries the rotation of a reference point; it is made if there is none."""
         if point not in self.rotations:
             self.rotations[point] = len(self.made.points)
             self.made.points = np.concatenate([self.made.points, self.made.points[[point]]])
         return self.rotations[point]
 
     def mesh(self) -> Mesh:
-        """Return the mesh, with solids turned the right way."""
+        """Return the mesh, with inverted solids reoriented."""
         solids = {name: [element.points for element in own] for name, own in self.made.by_kind.items()}
         cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
         del solids
@@ -108,12 +108,12 @@ class DeckMesh:
 
 
 def ascending(points: Iterable[int]) -> Indices:
-    """Return points (n,), each once."""
+    """Return the distinct points (n,), ascending."""
     return np.unique(points if isinstance(points, np.ndarray) else np.fromiter(points, np.intp))
 
 
 def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
-    """Return the rows of solids by the type of their cells."""
+    """Return the rows of solids by cell type."""
     rows: dict[str, list[int]] = {}
     for element in chosen:
         if element.type is not None:
@@ -122,27 +122,25 @@ def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
 
 
 def begun(made: Assembled) -> DeckMesh:
-    """Return the mesh of a deck without any facets yet, with groups for its sets.
+    """Return the mesh of a deck, still without facets, with groups for its sets.
 
-    CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
+    Raises CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
     """
     if not made.solids:
-        raise made.content.steps[0].location.refuse("the deck has no solid elements")
+        raise made.content.steps[0].refuse("the deck has no solid elements")
     first = made.solids[0].solid
     for element in made.solids:
         if element.solid.kinematics != first.kinematics:
-            raise element.cell.location.refuse(
+            raise element.cell.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
         if element.solid.conducts and made.content.heat != "alone":
-            raise element.cell.location.refuse(
+            raise element.cell.refuse(
                 f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
             )
     dim, points = 3 if first.kinematics == "3d" else 2, made.points
     if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
-        raise made.solids[0].cell.location.refuse(
-            f"elements of type {first.name} lie in the plane z = const, but z differs"
-        )
+        raise made.solids[0].cell.refuse(f"elements of type {first.name} lie in the plane z = const, but z differs")
     deck_mesh = DeckMesh(made, first.kinematics, dim)
     _name_sets(deck_mesh)
     return deck_mesh
@@ -160,7 +158,7 @@ def _name_sets(deck_mesh: DeckMesh) -> None:
         for name, definition in part.surfaces.items():
             if definition.of_nodes and definition.faces:
                 _name_nodes(deck_mesh, prefix + definition.name, definition, scope)
-            elif definition.faces:  # one that nothing uses may be empty
+            elif definition.faces:  # an unused surface may be empty
                 faces = made.faces(f"{scope}.{name}" if scope else name, definition.location)
                 deck_mesh.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
@@ -171,9 +169,9 @@ def _name_sets(deck_mesh: DeckMesh) -> None:
 
 
 def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
-    """Name the facets around the nodes of a surface; where they make up no whole ones, its further points are `loose`."""
+    """Name the facets around the nodes of a surface; facet points that are not in the surface are `loose`."""
     whole, further, left = deck_mesh.made.faces_of_nodes(definition, scope)
-    if not (whole or further):  # nodes of no solid
+    if not (whole or further):  # the nodes belong to no solid
         return
     deck_mesh.add_facets(group, [*whole, *further])
     if left:
@@ -182,7 +180,7 @@ def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, 
 
 
 def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
-    """Return the group of a surface as the secondary side of a pair, which may be one of nodes; CaseError for lone nodes."""
+    """Return the group of a surface, of faces or nodes, as secondary side; raises CaseError for nodes on no outer face."""
     definition, scope = deck_mesh.made.surface(name, location)
     if not definition.of_nodes:
         return group_of_surface(deck_mesh, name)
@@ -190,7 +188,7 @@ def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
     carried = {point for face in (*whole, *further) for point in facet_points(*face)}
     for point in deck_mesh.made.surface_nodes(definition, scope):
         if point not in carried:
-            raise definition.location.refuse(
+            raise definition.refuse(
                 f"node {deck_mesh.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )
@@ -198,6 +196,6 @@ def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
 
 
 def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:
-    """Return the name of the group of a surface, however a pair writes it."""
+    """Return the name of the group of a surface, in whatever case a pair writes it."""
     wanted = folded(name)
     return next(group for group in deck_mesh.groups if folded(group) == wanted)

@@ -1,4 +1,4 @@
-"""Multi-point constraints of many nodes: in a plane, on a straight line, with a mean rotation; for small displacements."""
+"""Multi-point constraints PLANE, STRAIGHT and MEANROT of many nodes, for small displacements."""
 
 from __future__ import annotations
 
@@ -9,21 +9,19 @@ from fastcontact.cases.decks.content import MultiPoint
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.model.couplings import Term
 
-# Numbers of nodes that the kinds need.
+# Least numbers of nodes by kind.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Points whose distance from a line or a point is less than this part of their size have no direction from it.
+# Points closer to a line or point than this fraction of their extent have no direction from it.
 FLAT = 1e-9
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
-    """Return the equations of a multi-point constraint; CaseError where its nodes do not determine it."""
+    """Return the equations of a multi-point constraint; raises CaseError if its nodes do not determine it."""
     nodes = [point for name in constraint.nodes for point in deck_mesh.made.nodes(name, constraint.location)]
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
     if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
-        raise constraint.location.refuse(
-            f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space"
-        )
+        raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space")
     where = deck_mesh.made.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, where)]
@@ -35,7 +33,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     else:
         across = np.cross(first, where[2] - where[0])[None]
         if np.linalg.norm(across) <= FLAT * (first @ first):
-            raise constraint.location.refuse("the first three nodes of PLANE lie on a line")
+            raise constraint.refuse("the first three nodes of PLANE lie on a line")
         edges = np.array([first, where[2] - where[0]])
         inside = np.linalg.lstsq(edges.T, (where - where[0]).T, rcond=None)[0].T
         weights = np.column_stack([1.0 - inside.sum(axis=1), inside])
@@ -49,36 +47,36 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
 
 
 def _directions(constraint: MultiPoint, line: Array) -> Array:
-    """Return two directions (2, 3) across a line [-]."""
+    """Return two directions (2, 3) normal to a line [-]."""
     if not line.any():
-        raise constraint.location.refuse("the first two nodes of STRAIGHT are at one place")
+        raise constraint.refuse("the first two nodes of STRAIGHT are at one place")
     return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
 def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
-    """Return the equation between nodes and the first component of the last one, their mean rotation about its direction.
+    """Return the equation that sets the first component of the last node to the mean rotation of the others about an axis.
 
-    That is the mean of the angles by which they turn about their centre, as in CalculiX: with the axis a, offsets p from the
-    centre across it, ``mean(a . (p x u) / p . p)``; the last node's coordinates are the direction of the axis.
+    The mean rotation is the mean of the nodal angles about the centre, as in CalculiX: ``mean(a . (p x u) / p . p)`` with the
+    axis a and the offsets p from the centre normal to it. The coordinates of the last node are the direction of the axis.
     """
     axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
     length = np.linalg.norm(axis)
     if length == 0.0:
-        raise constraint.location.refuse(
+        raise constraint.refuse(
             "the coordinates of the last node of MEANROT are the direction of the axis, and all zero"
         )
     axis = axis / length
     offset = places - np.outer(places @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
     if squared.min() <= FLAT * squared.max():
-        raise constraint.location.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
+        raise constraint.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
     arms = np.cross(axis, offset) / squared[:, None] / len(offset)
     arms -= arms.mean(axis=0)
     return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]
 
 
 def _terms(points: list[int], coefficients: Array) -> list[Term]:
-    """Return the terms of an equation with coefficients (n, 3) of the displacements of points."""
+    """Return the terms of an equation with coefficients (n, 3) for the displacements of points."""
     return [
         (point, axis, value)
         for point, row in zip(points, coefficients.tolist(), strict=True)

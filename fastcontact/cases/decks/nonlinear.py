@@ -1,4 +1,4 @@
-"""Keywords of nonlinear bodies: *PLASTIC, *HYPERELASTIC, and what NLGEOM comes to."""
+"""Nonlinear bodies of a deck: *PLASTIC, *HYPERELASTIC, and the effect of NLGEOM."""
 
 from __future__ import annotations
 
@@ -10,36 +10,34 @@ from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 
-# Poisson's ratio of hyperelastic materials whose compressibility is zero, as in CalculiX.
+# Poisson's ratio of hyperelastic materials with zero compressibility constant, as in CalculiX.
 UNGIVEN = 0.475
-# Numbers of constants before those of the compressibility, and of those.
+# Numbers of deviatoric constants, and of compressibility constants.
 HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:
-    """*PLASTIC: yield stresses by equivalent plastic strains, after the *ELASTIC of the material."""
+    """*PLASTIC: yield stresses by equivalent plastic strain, after the *ELASTIC of the material."""
     hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
     elastic = None if current.law is None else current.law(None)
     if type(elastic) is not LinearElastic:
-        raise block.location.refuse(f"material '{current.name}': isotropic *ELASTIC constants come before it")
+        raise block.refuse(f"material '{current.name}': isotropic *ELASTIC constants come before it")
     table = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
     if not table:
-        raise block.location.refuse("a data line with a yield stress is needed")
+        raise block.refuse("a data line with a yield stress is needed")
     if table[0][0] != 0.0:
-        raise block.rows[0].location.refuse(
-            f"material '{current.name}': the first plastic strain {table[0][0]:g} must be zero"
-        )
+        raise block.rows[0].refuse(f"material '{current.name}': the first plastic strain {table[0][0]:g} must be zero")
     if any(row.text(2) for row in block.rows) and len({row.text(2) for row in block.rows}) > 1:
-        raise block.location.refuse(f"material '{current.name}': one temperature is supported")
+        raise block.refuse(f"material '{current.name}': one temperature is supported")
     kinematic = 0.0
     if hardening == "KINEMATIC":
         if len(table) > 2:
-            raise block.location.refuse(
+            raise block.refuse(
                 f"material '{current.name}': kinematic hardening is linear: two points, not {len(table)}"
             )
         kinematic = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
         table = table[:1]
-    with refusing(block.location, f"material '{current.name}': "):
+    with refusing(block, f"material '{current.name}': "):
         law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=kinematic)
     current.law = lambda axes: law
 
@@ -48,22 +46,19 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     """*HYPERELASTIC: constants of the deviatoric part, then of the compressibility."""
     kinds = [kind for kind in HYPERELASTIC if kind in block.parameters]
     if len(kinds) != 1:
-        raise block.location.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
+        raise block.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
     kind, terms = kinds[0], int(block.get("N", "1")) if kinds[0] == "OGDEN" else 1
-    numbers = [row.number(i) for row in block.each() for i in range(len(row.entries)) if row.entries[i]]
-    first, rest = (count * terms for count in HYPERELASTIC[kind])
+    numbers, (first, rest) = block.numbers(), (count * terms for count in HYPERELASTIC[kind])
     if len(numbers) < first:
-        raise block.location.refuse(
-            f"material '{current.name}': {kind} has {first} constants, {len(numbers)} are given"
-        )
+        raise block.refuse(f"material '{current.name}': {kind} has {first} constants, {len(numbers)} are given")
     constants, compressible = numbers[:first], [*numbers[first : first + rest], *[0.0] * rest][:rest]
     if any(compressible[1:]):
-        raise block.location.refuse(f"material '{current.name}': of the compressibility only D1 is supported")
+        raise block.refuse(f"material '{current.name}': of the compressibility only D1 is supported")
     mu = _shear_modulus(kind, constants)
     bulk = 2.0 / compressible[0] if compressible[0] else 2.0 * mu * (1.0 + UNGIVEN) / (3.0 * (1.0 - 2.0 * UNGIVEN))
     if not compressible[0]:
-        content.note(block.location, f"D1 = 0: the bulk modulus is that of nu = {UNGIVEN}")
-    with refusing(block.location, f"material '{current.name}': "):
+        content.note(block, f"D1 = 0: the bulk modulus is that of nu = {UNGIVEN}")
+    with refusing(block, f"material '{current.name}': "):
         law = _law(kind, constants, mu, bulk)
     current.law = lambda axes: law
 
@@ -85,7 +80,7 @@ def _law(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
 
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
-    """Return the strain of the model that a deck asks for, and why NLGEOM is not followed; empty where it is."""
+    """Return the strain measure of the model, and the reason why NLGEOM is not followed; empty if it is."""
     finite = [law for law in laws if getattr(law, "strain", "small") == "finite"]
     if finite:
         return "finite", ""

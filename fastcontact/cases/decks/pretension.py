@@ -1,4 +1,4 @@
-"""Pretension sections of a deck: *PRE-TENSION SECTION, and *BOUNDARY, FIXED at its node, which locks it."""
+"""Pretension sections of a deck: *PRE-TENSION SECTION, and *BOUNDARY, FIXED at its node, which locks its length."""
 
 from __future__ import annotations
 
@@ -17,30 +17,28 @@ from fastcontact.model.model import Model
 
 
 def pretension_section(content: Content, block: Block) -> None:
-    """*PRE-TENSION SECTION: a surface through a bolt, and the node that has its shortening and its force."""
+    """*PRE-TENSION SECTION: a surface through a bolt, and the node that carries its shortening and force."""
     if len(block.rows) > 1:
-        raise block.location.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
+        raise block.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
-        raise block.location.refuse("the normal has no length")
+        raise block.refuse("the normal has no length")
     content.pretensions.append(
         PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
     )
 
 
 def section_points(made: Assembled) -> dict[int, PretensionSection]:
-    """Return the sections by the points of their nodes; CaseError where such a point belongs to a body or to another one."""
+    """Return the sections by the point of their node; raises CaseError if it belongs to a body or another section."""
     used = {point for solid in made.solids for point in solid.points}
     sections: dict[int, PretensionSection] = {}
     for section in made.content.pretensions:
         point = made.node(section.node, section.location)
         if point in used:
-            raise section.location.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
+            raise section.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
         if point in sections:
-            raise section.location.refuse(
-                f"node {section.node} has a section already, in line {sections[point].location.line}"
-            )
+            raise section.refuse(f"node {section.node} has a section already, in line {sections[point].location.line}")
         sections[point] = section
     return sections
 
@@ -54,7 +52,7 @@ class Locks:
         self.number = 0
 
     def begin(self, number: int, supports: list[Given], made: Assembled) -> None:
-        """Go on to a step; CaseError where it leaves out a section that was locked before."""
+        """Advance to a step; raises CaseError if it releases a section that was locked before."""
         self.number = number
         if not any(given.new for given in supports):
             return
@@ -63,11 +61,11 @@ class Locks:
             if point not in named:
                 location = next(given.block.location for given in supports if given.new)
                 raise location.refuse(
-                    f"node {self.points[point].node} of a pretension section is let go here: once locked it stays so"
+                    f"node {self.points[point].node} of a pretension section is released here: a locked section stays locked"
                 )
 
     def take(self, point: int, component: int, fixed: bool) -> bool:
-        """Return whether a support locks a section, which is remembered."""
+        """Return whether a support locks a section, and record the lock."""
         if point not in self.points or component != 1 or not fixed:
             return False
         self.begins.setdefault(point, float(self.number - 1))
@@ -81,16 +79,16 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
         deck_mesh.made.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
-            raise section.location.refuse(f"surface '{group}' has a pretension section already")
+            raise section.refuse(f"surface '{group}' has a pretension section already")
         sections.add(group)
         normal = None if section.normal is None else section.normal[: deck_mesh.dim]
-        with refusing(section.location):
+        with refusing(section):
             mesh = cut(mesh, group, normal)
     return mesh
 
 
 def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
-    """Add the pretension sections to a model; return all relations that they have at any time, and those to their nodes."""
+    """Add the pretension sections to a model; return all their constraints, and those to their nodes."""
     before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
@@ -106,9 +104,9 @@ def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiP
 
 
 def _side(deck_mesh: DeckMesh, section: PretensionSection) -> float:
-    """Return whether the normal of a section points out of the elements that its surface names (1.0) or into them (-1.0).
+    """Return 1.0 if the normal of a section points out of the elements of its surface, -1.0 if it points into them.
 
-    A positive force acts along the normal on these elements: it pulls the sides together in the first case alone.
+    A positive force acts along the normal on these elements: it pulls the sides together only in the first case.
     """
     if section.normal is None:
         return 1.0

@@ -1,4 +1,4 @@
-"""From the blocks of a deck to its content, one keyword after the other, each where it may stand."""
+"""Reading of the blocks of a deck into its content, with a check of the context of each keyword."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ IN_LAYERS = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
 
 @dataclass
 class Reader:
-    """What is open while a deck is read: part, instance, material, interaction, step, coupling."""
+    """State while a deck is read: the open part, instance, material, interaction, step and coupling."""
 
     content: Content = field(default_factory=Content)
     part: Part | None = None
@@ -34,30 +34,26 @@ class Reader:
         known = checked(block, f"material '{self.material.name}': " if self.material else "")
         read = known.read or getattr(self, "_" + keyword.lower().replace(" ", "_"))
         if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
-            raise self.coupling.location.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+            raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
         if known.place == "material":
             if self.material is None:
-                raise block.location.refuse("belongs below *MATERIAL")
+                raise block.refuse("belongs below *MATERIAL")
             read(content, self.material, block)
             return
         if self.material is not None and keyword in IN_LAYERS:
             name = self.material.name
-            raise block.location.refuse(
-                f"material '{name}': damage of bodies is outside of fastcontact, that of layers is not"
-            )
+            raise block.refuse(f"material '{name}': damage of bodies is outside of fastcontact, that of layers is not")
         self.material = None
         if known.place == "interaction":
             if self.interaction is None:
-                raise block.location.refuse("belongs below *SURFACE INTERACTION")
+                raise block.refuse("belongs below *SURFACE INTERACTION")
             read(content, self.interaction, block)
             return
         self.interaction = None
         if known.place == "part":
             self._not_in_step(block)
             if self.instance is not None:
-                raise block.location.refuse(
-                    "is not supported inside of an instance: put it into the part or the assembly"
-                )
+                raise block.refuse("is not supported inside of an instance: put it into the part or the assembly")
             read(content, self.part or self.content.root, block)
         elif known.place == "model":
             if keyword != "AMPLITUDE":
@@ -69,18 +65,18 @@ class Reader:
             read(content, self.step, block)
         elif known.place == "procedure":
             if self.step is None:
-                raise block.location.refuse("belongs into a step")
+                raise block.refuse("belongs in a step")
             read(content, self.step, block)
         else:
             read(block)
 
     def _not_in_step(self, block: Block) -> None:
         if self.step is not None:
-            raise block.location.refuse("cannot stand inside of a step")
+            raise block.refuse("cannot be inside a step")
 
     def _not_in_part(self, block: Block) -> None:
         if self.part is not None or self.instance is not None:
-            raise block.location.refuse("is supported for the whole assembly only, not inside of a part or instance")
+            raise block.refuse("is supported for the whole assembly only, not inside of a part or instance")
 
     def _heading(self, block: Block) -> None:
         self.content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
@@ -109,7 +105,7 @@ class Reader:
 
     def _change_friction(self, block: Block) -> None:
         if self.step is None:
-            raise block.location.refuse("belongs into a step")
+            raise block.refuse("belongs in a step")
         self.interaction = properties.changed_interaction(self.content, block)
 
     def _coupling(self, block: Block) -> None:
@@ -118,7 +114,7 @@ class Reader:
 
     def _kinematic(self, block: Block) -> None:
         if self.coupling is None:
-            raise block.location.refuse("belongs below *COUPLING")
+            raise block.refuse("belongs below *COUPLING")
         connections.coupling(self.content, self.coupling, block)
         self.coupling = None
 
@@ -126,25 +122,25 @@ class Reader:
 
     def _step(self, block: Block) -> None:
         if self.step is not None:
-            raise block.location.refuse("the step before has no *END STEP")
+            raise block.refuse("the step before has no *END STEP")
         self._not_in_part(block)
         self.step = stepping.new_step(self.content, block)
 
     def _end_step(self, block: Block) -> None:
         if self.step is None:
-            raise block.location.refuse("there is no step to end")
+            raise block.refuse("there is no step to end")
         stepping.end_step(self.content, self.step)
         self.step = None
 
 
 def read_content(blocks: Iterable[Block]) -> Content:
-    """Return what the blocks of a deck say; CaseError with file, line and keyword where something is wrong."""
+    """Return the content of the blocks of a deck; raises CaseError with file, line and keyword if it is invalid."""
     reader = Reader()
     for block in blocks:
         reader.take(spelled(block))
     if reader.step is not None:
-        raise reader.step.location.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
+        raise reader.step.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
-        raise reader.coupling.location.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+        raise reader.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
     heat.check_steps(reader.content)
     return reader.content

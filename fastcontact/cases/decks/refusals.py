@@ -1,35 +1,39 @@
-"""Names that a deck defines twice or not at all, and what the model refuses, told at the line of the deck."""
+"""Errors with a deck location: names defined twice or not at all, and errors of the model."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
 
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import Located, Location, folded
 from fastcontact.errors import CaseError, FastcontactError
+
+Entry = TypeVar("Entry")
 
 
 @contextmanager
-def refusing(location: Location, about: str = "") -> Iterator[None]:
-    """Refuse, at a location of the deck, what the package refuses in the block; the message begins with what it is about."""
+def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
+    """Re-raise errors of the package as CaseError at a location of the deck; the message begins with `about`."""
     try:
         yield
-    except CaseError:  # which has a location
+    except CaseError:  # has a location already
         raise
     except FastcontactError as error:
-        raise location.refuse(f"{about}{error}") from error
+        raise at.refuse(f"{about}{error}") from error
 
 
-def check_new(kind: str, name: str, table: Mapping[str, Any], location: Location) -> None:
-    """Refuse a name that is in a table already."""
+def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
+    """Add an entry to a table under its name and return it; raises CaseError if the name is in the table already."""
     if folded(name) in table:
-        raise location.refuse(f"{kind} '{name}' is defined twice")
+        raise at.refuse(f"{kind} '{name}' is defined twice")
+    table[folded(name)] = entry
+    return entry
 
 
-def defined(kind: str, name: str, table: Mapping[str, Any], location: Location) -> Any:
-    """Return the entry of a table with a name; refused with the names of all entries if there is none."""
+def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
+    """Return the entry of a table with a name; raises CaseError with the names of all entries if there is none."""
     if folded(name) not in table:
         known = ", ".join(entry.name for entry in table.values()) or "none"
-        raise location.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")
+        raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")
     return table[folded(name)]

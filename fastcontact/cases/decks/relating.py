@@ -1,4 +1,4 @@
-"""Linear relations of a deck: equations, rigid bodies and couplings, as rows over all displacement components."""
+"""Linear constraints of a deck: equations, rigid bodies and couplings, as rows over all displacement components."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows,
 
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
-    """Give every reference node a point for its rotation, before the mesh is made."""
+    """Add a rotation point for every reference node, before the mesh is made."""
     for link in deck_mesh.made.content.links:
         point = deck_mesh.made.node(link.reference, link.location)
         if link.rotation:
             deck_mesh.rotations[point] = deck_mesh.made.node(link.rotation, link.location)
         elif deck_mesh.kinematics == "axisymmetric":
-            raise link.location.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
+            raise link.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
             deck_mesh.rotation(point)
 
 
 def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
-    """Return the relations of all equations, rigid bodies and couplings."""
+    """Return the constraints of all equations, rigid bodies and couplings."""
     content = deck_mesh.made.content
     axes = local_directions(deck_mesh.made)
     rows = [_equation(deck_mesh, equation, axes) for equation in content.equations]
@@ -46,26 +46,26 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
 
 
 def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]) -> list[Term]:
-    """Return the terms of an equation along the axes of space; components count along the local `axes` of points."""
+    """Return the terms of an equation along the global axes; its components refer to the local `axes` of points."""
     terms: list[Term] = []
     for name, component, coefficient in equation.terms:
         point = deck_mesh.made.node(name, equation.location)
         if not 1 <= component <= deck_mesh.dim:
-            raise equation.location.refuse(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
+            raise equation.refuse(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
         along = axes.get(point, np.eye(3))[component - 1]
         terms += [(point, axis, coefficient * along[axis]) for axis in np.flatnonzero(along[: deck_mesh.dim]).tolist()]
     if not any(coefficient for _, _, coefficient in terms):
-        raise equation.location.refuse("all coefficients of the equation are zero")
+        raise equation.refuse("all coefficients of the equation are zero")
     return terms
 
 
 def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
-    """Return the equations by which nodes have the displacements of others."""
+    """Return the equations that set the displacements of nodes equal to those of others."""
     first, second = (deck_mesh.made.nodes(name, pin.location) for name in (pin.first, pin.second))
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
-        raise pin.location.refuse(
+        raise pin.refuse(
             f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: as many are needed, or one that "
             "leads, each another one"
         )
@@ -75,7 +75,7 @@ def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
 
 
 def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
-    """Return the points that follow a reference point, without itself."""
+    """Return the points that follow a reference point, without the point itself."""
     made = deck_mesh.made
     if link.kind == "nodes":
         points = made.nodes(link.group, link.location)
@@ -91,7 +91,7 @@ def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
     reference = made.node(link.reference, link.location)
     kept = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not kept:
-        raise link.location.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
+        raise link.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
     return kept
 
 
@@ -103,7 +103,7 @@ def _reference(deck_mesh: DeckMesh, link: Link) -> ReferencePoint:
 
 
 def _rigid(deck_mesh: DeckMesh, link: Link) -> list[list[Term]]:
-    """Return the equations by which nodes follow the motion of a reference point with its rotation."""
+    """Return the equations that make nodes follow the rigid motion of a reference point."""
     points, dim = np.array(_points(deck_mesh, link), np.intp), deck_mesh.dim
     rows = rigid_rows(_reference(deck_mesh, link), points, deck_mesh.made.points[points, :dim], range(dim))
     along = [_directions(deck_mesh, link, point) for point in points.tolist()]
@@ -111,7 +111,7 @@ def _rigid(deck_mesh: DeckMesh, link: Link) -> list[list[Term]]:
 
 
 def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
-    """Return the directions (n, dim) of the components that a coupling relates at a point [-]."""
+    """Return the directions (n, dim) that a coupling constrains at a point [-]."""
     axes = np.eye(3)
     if link.orientation:
         axes = local_axes(
@@ -121,7 +121,7 @@ def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
 
 
 def _along(rows: Sequence[Sequence[Term]], directions: Array) -> list[list[Term]]:
-    """Return equations of displacement components, one for each axis, as such along `directions` (n, dim)."""
+    """Return equations for displacements along `directions` (n, dim) from those for each axis."""
     return [
         [
             (point, axis, float(factor) * value)
@@ -133,20 +133,20 @@ def _along(rows: Sequence[Sequence[Term]], directions: Array) -> list[list[Term]
 
 
 def _distributing(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
-    """Return the equations by which a reference point follows the mean motion of a surface, weighted by area."""
+    """Return the equations that make a reference point follow the area-weighted mean motion of a surface."""
     made = deck_mesh.made
     group = deck_mesh.add_facets(f"coupling of line {link.location.line}", made.faces(link.group, link.location))
     areas = Traction(_known(mesh, deck_mesh, group), {0: 1.0}, None).vector(mesh, deck_mesh.kinematics)[:, 0]
     points = np.array(_points(deck_mesh, link), np.intp)
     weight = areas[points] / areas[points].sum()
-    with refusing(link.location):
+    with refusing(link):
         rows = distributing_rows(_reference(deck_mesh, link), points, made.points[points, : deck_mesh.dim], weight)
     turns = len(rows) - deck_mesh.dim
     return rows[:turns] + _along(rows[turns:], _directions(deck_mesh, link, made.node(link.reference, link.location)))
 
 
 def _known(mesh: Mesh, deck_mesh: DeckMesh, group: str) -> str:
-    """Return a group of the mesh with the same facets as one that was added after the mesh was made."""
+    """Return a group of the mesh with the same facets as one added after the mesh was made."""
     return next(
         name
         for name, members in deck_mesh.groups.items()

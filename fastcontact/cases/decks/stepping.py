@@ -1,11 +1,11 @@
-"""Keywords of the steps: *STEP, *STATIC, *FREQUENCY, and the blocks of supports and loads in them."""
+"""Keywords of steps: *STEP, *STATIC, *FREQUENCY, and the blocks of supports and loads in them."""
 
 from __future__ import annotations
 
 from fastcontact.cases.decks.blocks import Block, folded
 from fastcontact.cases.decks.content import Content, Given, Step
 
-# Parts of a step whose pair has friction, at most.
+# Largest number of increments of a step with friction.
 MOST_PARTS = 20
 
 
@@ -13,90 +13,84 @@ def new_step(content: Content, block: Block) -> Step:
     """*STEP."""
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
     if content.modes is not None:
-        raise block.location.refuse("follows a step with *FREQUENCY, which is supported as the last one only")
+        raise block.refuse("follows a step with *FREQUENCY, which is supported as the last one only")
     block.choice("AMPLITUDE", ("RAMP",))
     content.steps.append(Step(block.location, nonlinear, perturbation="PERTURBATION" in block.parameters))
     return content.steps[-1]
 
 
 def static(content: Content, step: Step, block: Block) -> None:
-    """*STATIC: first increment and length of the step; how it is cut is decided here."""
+    """*STATIC: first increment and length of the step, which determine its division into increments."""
     if step.static:
-        raise block.location.refuse("the step has two of it")
+        raise block.refuse("the step has this keyword twice")
     if step.modes:
-        raise block.location.refuse("a step has either *STATIC or one *FREQUENCY")
+        raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     if step.perturbation:
-        raise step.location.refuse(
-            "PERTURBATION is not supported: contact has no linear perturbation, but modes by *FREQUENCY"
-        )
+        raise step.refuse("PERTURBATION is not supported: contact has no linear perturbation, but modes by *FREQUENCY")
     step.static = True
     if "STABILIZE" in block.parameters:
-        content.note(
-            block.location, "STABILIZE has no effect: contact is exact, and bodies that it alone holds need no damping"
-        )
+        content.note(block, "STABILIZE has no effect: contact is exact, and bodies that it alone holds need no damping")
     for row in block.rows[:1]:
         step.increment = row.number(0, 1.0)
         step.period = row.number(1, 1.0)
         for index in (2, 3):
             row.number(index, 1.0)
         if not (step.period > 0 and step.increment > 0):
-            raise row.location.refuse("the increment and the length of the step must be positive")
+            raise row.refuse("the increment and the length of the step must be positive")
 
 
 def heated(content: Content, step: Step, block: Block) -> None:
-    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, of steady heat."""
+    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
-        raise block.location.refuse("only STEADY STATE is supported: heat is not followed in time")
+        raise block.refuse("only STEADY STATE is supported: heat is not followed in time")
     static(content, step, block)
     step.heat = "alone" if block.keyword == "HEAT TRANSFER" else "coupled"
     if block.keyword[:2] == "UN":
-        content.note(block.location, "temperatures and displacements are solved together")
+        content.note(block, "temperatures and displacements are solved together")
 
 
 def frequency(content: Content, step: Step, block: Block) -> None:
-    """*FREQUENCY: how many modes."""
+    """*FREQUENCY: the number of modes."""
     if step.static or step.modes:
-        raise block.location.refuse("a step has either *STATIC or one *FREQUENCY")
+        raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
     if number < 1:
-        raise block.rows[0].location.refuse("asks for no mode: write how many")
+        raise block.rows[0].refuse("requests no mode: write how many")
     step.modes = number
 
 
 def end_step(content: Content, step: Step) -> None:
-    """*END STEP: what a step with *FREQUENCY asks for is kept, and no load step."""
+    """*END STEP: a step with *FREQUENCY becomes a request for modes, not a load step."""
     if not step.modes:
         if not step.static:
-            raise step.location.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
+            raise step.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
         return
     if step.given:
-        raise step.given[0].block.location.refuse(
-            "cannot stand in a step with *FREQUENCY: modes have the supports of before"
-        )
+        raise step.given[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the supports of before")
     content.steps.pop()
     if not content.steps:
-        raise step.location.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
+        raise step.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
     if content.steps[-1].heat == "alone":
-        raise step.location.refuse("*FREQUENCY behind *HEAT TRANSFER is not supported: bodies are at rest there")
+        raise step.refuse("*FREQUENCY behind *HEAT TRANSFER is not supported: bodies are at rest there")
     stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
     content.modes = {"n": step.modes, "stress_stiffening": stiffening}
     content.note(
-        step.location,
+        step,
         f"{step.modes} modes about the last step, {'with' if stiffening else 'without'} the stiffness by its stresses "
         "(PERTURBATION, or NLGEOM before)",
     )
 
 
 def given(content: Content, step: Step | None, block: Block) -> None:
-    """Keep a block of supports or loads, in its step or before all steps."""
+    """Store a block of supports or loads, in its step or before all steps."""
     name = block.get("AMPLITUDE")
     if name and folded(name) not in content.amplitudes:
         known = ", ".join(content.amplitudes) or "none"
-        raise block.location.refuse(f"amplitude '{name}' is not defined above this line; amplitudes: {known}")
+        raise block.refuse(f"amplitude '{name}' is not defined above this line; amplitudes: {known}")
     made = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
         step.given.append(made)
     elif block.keyword == "BOUNDARY":
         content.supports.append(made)
     else:
-        raise block.location.refuse("loads belong into a step")
+        raise block.refuse("loads belong in a step")

@@ -13,7 +13,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 
 
 class _Formulations(Mapping[str, type[Formulation]]):
-    """The formulations by name, each imported when it is asked for: most models have one."""
+    """The formulations by name, each imported at its first use: most models have one."""
 
     _names = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
 

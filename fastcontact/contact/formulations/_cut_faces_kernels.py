@@ -24,8 +24,9 @@ def planes(corners, n_corners, origin, axes):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
 
-# Not a kernel of its own: of those the process that compiles them runs another copy than later ones, in which products and
-# sums may be fused otherwise. Tangents that differ in the last bit then move all results of a contact in theirs.
+# Inlined rather than a separate kernel: the process that compiles a separate kernel runs another copy than later
+# processes, in which products and sums may be fused differently. Tangents that differ in the last bit then change all
+# contact results there.
 @innermost_kernel
 def _plane(corners, count, origin, axes):
     origin[:] = 0.0
@@ -34,7 +35,7 @@ def _plane(corners, count, origin, axes):
             origin[d] += corners[k, d] / count
     normal = axes[2]
     normal[:] = 0.0
-    for k in range(count):  # area vector (Newell), which also serves facets that are not flat
+    for k in range(count):  # area vector (Newell), valid for warped facets too
         m = (k + 1) % count
         for d in range(3):
             e, f = (d + 1) % 3, (d + 2) % 3
@@ -117,7 +118,7 @@ def _clip(subject, count, window, n_window, spare):
 
 @kernel
 def _common(corners, count, others, n_others, origin, axes, subject, window, spare):
-    """Fill `subject` with the part of a polygon that faces another one; return its number of corners, 0 for none."""
+    """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
     _project(corners, count, origin, axes, subject)
     whole = _area(subject, count)
     _project(others, n_others, origin, axes, spare)
@@ -159,7 +160,7 @@ def facing_pairs(
     origin, axes : (n_facets, 3), (n_facets, 3, 3)
         Planes of the secondary facets.
     radius, reach : (n_facets,)
-        Around the centres of the secondary facets; how far off, along the normal, the other side may be.
+        Radii around the centres of the secondary facets; largest distance of the other side along the normal.
     other_normal : (n_facets, 3)
         Unit normals of the primary facets.
     numbers, tree : (n_facets,), Tree
@@ -172,7 +173,7 @@ def facing_pairs(
     Returns
     -------
     int
-        Number of pairs; larger than the room where that did not suffice, and then only the first are filled.
+        Number of pairs; if it exceeds the capacity of `pairs`, only the first ones are filled.
     """
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
     stack, leaves, count = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
@@ -230,9 +231,9 @@ def _flatten(facet, origin, axes, flat):
 
 @innermost_kernel
 def _locate(flat, x, y, xi, terms):
-    """Move `xi` (2,) to where a facet passes over (x, y) and fill `terms` there; return its area per unit of xi.
+    """Move `xi` (2,) to the point of a facet above (x, y) and fill `terms` there; return its area per unit of xi.
 
-    Zero where there is no such place.
+    Return zero if there is no such point.
     """
     n_terms = flat.shape[0]
     for _ in range(MAX_ITERATIONS):
@@ -321,23 +322,24 @@ def integrate(
     primary, n_primary, other_deformed, other_to_terms, other_middle, pairs, points, weights, heights, other_heights,
     factor, mass, coupling, closer,
 ):  # fmt: skip
-    """Integrate products of shape functions over the parts where the secondary facets `low` to ``high - 1`` face others.
+    """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
-    Both facets are followed along the normal of the secondary polygon; areas are those of the reference surface. Parts
-    are cut into triangles around their centres: the rule is not exact on mapped facets, and its error then depends on no
-    first corner and does not jump where a corner comes or goes as the facets move. Between flat triangles it is exact.
+    Both facets are projected along the normal of the secondary polygon; areas are those of the reference surface. Segments
+    are divided into triangles around their centres: the rule is not exact on mapped facets, and with the centre its
+    error does not depend on a first corner and does not jump where corners appear or vanish. Between flat triangles it
+    is exact.
 
     Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet;
     those of facet s begin at ``start[s]``.
-    `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets where they are and where they
-    were, `to_terms` (n_terms, n_nodes) leads to them from nodal values, `middle` (2,) are the reference coordinates to start
-    from; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the triangle.
-    `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, count by the `factor` (n_pairs, 2) of the pair.
-    Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over the part that faces the primary
-    side, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape functions, and `closer` (n_facets,
-    n_nodes), the former times the sum of both heights.
+    `deformed` and `reference` (n_facets, n_terms, 3) are the terms of the secondary facets in both configurations,
+    `to_terms` (n_terms, n_nodes) computes them from nodal values, `middle` (2,) is the initial guess of the reference
+    coordinates; the same with `other` for the primary facets. `points` (n_q, 2) and `weights` (n_q,) are a rule on the
+    triangle. `heights` (n_facets, k, k) of both sides' smooth surfaces, k = 0 for none, are weighted by the `factor`
+    (n_pairs, 2) of the pair. Filled in place: `mass` (n_facets, n_nodes, n_nodes) of the secondary shape functions over
+    the part that faces the primary side, `coupling` (n_pairs, n_nodes, n_other_nodes), secondary times primary shape
+    functions, and `closer` (n_facets, n_nodes), the former times the sum of both heights.
 
-    Returns -1, or the number of a pair with a facet too distorted to be followed.
+    Returns -1, or the number of a pair with a facet too distorted to be projected.
     """
     subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]

@@ -1,8 +1,8 @@
 """Segmentation of secondary lines at the projected primary nodes, and integration over the segments.
 
-The gap between facets that do not match has a kink wherever a node of the primary side stands opposite; between two of
-those it is smooth (Popp, Gee and Wall, 2009). Where the primary side ends, what is opposite lies along the normal there:
-what is beyond faces nothing, and the projections that tell so must agree with the cut.
+The gap between non-matching facets has a kink opposite every primary node; between two kinks it is smooth (Popp, Gee and
+Wall, 2009). At the end of the primary side the cut lies along the normal there: points beyond it face nothing, and the
+projections that decide this must agree with the cut.
 """
 
 from __future__ import annotations
@@ -19,19 +19,16 @@ from fastcontact.contact.search.closest import closest
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Parts of a facet shorter than this, in its own length, are rounding errors of the cut.
-SLIVER = 1e-10
 # Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest, but not faced.
 OPPOSITE = -0.5
-# A tolerance of the projection below this, in facet lengths, is one for rounding errors.
-ROUNDING = 1e-3
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
 
 @dataclass(frozen=True, eq=False)
 class LinePoints:
-    """Integration points of all pieces of a block: facet (n,), xi (n,), shape (n, k), reference area (n,)."""
+    """Integration points of all segments of a block: facet (n,), xi (n,), shape (n, k), reference area (n,)."""
 
     facet: Indices
     xi: Array
@@ -49,9 +46,10 @@ def line_points(
     tolerance: float,
     borders: tuple[Indices, Array] = NO_BORDERS,
 ) -> LinePoints:
-    """Cut the facets of a block on the deformed configuration and put Gauss points on every piece.
+    """Cut the facets of a block on the deformed configuration and place Gauss points on every segment.
 
-    The primary side ends `tolerance` facet lengths beyond its ends. `borders` are further cuts: facets (n,) and xi (n,).
+    The primary side is extended by `tolerance` facet lengths at its ends. `borders` are further cuts: facets (n,) and xi
+    (n,).
     """
     facet, begin, end = _cuts(block, primary, deformed, tolerance, borders)
     s, w = quadrature.gauss_line(n_gauss)
@@ -70,7 +68,7 @@ def line_points(
 def _cuts(
     block: FacetBlock, primary: Surface, deformed: Array, tolerance: float, borders: tuple[Indices, Array]
 ) -> tuple[Indices, Array, Array]:
-    """Return (facet, begin, end) of the pieces of the facets of a block, in their reference coordinate."""
+    """Return (facet, begin, end) of the segments of the facets of a block, in their reference coordinate."""
     n = len(block.facets)
     normals = nodal_normals(primary, deformed)
     between, along = _opposite_nodes(block, primary, deformed, normals)
@@ -79,7 +77,7 @@ def _cuts(
     xi = np.concatenate([np.full(n, -1.0), np.full(n, 1.0), along, borders[1], xi_of_end])
     order = np.lexsort((xi, facet))
     facet, xi = facet[order], xi[order]
-    piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > SLIVER)
+    piece = (facet[1:] == facet[:-1]) & (np.diff(xi) > LENGTH_ROUND_OFF)
     return facet[:-1][piece], xi[:-1][piece], xi[1:][piece]
 
 
@@ -93,10 +91,10 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
 def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normals: Array) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
 
-    Where two of these meet, that is on the line which halves the angle between them: beside it another facet is nearer. The
-    point of the block that is closest to the node does for flat sides alone: opposite a hollow corner of sides that stand
-    apart, or overlap by an interference, it leaps from one facet to the next as the bodies move. It is where the primary side
-    ends, and at its corners, beside which the flank is not faced.
+    Where two primary facets meet, the opposite point lies on the bisector of the angle between them: beside it another
+    facet is nearer. The closest point of the block is used only where the primary side ends, and at its corners, beside
+    which the flank is not faced: opposite a concave corner of sides that are apart, or overlap by an interference, it
+    jumps from one facet to the next as the bodies move.
     """
     ends, first = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
@@ -104,7 +102,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
     along = opposite.xi[:, 0]
     inner = primary.inner_ends.ravel()[first]
     smooth = inner & ~_corners(primary, deformed, normals)[ends]
-    inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - SLIVER) & ~smooth)
+    inside = np.flatnonzero((opposite.overhang == 0.0) & (np.abs(along) < 1.0 - LENGTH_ROUND_OFF) & ~smooth)
     rows = np.flatnonzero(inner)
     facets = np.column_stack([opposite.facet[rows], line_neighbours(block.local)[opposite.facet[rows]]])
     crossed = _across(deformed[block.facets[facets]], foot[rows][:, None], normal[rows][:, None])
@@ -114,7 +112,7 @@ def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normal
 
 
 def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
-    """Return which nodes (m,) of a side are corners, where a facet leans much from the nodal `normals` (m, 2)."""
+    """Return which nodes (m,) of a side are corners, where a facet is steeply inclined to the nodal `normals` (m, 2)."""
     lean = np.ones(len(side.points))
     for block in side.blocks:
         facet_normal = facet_normals(block, coordinates)
@@ -123,7 +121,7 @@ def _corners(side: Surface, coordinates: Array, normals: Array) -> Mask:
 
 
 def _across(points: Array, foot: Array, normal: Array) -> Array:
-    """Return how far `points` (..., k, 2) lie beside the lines through `foot` along `normal` (..., 2) [length]."""
+    """Return the distances of `points` (..., k, 2) from the lines through `foot` along `normal` (..., 2), signed [length]."""
     away = points - foot[..., None, :]
     return np.asarray(away[..., 0] * normal[..., None, 1] - away[..., 1] * normal[..., None, 0])
 
@@ -132,8 +130,8 @@ def _opposite_ends(
     block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
 ) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
-    # A tolerance for rounding errors alone is no part of the side: a cut there would leave a strip that faces it.
-    ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > ROUNDING else (1.0,)
+    # A tolerance for round-off only does not extend the side: a cut there would leave a strip that faces the tolerance.
+    ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
     first, facets, places = 0, [], []
     for other in primary.blocks:
         shape = elements.get(other.element).shape
@@ -160,7 +158,7 @@ def _zeros(values: Array) -> tuple[Indices, Array]:
     with np.errstate(divide="ignore", invalid="ignore"):
         both = np.stack([half / bend, middle / half], axis=1)
     both[slope**2 < 4.0 * bend * middle] = np.nan
-    row, which = np.nonzero(np.abs(both) < 1.0 - SLIVER)
+    row, which = np.nonzero(np.abs(both) < 1.0 - LENGTH_ROUND_OFF)
     return row, both[row, which]
 
 
@@ -178,9 +176,9 @@ def line_overlap(
     axisymmetric : bool
         Integrals run over the full circle.
     tolerance : float
-        How far a point may stand out beyond the end of the primary side and still face it, in facet lengths.
+        Largest distance of a point beyond the end of the primary side at which it still faces the side, in facet lengths.
     smoothing : Smoothing or None
-        The smooth surfaces that facets stand for, if they count.
+        The smooth surfaces that facets approximate, if they are taken into account.
     """
     first = np.cumsum([0] + [len(block.facets) for block in primary.blocks])
     masses, couplings, closer, number_of_first = [], [], [], 0
@@ -191,7 +189,7 @@ def line_overlap(
         at = Candidates(block.facets[points.facet], points.shape).positions(deformed)
         facing = pair(at, primary, deformed, tolerance)
         opposite = np.einsum("nd,nd->n", normals_at(block, deformed, points), facing.normal) < OPPOSITE
-        # A piece faces the other side with all its points or none: with too few it would not carry a field of its own.
+        # A segment faces the other side with all its points or none: too few points would not determine a field.
         mostly = (facing.paired & opposite).reshape(-1, k + 2).mean(axis=1) > 0.5
         area = np.where(np.repeat(mostly, k + 2), points.area, 0.0)
         mass = np.zeros((n, k, k))
@@ -199,8 +197,8 @@ def line_overlap(
         masses.append(mass)
         heights = np.zeros((n, k, 2))
         if smoothing is not None and axes is not None:
-            ours = number_of_first + points.facet, points.xi[:, None]
-            depth = area * smoothing.overlap(ours, (facing.facet, facing.xi), axes)
+            on_secondary = number_of_first + points.facet, points.xi[:, None]
+            depth = area * smoothing.overlap(on_secondary, (facing.facet, facing.xi), axes)
             np.add.at(heights, points.facet, points.shape[:, :, None] * (depth[:, None] * facing.normal)[:, None])
         closer.append(heights)
         number_of_first += n

@@ -1,11 +1,11 @@
 r"""Pressure fields that remain determined by their integration points on partly covered facets.
 
-The points of a facet that faces the other side with a strip of itself hardly determine a field over all of
-it: on a strip of a fraction :math:`\theta` at the end of a line, what a polynomial of degree k is at the other end weighs
-:math:`\theta^{2k+1}`. How well a facet determines its field says the smallest eigenvalue of its mass matrix over what takes
-part, relative to that over the whole facet. Where it is too small the field is a simpler one there: linear between the
-corners of a quadratic facet, or the value that it has at the nodes which other facets determine. Fields that are constant
-over a strip remain among them, so a uniform pressure passes.
+The integration points of a facet of which only a strip faces the other side hardly determine a field over the whole facet:
+on a strip of a fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the other end has the
+weight :math:`\theta^{2k+1}`. The measure is the smallest eigenvalue of the mass matrix over the covered part, relative to
+that over the whole facet. Where it is too small the field is simplified: linear between the corners of a quadratic facet, or
+constant from the nodes that other facets determine. Fields that are constant over a strip remain representable, so a uniform
+pressure is transmitted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import SINGLE_PRECISION
 
-# A line is determined by a seventh of it, a parabola by two fifths; values at the other end count no more than thirtyfold.
+# A seventh of the facet determines a line, two fifths a parabola; values at the other end are amplified at most thirtyfold.
 DETERMINED = 1e-3
 
 
@@ -34,7 +34,7 @@ class WholeFacets:
     ----------
     block : FacetBlock
     to_corners : ndarray (n_corners, k)
-        Corner functions by shape functions [-].
+        Coefficients of corner functions in shape functions [-].
     mass : ndarray (n_facets, k, k)
         Integrals of products of two shape functions over the facets [area].
     """
@@ -56,56 +56,56 @@ class WholeFacets:
     def degrees(self, mass: Array) -> Indices:
         """Return the degree of the field (n_facets,) that `mass` (n_facets, k, k) over the covered part determines.
 
-        2 all of it, 1 one that is linear between the corners, 0 none, -1 where nothing takes part.
+        2 for the full field, 1 for one that is linear between the corners, 0 for none, -1 where nothing takes part.
         """
         degrees = np.full(len(mass), 2)
         degrees[~mass.any(axis=(1, 2))] = -1
         size = np.einsum("fkk->f", self.mass)
         partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
-        whole, partial, T = self.mass[partly], mass[partly], self.to_corners
-        linear = _smallest(T @ whole @ T.T, T @ partial @ T.T) > DETERMINED
-        degrees[partly] = np.where(_smallest(whole, partial) > DETERMINED, 2, np.where(linear, 1, 0))
+        full, partial, T = self.mass[partly], mass[partly], self.to_corners
+        linear = _smallest(T @ full @ T.T, T @ partial @ T.T) > DETERMINED
+        degrees[partly] = np.where(_smallest(full, partial) > DETERMINED, 2, np.where(linear, 1, 0))
         return degrees
 
 
-def _smallest(whole: Array, mass: Array) -> Array:
-    """Return the smallest eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
-    inverse = np.linalg.inv(np.linalg.cholesky(whole))
+def _smallest(full: Array, mass: Array) -> Array:
+    """Return the smallest generalised eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
+    inverse = np.linalg.inv(np.linalg.cholesky(full))
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
 
 def determined(
-    side: Surface, whole: list[WholeFacets], masses: list[Array], excluded: Mask
+    side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
 ) -> tuple[csr_array, Indices]:
-    """Return the field at all nodes (m, k) by its independent values, and the nodes (k,) of these.
+    """Return the matrix (m, k) from the independent values of the field to all nodes, and the nodes (k,) of these values.
 
     Parameters
     ----------
     side : Surface
     whole : list of WholeFacets
-        Of each block of the side.
+        Whole facets of each block of the side.
     masses : list of ndarray (n_facets, n_nodes, n_nodes)
-        Integrals of products of two shape functions over what takes part [area].
+        Integrals of products of two shape functions over the covered part [area].
     excluded : ndarray of bool (m,)
-        Nodes that have no value of their own.
+        Nodes without an independent value.
     """
-    degrees = [field.degrees(mass) for field, mass in zip(whole, masses, strict=True)]
+    degrees = [field.degrees(mass) for field, mass in zip(fields, masses, strict=True)]
     kept = np.zeros(len(side.points), bool)
-    for field, degree in zip(whole, degrees, strict=True):
+    for field, degree in zip(fields, degrees, strict=True):
         kept[field.block.local[degree == 2]] = True
         kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
     kept &= ~excluded
-    for field, degree, mass in zip(whole, degrees, masses, strict=True):
+    for field, degree, mass in zip(fields, degrees, masses, strict=True):
         _give_each_a_value(kept, field.block.local[degree >= 0], mass[degree >= 0], excluded)
     independent = np.flatnonzero(kept)
     values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
     if any((degree[degree >= 0] < 2).any() for degree in degrees):
-        values = _interpolated(csr_array(values), whole, degrees, kept, excluded)
+        values = _interpolated(csr_array(values), fields, degrees, kept, excluded)
     return csr_array(csr_array(values)[:, independent]), independent
 
 
 def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
-    """Make one node independent, in place, in facets that have none: where most of the facet takes part."""
+    """Make a node of each facet without independent ones independent, in place: where most of the facet takes part."""
     for row in np.flatnonzero(~kept[local].any(axis=1)):
         nodes = local[row]
         if not (kept[nodes].any() or excluded[nodes].all()):
@@ -113,15 +113,15 @@ def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) 
 
 
 def _interpolated(
-    values: csr_array, whole: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
+    values: csr_array, fields: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
 ) -> csr_array:
-    """Return the values (m, m) with those of nodes that are neither independent nor excluded.
+    """Return `values` (m, m), completed by rows of the nodes that are neither independent nor excluded.
 
-    Corners take the mean of the independent nodes of their facets, and other nodes what is linear between the corners.
+    Corners take the mean of the independent nodes of their facets; other nodes interpolate linearly between corners.
     """
     m = len(with_value)
     pairs = []
-    for field, degree in zip(whole, degrees, strict=True):
+    for field, degree in zip(fields, degrees, strict=True):
         local = field.block.local[degree >= 0]
         corners = local[:, : len(field.to_corners)]
         row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
@@ -131,13 +131,13 @@ def _interpolated(
     count = np.bincount(row, minlength=m)
     values = csr_array(diags_array((with_value | excluded).astype(float)) @ values)
     values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
-    return csr_array(values + _between_corners(whole, degrees, with_value | excluded) @ values)
+    return csr_array(values + _between_corners(fields, degrees, with_value | excluded) @ values)
 
 
-def _between_corners(whole: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
-    """Return the rows (m, m) of nodes between corners that are not `done` (m,): linear between those."""
+def _between_corners(fields: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
+    """Return the rows (m, m) of nodes between corners that are not `done` (m,), interpolated linearly."""
     between = lil_array((len(done), len(done)))
-    for field, degree in zip(whole, degrees, strict=True):
+    for field, degree in zip(fields, degrees, strict=True):
         corners = len(field.to_corners)
         facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
         for nodes, node in zip(field.block.local[facet], k + corners, strict=True):

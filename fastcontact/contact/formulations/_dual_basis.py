@@ -5,14 +5,14 @@ For positive shape functions :math:`\tilde N` of a facet that sum to one, the du
 .. math:: \psi = \mathrm{diag}(w) M^{-1} \tilde N, \quad w = \int \tilde N, \quad M = \int \tilde N \tilde N^T
 
 obey :math:`\int \psi_j \tilde N_k = w_j \delta_{jk}` and sum to one (Wohlmuth, 2000). The integrals run over that part
-of the facet which faces the other side, so both hold there (Cichosz and Bischoff, 2011; Popp, Seitz, Gee and Wall,
-2013). Where a function has next to no part in it, M is next to singular: that function is left out, and the others
-sum to one without it.
+of the facet which faces the other side, so both properties hold there (Cichosz and Bischoff, 2011; Popp, Seitz, Gee and
+Wall, 2013). Where the covered part of a function nearly vanishes, M is nearly singular: that function is left out, and the
+others sum to one without it.
 
-The corner functions of quadratic facets are not positive. They get shares of those of the mid nodes (Popp, Wohlmuth,
-Gee and Wall, 2012), here as large as it takes to be positive everywhere, so that no part of a facet, however cut,
-weighs less than nothing: on lines, triangles and nine-node quadrangles these are the polynomials of Bernstein. The
-displacement that goes with a corner function is that of the corner; the one of a mid node adds those of its edge's ends.
+The corner functions of quadratic facets are not positive. Multiples of the mid-node functions are added to them (Popp,
+Wohlmuth, Gee and Wall, 2012), large enough for positivity everywhere, so that no part of a facet, however it is cut, has
+negative weight: on lines, triangles and nine-node quadrangles this gives the Bernstein polynomials. The coefficient of a
+corner function is the displacement of the corner; that of a mid node also involves the displacements of its edge's ends.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
-# Share of a mid node's function that either end of its edge gets: 1/4 makes parabolas Bernstein polynomials; without a
-# centre node, 3/8 is the least that leaves no negative part, that of (a + b) / 4 + 1 / 2 for a, b in [-1, 1].
+# Fraction of a mid node's function added to either end of its edge: with 1/4, parabolas become Bernstein polynomials; without
+# a centre node, 3/8 is the smallest for which (a + b) / 4 + 1 / 2, a and b in [-1, 1], has no negative part.
 SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
-# A function of which less than this fraction of its weight faces the other side takes no part of its own.
+# A function of which less than this fraction of its weight faces the other side has no dual function.
 COVERED = 0.02
-# Parts above this fraction of the largest one count as equal to it: those of curved facets differ by some hundredths.
+# Fractions above this multiple of the largest one count as equal to it: on curved facets they differ by a few percent.
 EQUAL = 0.9
 # Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond this multiple of one, and where
 # their integral falls below this fraction of their weight, they extrapolate more than they test.
@@ -69,7 +69,7 @@ def _bernstein_square(element: elements.Element) -> Array:
 
 
 def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
-    r"""Return the dual functions of facets of which any part may face the other side.
+    r"""Return the dual functions of facets of which an arbitrary part faces the other side.
 
     Parameters
     ----------
@@ -78,18 +78,18 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
     kept : ndarray of bool (n_facets, k)
         Functions that may take part.
     fraction : ndarray (n_facets, k)
-        Weight of each function over that part, in terms of its weight over the whole facet.
+        Weight of each function over that part, relative to its weight over the whole facet.
 
     Returns
     -------
     dual, D
-        As by `biorthogonal`, for all functions kept where that makes sense. On a narrow strip those with next to no
-        share are left out, and if that does not help all but those with the largest, or the first of these.
+        As by `biorthogonal`, for all functions kept where these are well conditioned. On a narrow strip functions of nearly
+        vanishing fraction are left out, and if that is not sufficient all but those of the largest, or the first of these.
     """
     partial = kept & (fraction > 0.0)
     dual, D = biorthogonal(mass, partial)
     share = np.where(partial, fraction, -1.0)
-    # Those that are nearly equal, or the first of them: which they are must not change as facets deform.
+    # All of nearly equal fraction, or the first of them: the choice must not change as facets deform.
     large = share >= EQUAL * share.max(axis=1, keepdims=True)
     largest = np.argmax(large, axis=1)[:, None] == np.arange(partial.shape[1])
     for fewer in (partial & (fraction > COVERED), partial & large, partial & largest):
@@ -102,7 +102,7 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
 
 
 def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
-    """Return for which facets (n_facets,) the dual functions are moderate and positive on average."""
+    """Return for which facets (n_facets,) the dual functions are bounded and positive on average."""
     area = np.maximum(mass.sum(axis=(1, 2)), TINY)
     weight = mass.sum(axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
@@ -133,7 +133,7 @@ def biorthogonal(mass: Array, partial: Mask) -> tuple[Array, Array]:
     """
     k = mass.shape[1]
     rest = partial.sum(axis=1)[:, None, None]
-    # Those that take part share the others evenly, so that they still sum to one.
+    # Functions left out are distributed evenly over the others, so that these still sum to one.
     spanning = np.eye(k) * partial[:, :, None] + partial[:, :, None] * ~partial[:, None, :] / np.maximum(rest, 1)
     G = np.where(partial[:, :, None] & partial[:, None, :], spanning @ mass, np.eye(k))
     weight = np.where(partial, mass.sum(axis=2), 0.0)

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
@@ -23,6 +24,7 @@ from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
 from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
+from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.contact.tied import TiedPair, moments_of, tied
@@ -32,20 +34,17 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Nodes on an axis or plane of symmetry stand out a little beyond facets that lean, nodes at the end of one side beyond
-# that of the other where the two strain differently, in facet lengths.
-ON_SYMMETRY = 0.05
 # In 3D a body that slides leaves edges and planes of symmetry node by node; a node that is dropped earlier comes and goes.
 LEAVING = 0.5
-# Sine of the angle to a plane of symmetry from which on a surface has a corner there.
+# Sine of the angle to a plane of symmetry above which a surface has a corner there.
 LEANING = 0.38
 
 
 @dataclass(eq=False)
 class Formulation(ABC):
-    """A contact formulation bound to one pair of surfaces; it does not change after it is made.
+    """A contact formulation bound to one pair of surfaces; instances are immutable.
 
-    Sub-classes are dataclasses; their further fields are the options that a user may set by name.
+    Subclasses are dataclasses; their further fields are options of the formulation.
 
     Parameters
     ----------
@@ -60,25 +59,25 @@ class Formulation(ABC):
     friction : float
         Coefficient of Coulomb friction, zero for none [-].
     projection_tolerance : float, optional
-        How far a point may stand out beyond the end of the primary side and still be paired, in facet lengths. A little by
-        default, lest points at the very end come and go as the bodies strain; in 3D, where sliding bodies leave edges and
-        planes of symmetry point by point, half a facet.
+        Largest distance beyond the end of the primary side at which a point is still paired, in facet lengths. Small by
+        default, so that points at the very end do not alternate as the bodies strain; half a facet in 3D, where sliding
+        bodies leave edges and planes of symmetry point by point.
     normals : str or sequence of float, optional
-        Along which the gap is measured. ``"facet"``: that of the primary facet at the projection; ``"averaged"``:
+        Normals along which the gap is measured. ``"facet"``: normal of the primary facet at the projection; ``"averaged"``:
         interpolated between nodal means. By default the former in 2D without `surface_smoothing`, and the latter in 3D,
-        where a point opposite an edge between facets often flips for ever. ``"secondary"``: opposite to the mean normal
-        of the secondary side at the point. A vector (dim,) of any length: that one for the whole primary side, out of its
+        where the pairing of a point opposite an edge may not converge. ``"secondary"``: opposite to the mean normal
+        of the secondary side at the point. A vector (dim,) of any length: one normal for the whole primary side, out of its
         body; points are projected along it.
     slip : str
-        ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: all relative motion
-        along the tangents to the primary side is, also of a gap that closes while its normal leans, as in code_aster.
+        ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: slip is all relative
+        displacement along the tangents to the primary side, also while a gap closes obliquely, as in code_aster.
     surface_smoothing : bool
-        Whether the gap is that between the smooth surfaces which straight facets of curved sides stand for, see
-        `surface_smoothing`; for mortar it is by default.
+        Whether to measure the gap between the smooth surfaces that straight facets of curved sides approximate, see
+        `surface_smoothing`; the default for mortar.
     options : PairOptions
         Options of the pair that do not depend on its formulation, e.g. its clearance.
     held : HeldMotions, optional
-        Directions in which supports and relations hold single nodes, where they are known.
+        Directions in which supports and multi-point constraints hold single nodes, where they are known.
     """
 
     secondary: Surface
@@ -109,7 +108,7 @@ class Formulation(ABC):
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if self.projection_tolerance is None:
-            self.projection_tolerance = ON_SYMMETRY if self.points.shape[1] == 2 else LEAVING
+            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else LEAVING
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
@@ -122,7 +121,7 @@ class Formulation(ABC):
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
-        """The smooth surfaces of both sides, where they count and differ from the facets; not along one normal for all."""
+        """The smooth surfaces of both sides; None without smoothing, on flat sides, and with one normal for all points."""
         if not self.surface_smoothing or self.options.tied or not isinstance(self.primary, Surface):
             return None
         if not isinstance(self.normals, str):
@@ -131,27 +130,19 @@ class Formulation(ABC):
 
     @property
     def slides(self) -> bool:
-        """Whether what the sides do along each other counts."""
+        """Whether tangential motion matters: friction, tying or cohesion."""
         cohesion = self.options.cohesion
         return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
 
     @property
     def eliminable(self) -> bool:
-        """Whether iterative solvers can eliminate closed constraints; penalties, which are springs, do not prevent it."""
+        """Whether iterative solvers can eliminate closed constraints; penalties do not prevent it, since they are springs."""
         return True
 
     @property
     def faceted(self) -> bool:
-        """Whether normals are those of single facets, between which points may flip."""
+        """Whether normals are those of single facets, so that the pairing of points may alternate between two."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
-
-    @property
-    def basis_transformation(self) -> csr_array | None:
-        """Values at mid nodes of functions that gaps are weighted with, where these are linear on quadratic facets.
-
-        A matrix (n_points, n_points) with rows of mid nodes and columns of corners [-]; None where there are none.
-        """
-        return None
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
@@ -163,12 +154,12 @@ class Formulation(ABC):
         """Pair the two sides and return constraints that may open and close, without penalty."""
 
     def constraints(self, at: Configuration) -> Constraints:
-        """Pair the two sides and return the constraints of the kind of contact asked for.
+        """Pair the two sides and return the constraints of the pair's kind of contact.
 
         Raises
         ------
         ContactError
-            If the pair has a penalty, and the constraints of its formulation stand for no areas.
+            If the pair has a penalty, and the constraints of its formulation have no areas.
         """
         if self.tied is not None:
             return self.tied.constraints()
@@ -184,7 +175,7 @@ class Formulation(ABC):
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
-            # Also as the step begins: what this iterate lets through by itself is not out of reach.
+            # Also at the beginning of the step: a penetration that only this iterate produces must not be ignored.
             away = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
             constraints = constraints.without(away > self.options.search_distance)
         if self.options.cohesion is not None:
@@ -205,7 +196,7 @@ class Formulation(ABC):
         if normal is None and tangential is None:
             return constraints
         if areas is None:
-            raise ContactError(f"formulation '{self.name}' knows no penalty: leave out the option")
+            raise ContactError(f"formulation '{self.name}' supports no penalty: leave out the option")
         if isinstance(normal, OverclosureLaw):
             slope, without = normal.line(-constraints.gaps(at.displacement))
             constraints = replace(
@@ -219,13 +210,13 @@ class Formulation(ABC):
 
     @cached_property
     def _gaps_as_they_lie(self) -> tuple[Array, Array]:
-        """Places (m, dim) of constraints on the bodies before any load, and their gaps (m,) [length]."""
+        """Positions (m, dim) of constraints on the undeformed bodies, and their gaps (m,) [length]."""
         constraints = self.unilateral(Configuration.undeformed(self.points))
         return constraints.positions, constraints.gap0
 
     @cached_property
     def tied(self) -> TiedPair | None:
-        """The equations of a tied pair, on the bodies as they lie before any load."""
+        """The equations of a tied pair, on the undeformed bodies."""
         if not self.options.tied:
             return None
         constraints = self.unilateral(Configuration.undeformed(self.points))
@@ -269,7 +260,7 @@ class Formulation(ABC):
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
         """Return the pairing of candidates on the deformed configuration, by the options of the pair.
 
-        `tolerance` takes the place of `projection_tolerance` where it is given.
+        `tolerance` replaces `projection_tolerance` where given.
         """
         deformed = self.points + at.displacement
         beyond = self.projection_tolerance if tolerance is None else tolerance
@@ -285,10 +276,10 @@ class Formulation(ABC):
         """Return unit means (n, dim) of the secondary facets' normals at candidates."""
         local = np.zeros(len(deformed), np.intp)
         local[self.secondary.points] = np.arange(len(self.secondary.points))
-        ours = np.einsum(
+        normal = np.einsum(
             "nk,nkd->nd", candidates.shape, nodal_normals(self.secondary, deformed)[local[candidates.nodes]]
         )
-        return np.asarray(ours / np.maximum(np.linalg.norm(ours, axis=1, keepdims=True), TINY))
+        return np.asarray(normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), TINY))
 
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
@@ -305,7 +296,7 @@ class Formulation(ABC):
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
 
     def _held_at(self, candidates: Candidates) -> Array | None:
-        """Return projectors (n, dim, dim) on the directions in which all nodes of candidates are held, None without any."""
+        """Return projectors (n, dim, dim) on the directions in which all nodes of candidates are held; None without any."""
         if self.held is None or not len(self.held.nodes) or not self.friction:
             return None
         return spanned(
@@ -330,7 +321,8 @@ class Formulation(ABC):
     ) -> tuple[tuple[csr_array, ...], Array | None]:
         """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and its constant part (k, n).
 
-        The latter: what a rigid primary side moves in the step, or minus the part that closes a gap [length]; None is zero.
+        The latter is the motion of a rigid primary side in the step, or minus the part that closes a gap [length]; None
+        for zero.
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0: Array | None = None
@@ -351,7 +343,7 @@ class Formulation(ABC):
         return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
 
     def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return by how much the smooth surfaces are closer than the facets at candidates (n,) with known facets [length]."""
+        """Return the reduction of the gaps (n,) of candidates by the smooth surfaces above their facets [length]."""
         closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
             self.smoothing is None
@@ -362,12 +354,15 @@ class Formulation(ABC):
             return closer
         deformed = self.points + at.displacement
         axes = [frames(side, self.points, deformed) for side in (self.secondary, self.primary)]
-        ours, theirs = (candidates.facet[rows], candidates.xi[rows]), (pairing.facet[rows], pairing.xi[rows])
-        closer[rows] = self.smoothing.overlap(ours, theirs, axes)
+        on_secondary, on_primary = (
+            (candidates.facet[rows], candidates.xi[rows]),
+            (pairing.facet[rows], pairing.xi[rows]),
+        )
+        closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
         return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
-        """Return the displacement of the points faced by candidates due to obstacle rotation (n, dim) [length], or None."""
+        """Return the displacement (n, dim) due to obstacle rotation of the points faced by candidates [length], or None."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.pose, at.pose_start)
@@ -381,7 +376,7 @@ class Formulation(ABC):
         """Return what secondary `nodes` (n,) face, and the mean projectors (n, dim, dim) on what is held there."""
         assert self.held is not None
         candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
-        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
+        pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
         theirs = np.zeros((len(nodes), *2 * self.points.shape[1:]))
         if isinstance(self.primary, Surface):
             rows = np.flatnonzero(pairing.paired)
@@ -404,15 +399,16 @@ class Formulation(ABC):
         return held if held.any() else None
 
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
-        """Return directions (n_nodes, dim) in which both sides are held, and do not move apart, with the nodes (n_nodes,).
+        """Return directions (n_nodes, dim) in which both sides are held without relative motion, with the nodes (n_nodes,).
 
-        So it is in a plane of symmetry and on an axis: slip is zero there whatever the traction, which nothing determines.
-        Where one side is free, or driven past the other, there is friction. Facets all of whose nodes are held are left out.
+        This is the case in a plane of symmetry and on an axis: slip is zero there for every traction, so that the traction is
+        undetermined. Where one side is free, or driven past the other, friction acts. Facets with all nodes held are
+        left out.
         """
         nodes = self._held_nodes
         if not len(nodes) or self.held is None:
             return []
-        pairing, theirs = self._opposite_held(nodes, at)
+        pairing, held_opposite = self._opposite_held(nodes, at)
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
         if isinstance(self.primary, RigidSide):
@@ -424,13 +420,14 @@ class Formulation(ABC):
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
-            # Where a leaning normal leads a little past a held node, what moves beside it does not count.
+            # Where an inclined normal leads slightly past a held node, the motion of the other nodes there is ignored.
             beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])
-            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(theirs[rows], hermitian=True), beside)
-            both = spanned(both @ theirs @ both, 0.5)
+            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), beside)
+            both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))
-        # Closing is no slip where the normal is held, too. Elsewhere it may lean, as at the edge of a plane of symmetry.
+        # Closing is no slip where the normal is held, too. Elsewhere it may be inclined, as at the edge of a plane of
+        # symmetry.
         closing = np.where(
             np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0
         )
@@ -441,7 +438,7 @@ class Formulation(ABC):
         return alike(_without_whole_facets(held, self.secondary), self.points[self.secondary.points])
 
     def _mirrored(self, side: Surface) -> Surface:
-        """Return a side whose averaged normals are those of the whole where supports hold its edge in a plane of symmetry."""
+        """Return a side whose averaged normals are those of the full model where its edge is held in a plane of symmetry."""
         if self.held is None or not np.isin(side.points, self.held.nodes).any():
             return side
         held = _without_whole_facets(self.held.at(side.points), side)
@@ -454,11 +451,11 @@ class Formulation(ABC):
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> Array:
-        """Return the slip (k, n) to add so that closing a gap is none, though the normal leans.
+        """Return the slip (k, n) to add so that closing a gap causes none where the normal is inclined.
 
-        Where the surface bends, at the edge of the contact above all, the normal of one side leans against the direction
-        in which the gap closes, and a part of that would count as slip. Along the mean of both sides' normals mirrored
-        bodies close their gaps without any.
+        On curved surfaces, above all at the edge of the contact, the normal of one side is inclined to the direction in which
+        the gap closes, and a component of the closing motion would count as slip. Along the mean of both sides' normals,
+        mirrored bodies close their gaps without slip.
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + at.displacement, self.points + at.start
@@ -466,20 +463,20 @@ class Formulation(ABC):
         rows = np.flatnonzero(pairing.paired)
         facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
         nodes, shape = candidates.nodes[rows], candidates.shape[rows]
-        theirs = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
-        theirs = interpolated(theirs, facing)
-        mean = theirs - self._secondary_normals(Candidates(nodes, shape), deformed)
+        primary_normals = at_nodes_of_facets(smooth_normals(self.primary, deformed))[pairing.facet[rows]]
+        primary_normals = interpolated(primary_normals, facing)
+        mean = primary_normals - self._secondary_normals(Candidates(nodes, shape), deformed)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         mean = np.divide(mean, length, out=np.zeros_like(mean), where=length > LENGTH_ROUND_OFF)
-        apart = np.einsum("nk,nkd->nd", shape, start[nodes])
-        apart -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
-        opening = np.einsum("nd,nd->n", mean, apart)
+        offset = np.einsum("nk,nkd->nd", shape, start[nodes])
+        offset -= np.einsum("nk,nkd->nd", facing.shape, start[facing.nodes])
+        opening = np.einsum("nd,nd->n", mean, offset)
         for k, along in enumerate(directions):
             slip0[k, rows] = np.einsum("nd,nd->n", along[rows], mean) * opening
         return slip0
 
     def first_contact(self, at: Configuration) -> tuple[Array, Array]:
-        """Return where the bodies meet first [length], and the normal faced there [-], both (dim,).
+        """Return the point of first contact [length], and the normal faced there [-], both (dim,).
 
         The secondary node with the smallest gap before any displacement of the bodies; of equally close ones that nearest to
         the origin.
@@ -495,11 +492,11 @@ class Formulation(ABC):
     ) -> tuple[Array, Array]:
         """Return the gaps (n_nodes,) of the secondary nodes [length], and the normals (n_nodes, dim) that they face [-].
 
-        Infinite where a node faces no primary facet. Clearances count unless they are left out. Where `displacement`
-        (n_points, dim) is given, the gaps are those that it leaves in the pairing of `at` [length].
+        Infinite where a node faces no primary facet. Clearances are included unless `with_clearance` is False. Where
+        `displacement` (n_points, dim) is given, the gaps are those at this displacement in the pairing of `at` [length].
         """
         nodes = Candidates.nodes_of(self.secondary)
-        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, ON_SYMMETRY))
+        pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, BESIDE))
         G, gap0 = gap_rows(nodes, pairing, self.primary, self.points)
         gap0 -= self.overlap_of_smooth(nodes, pairing, at)
         if with_clearance:
@@ -510,19 +507,17 @@ class Formulation(ABC):
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:
     """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet of a side are held."""
-    whole = np.zeros_like(held)
+    span = np.zeros_like(held)
     for block in side.blocks:
         around = held[block.local]
         vectors = np.linalg.eigh(around.mean(axis=1))[1]
         least = np.einsum("fdk,fnde,fek->fnk", vectors, around, vectors).min(axis=1) >= TOGETHER**2
         vectors = np.where(least[:, None], vectors, 0.0)
-        np.add.at(whole, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
-    return spanned(held - held @ spanned(whole, 0.5) @ held, 0.5)
+        np.add.at(span, block.local, (vectors @ vectors.transpose(0, 2, 1))[:, None])
+    return spanned(held - held @ spanned(span, 0.5) @ held, 0.5)
 
 
 def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
     """Return `known` values (k, ...) at the point (k, dim) [length] nearest to each of `positions`."""
-    from scipy.spatial import cKDTree
-
     places_before, values = known
-    return np.asarray(values[cKDTree(places_before).query(positions)[1]])
+    return np.asarray(values[nearest(places_before, positions)[1]])

@@ -1,6 +1,7 @@
 """Mortar integrals: products of shape functions over the overlap of two surfaces.
 
-`_cut_lines` and `_cut_faces` cut the facets of two meshed sides; against a rigid obstacle Gauss points of whole facets do.
+`_cut_lines` and `_cut_faces` cut the facets of two meshed sides; against a rigid obstacle, Gauss points of whole facets
+suffice.
 """
 
 from __future__ import annotations
@@ -15,9 +16,6 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 
-# What faces the other side with less than this part of its area is left out: its multipliers would have next to no equation.
-LEAST = 1e-3
-
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
@@ -29,7 +27,7 @@ class Coupling:
     pairs : ndarray of int (n, 2)
         Rows of the facets in their blocks.
     integrals : ndarray (n, n_nodes, n_primary_nodes)
-        Of secondary times primary shape functions over the common part [area].
+        Integrals of secondary times primary shape functions over the overlap [area].
     """
 
     secondary: FacetBlock
@@ -40,7 +38,7 @@ class Coupling:
 
 @dataclass(frozen=True, eq=False)
 class Overlap:
-    """All parts where two surfaces face each other.
+    """The overlap of two surfaces.
 
     Attributes
     ----------
@@ -49,9 +47,9 @@ class Overlap:
         faces the primary side [area].
     couplings : list of Coupling
     closer : list of ndarray (n_facets, n_nodes, dim)
-        For each block, integrals of its shape functions times by how much the smooth surfaces are closer to each other than
-        the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume]. Against an obstacle,
-        which has no points in the mesh, by the places on it that are faced.
+        For each block, integrals of its shape functions times the distance by which the smooth surfaces are closer to each
+        other than the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume]. Against an
+        obstacle, which has no points in the mesh, times the positions faced on it.
     """
 
     mass: list[Array]
@@ -72,7 +70,7 @@ def obstacle_overlap(
         Reference and deformed coordinates (n_points, dim) [length].
     axisymmetric : bool
     pose : Pose
-        Where the obstacle stands.
+        Position and rotation of the obstacle.
     """
     mass, faced = [], []
     for block in secondary.blocks:

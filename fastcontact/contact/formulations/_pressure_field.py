@@ -1,4 +1,4 @@
-r"""The base of formulations with a pressure field: contact decided at integration points, pressures at nodes.
+r"""Base of formulations with a pressure field: contact status at integration points, pressures at nodes.
 
 The multiplier field :math:`\lambda_h` has the order of the facets. At every integration point the pressure is
 
@@ -12,10 +12,10 @@ Lagrangian. With the point forces :math:`y = w p` as unknowns it becomes a linea
           C = \tfrac{1}{\rho} \left( W^{-1} - P (P^T W P)^{-1} P^T \right)
 
 with P the shape functions at the points and W their areas. C is positive semidefinite and vanishes on the fields that
-the shape functions can represent, so the multiplier itself is not softened; it only decides what is finer than the
+the shape functions can represent, so the multiplier itself is not regularised; C only acts on components finer than the
 field. The primal-dual active set solves this exactly (as a semismooth Newton method), for every rho > 0, with the
-pairing renewed in every iteration. No multiplier can stay undetermined as long as :math:`P^T W P` is regular: that
-takes at least as many points with a weight on a facet as it has nodes. Integrals run over the reference surface.
+pairing renewed in every iteration. All multipliers are determined as long as :math:`P^T W P` is regular: a facet needs at
+least as many weighted points as it has nodes. Integrals run over the reference surface.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class PressureField(NodalField):
     projection : Projection
         From point forces to the independent values of the field.
     nodes : csr_array (n_nodes, k)
-        From those to the values at all nodes [-].
+        From the independent values to those at all nodes [-].
     independent : ndarray of int (k,)
         Nodes of the independent values.
     around : ndarray of int (m, n)
@@ -56,7 +56,7 @@ class PressureField(NodalField):
     shape : ndarray (m, n)
         Their shape functions there [-].
     renewed : bool
-        Whether every pairing has integration points of its own.
+        Whether every pairing creates new integration points.
     nodal_areas : ndarray (n_nodes,)
         Integrals of the nodes' shape functions over the whole secondary side, by the rule of the points [area].
     covered_areas : ndarray (n_nodes,)
@@ -84,9 +84,9 @@ class PressureField(NodalField):
 
         `areas` are those of the points that take part, zero elsewhere, and of all points, both (m,) [area].
         """
-        (around, shape), (nodes, independent), (taking_part, whole) = points, field, areas
+        (around, shape), (nodes, independent), (taking_part, full_areas) = points, field, areas
         P = shapes_at(shape, around, nodes.shape[0])
-        covered, total = P.T @ taking_part, P.T @ whole
+        covered, total = P.T @ taking_part, P.T @ full_areas
         P = csr_array(P @ nodes)
         mass = splu((P.T @ diags_array(taking_part) @ P).tocsc()) if len(independent) else None
         projection = Projection(P, taking_part, rho, mass)
@@ -111,18 +111,18 @@ class PressureField(NodalField):
     @property
     def covered(self) -> Array:
         """Covered part of the nodal areas; one for nodes without area."""
-        whole = self.nodal_areas
-        with_area = np.abs(whole) > LENGTH_ROUND_OFF * np.abs(whole).max(initial=0.0)
-        return np.divide(self.covered_areas, whole, out=np.ones_like(whole), where=with_area)
+        areas = self.nodal_areas
+        with_area = np.abs(areas) > LENGTH_ROUND_OFF * np.abs(areas).max(initial=0.0)
+        return np.divide(self.covered_areas, areas, out=np.ones_like(areas), where=with_area)
 
     def shares(self, force: Array) -> Array:
         """Return the field times the areas that take part."""
         return self.pressure(force) * self.covered_areas
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
-        """Return means of gaps with the shape functions of the nodes: where points are closed they are zero, gaps may not be.
+        """Return means of the gaps weighted by nodal shape functions: zero around closed points even if nodal gaps are not.
 
-        Corners of quadratic faces without area have none, and no points are theirs.
+        Corners of quadratic faces without area have no mean, and no points belong to them.
         """
         usable, n = np.isfinite(gaps), len(self.nodal_areas)
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
@@ -133,12 +133,12 @@ class PressureField(NodalField):
         return np.divide(sums, total, out=np.full(n, np.inf), where=kept), self.around[np.arange(len(gaps)), near]
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the nodes with a pressure that an active point is nearest to; at least one of its facet, if any has one.
+        """Return the nodes with a pressure that are nearest to an active point; at least one per facet, if any has one.
 
-        The nodal gap plays no part: between facets that curve differently, nodes of facets in contact stand off. A node
-        without area, at the corner of some quadratic faces, can carry nothing for such a point: there the nearest one with
-        an area is closed, too. Of nodes that no point with an area is nearest to, at an axis or beyond the end of the other
-        side, the facet tells.
+        The nodal gap is not used: between facets of different curvature, nodes of facets in contact have open gaps. A node
+        without area, at the corner of some quadratic faces, carries no force: the nearest node with an area is closed
+        instead. Nodes to which no point with an area is nearest, at an axis or beyond the end of the other side, follow
+        their facet.
         """
         usual = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
         near = _nearest(self.around[active], self.shape[active], len(gap))
@@ -149,13 +149,13 @@ class PressureField(NodalField):
         touched[self.around[active]] = True
         near |= touched & ~_nearest(self.around[seen], self.shape[seen], len(gap))
         near &= pressure > 0
-        # Forces at one end of a facet, opposite an edge, may leave the nearest node a tension: then its others.
-        alone = self.around[active][~near[self.around[active]].any(axis=1)]
-        near[alone[pressure[alone] > 0]] = True
+        # Forces at one end of a facet, opposite an edge, may put the nearest node in tension: then the others of its facet.
+        isolated = self.around[active][~near[self.around[active]].any(axis=1)]
+        near[isolated[pressure[isolated] > 0]] = True
         return near
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
-        """Return the points where the field exceeds rho times the gap, if they were not there in the last pairing."""
+        """Return the points where the field exceeds rho times the gap, if the points are new in this pairing."""
         if not self.renewed:
             return None
         field = self.projection.P @ pressure[self.independent]
@@ -185,9 +185,9 @@ class PressureFieldFormulation(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`: the part outside the field is compliant, but the field values can be eliminated.
+        """See `Formulation`: forces outside the field are compliant, but the field values can be eliminated.
 
-        In space, without friction, which would couple them along all directions.
+        This holds in space without friction, which would couple them in all directions.
         """
         return self.points.shape[1] == 3 and not self.friction
 
@@ -197,7 +197,7 @@ class PressureFieldFormulation(Formulation):
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
     def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
-        """Return a field with one value for coincident nodes: nodal by independent values, and the nodes of the latter."""
+        """Return a field with one value for coincident nodes: the matrix to nodal values, and the independent nodes."""
         same, (values, nodes) = self.options.same_place, field
         if same is None:
             return field
@@ -239,8 +239,8 @@ class PressureFieldFormulation(Formulation):
             columns = np.flatnonzero(nodes[field.independent])
             if len(columns):
                 Z = field.projection.compliant(columns)
-                own = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
-                at_points = field.projection.P @ own[field.independent]
-                parts = [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
-                factors.append(np.stack([part[:, None] * Z for part in parts]))
+                in_axes = held if field.axes is None else np.einsum("nde,nd->ne", field.axes[1], held)
+                at_points = field.projection.P @ in_axes[field.independent]
+                components = [np.einsum("nd,nd->n", along, at_points) for along in (normals(directions), *directions)]
+                factors.append(np.stack([component[:, None] * Z for component in components]))
         return np.concatenate(factors, axis=2) if factors else None

@@ -1,9 +1,9 @@
 r"""Segment-based mortar contact in the plane with a multiplier field, integrated exactly over the segments.
 
-Every secondary facet is cut in each pairing, see `_cut_lines`, and every piece gets Gauss points of its own (Puso and
-Laursen, 2004). A uniform pressure then passes between meshes that do not match without error, which neither
-node-to-segment nor quadrature over whole facets achieves. Pieces that face nothing carry nothing, and the pressure field
-is projected over the rest: where the primary surface ends inside a facet, the pressure ends there too.
+Every secondary facet is cut in each pairing, see `_cut_lines`, and every segment gets its own Gauss points (Puso and
+Laursen, 2004). A uniform pressure is then transmitted exactly between non-matching meshes, which neither node-to-segment
+contact nor quadrature over whole facets achieves. Segments that face nothing carry nothing, and the pressure field is
+projected over the others: where the primary surface ends inside a facet, the pressure ends there too.
 
 The pressure at a point and the complementarity are those of `_pressure_field`.
 """
@@ -16,11 +16,11 @@ from typing import ClassVar
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
+from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._determined_field import WholeFacets, determined
-from fastcontact.contact.formulations._overlap import LEAST
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import facet_measure
 from fastcontact.contact.pairing import Candidates
@@ -33,12 +33,12 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 @dataclass(eq=False)
 class SegmentMortar(PressureFieldFormulation):
-    """Mortar contact with exact integration over cut lines; further parameters as in `PressureFieldFormulation`.
+    """Mortar contact with exact integration over segments of lines; further parameters as in `PressureFieldFormulation`.
 
     Parameters
     ----------
     n_gauss : int, optional
-        Gauss points per piece; by default 3 on linear and 4 on quadratic facets.
+        Gauss points per segment; by default 3 on linear and 4 on quadratic facets.
     multipliers : str
         ``"standard"``: the multiplier field is that of the facets.
     """
@@ -63,7 +63,7 @@ class SegmentMortar(PressureFieldFormulation):
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Cut and pair on the displaced configuration and return the gaps of the integration points."""
+        """Intersect the facets on the deformed configuration and return the gaps of the integration points."""
         deformed = self.points + at.displacement
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
@@ -77,7 +77,7 @@ class SegmentMortar(PressureFieldFormulation):
         paired = np.repeat(faced.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
         total = np.bincount(facet, weights=area)
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
-        kept = paired & (covered > LEAST * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        kept = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.out(candidates)
         pairing = replace(faced, paired=kept)
         field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
         return self.of_points(candidates, pairing, field, at)

@@ -1,16 +1,16 @@
 r"""Mortar contact with one weighted gap per node: :math:`\int \psi_j\, (x_s - x_p) \cdot n_j \ge 0`.
 
-The integrals run over the pieces into which the two sides cut each other (Puso, 2004; Popp, Gitterle, Gee and Wall,
-2010). A gap is divided by the weight of its :math:`\psi_j`, so that it is a length, and its multiplier is the force
-of the node's share of the pressure; the normal is the mean of those of the primary side around the node.
+The integrals run over the mortar segments of the two sides (Puso, 2004; Popp, Gitterle, Gee and Wall, 2010). A gap is divided
+by the weight of its :math:`\psi_j`, so that it is a length and its multiplier is the nodal force; the normal is the mean of
+the normals of the primary side around the node.
 
 ``"dual"`` functions are biorthogonal to the displacement of the secondary side, see `_dual_basis`: a gap involves one
-node of that side, on quadratic facets also the ends of the edge in the middle of which it lies. So constraints are
-eliminated one by one, the corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are
-linear between the corners, also on quadratic facets; only corners have gaps.
+node of that side, and for a mid node also the ends of its edge. Constraints can therefore be eliminated one by one, the
+corners first, and the matrix stays sparse and positive definite. ``"standard"`` functions are linear between the corners,
+also on quadratic facets; only corners have gaps.
 
-Against a rigid obstacle the integrals run over whole facets by Gauss points, and :math:`x_p` is the place on the obstacle
-nearest to each.
+Against a rigid obstacle the integrals use Gauss points of whole facets, and :math:`x_p` is the point of the obstacle closest
+to each.
 """
 
 from __future__ import annotations
@@ -25,29 +25,29 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Mask
+from fastcontact.contact.closed_nodes import NO_AREA
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import LEAST, Overlap, obstacle_overlap
+from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import NodalNormals, Points, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
+from fastcontact.contact.projection_kernels import BEYOND
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
 from fastcontact.mesh import elements
 from fastcontact.round_off import SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
-# A tangent of which less than this part, squared, is free counts as held.
+# A tangent of which a smaller fraction, squared, is free counts as held.
 FREE = 0.1
-# In facet lengths: points of facets in contact that stand out farther beyond the primary side than this do not face it.
-BESIDE = 1.0
 
 
 @dataclass(eq=False)
@@ -57,8 +57,8 @@ class WeightedMortar(Formulation):
     Parameters
     ----------
     normals : str or sequence of float
-        What the normal of a node is the mean of: ``"facet"``, those of the primary facets that it faces;
-        ``"averaged"``, nodal means of them. ``"secondary"`` and vectors as in `Formulation`.
+        Normals that are averaged to that of a node: ``"facet"``, those of the opposite primary facets; ``"averaged"``,
+        their nodal means. ``"secondary"`` and vectors as in `Formulation`.
     multipliers : str
         ``"dual"`` or, between faces, ``"standard"``.
     """
@@ -85,32 +85,11 @@ class WeightedMortar(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`; with a penalty, excesses at corners of quadratic facets would need unknowns of their own."""
-        if self.multipliers == "dual" or self.secondary.order == 1:
-            return True
-        exact = self.options.penalty is None and self.options.tangential_penalty is None
-        return exact and self.points.shape[1] == 3
-
-    @property
-    def basis_transformation(self) -> csr_array | None:
-        """See `Formulation`."""
-        if self.multipliers == "dual" or self.secondary.order == 1:
-            return None
-        rows, columns, values = [], [], []
-        for block, T in zip(self.secondary.blocks, self._test, strict=True):
-            corner, mid = np.nonzero(T)
-            beside = mid >= elements.get(block.element).n_corners
-            corner, mid = corner[beside], mid[beside]
-            rows.append(block.facets[:, mid].ravel())
-            columns.append(block.facets[:, corner].ravel())
-            values.append(np.tile(T[corner, mid], len(block.facets)))
-        at = np.concatenate(rows), np.concatenate(columns)
-        shape, count = (len(self.points),) * 2, csr_array((np.ones(len(at[0])), at), shape=(len(self.points),) * 2)
-        total = csr_array((np.concatenate(values), at), shape=shape)
-        return csr_array((total.data / count.data, total.indices, total.indptr), shape=shape)
+        """See `Formulation`; standard multipliers couple the corners of quadratic facets through their mid nodes."""
+        return self.multipliers == "dual" or self.secondary.order == 1
 
     def _test_functions(self, name: str) -> Array:
-        """Return the non-negative functions of a facet that sum to one, by its shape functions (n_nodes, n_nodes)."""
+        """Return the non-negative functions of a facet that sum to one, as coefficients (n_nodes, n_nodes)."""
         if self.multipliers == "dual":
             return positive(name)
         element = elements.get(name)
@@ -133,13 +112,13 @@ class WeightedMortar(Formulation):
         )
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Cut and pair on the displaced configuration and return one mean gap per node."""
+        """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         deformed = self.points + at.displacement
         overlap = self._overlap(deformed, at.pose)
         covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         kept = self._taking_part(covered)
         rows, across, closer = self._weighted(overlap, covered, kept)
-        # Left out as a whole: its neighbours' functions do not take over what an excluded node stands for.
+        # Left out altogether: the functions of its neighbours are not extended over the area of an excluded node.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
@@ -166,8 +145,8 @@ class WeightedMortar(Formulation):
         closing = self._closing(constraints, normal, at)
         slip0 = self._slip0(mean, closing, rubbing, at)
         for along, still, more in beside:
-            ours = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
-            falsely = np.einsum("md,md->m", more @ ours, along)
+            remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
+            falsely = np.einsum("md,md->m", more @ remaining, along)
             slip0 += np.stack([np.einsum("md,md->m", t, along) * falsely for t in rubbing])
         return replace(
             constraints,
@@ -181,9 +160,9 @@ class WeightedMortar(Formulation):
         self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
         multiplier: Array,
     ) -> WeightedForces:  # fmt: skip
-        """Return how contact forces and mean gaps vary; see `linearised_geometry`.
+        """Return the linearisation of contact forces and mean gaps; see `linearised_geometry`.
 
-        Over Gauss points of whole facets: where the cut runs, what is integrated is continuous.
+        Gauss points of whole facets suffice: the integrand is continuous across the cuts.
         """
         deformed, acts = self.points + at.displacement, multiplier != 0.0
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
@@ -201,7 +180,7 @@ class WeightedMortar(Formulation):
             shapes.append(np.tile(shape, (len(facets), 1)))
             first += area.size
         candidates = Candidates(filled_up(nodes), filled_up(shapes))
-        pairing = pair(candidates.positions(deformed), self.primary, deformed, BESIDE, "facet", at.pose)
+        pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
@@ -210,7 +189,7 @@ class WeightedMortar(Formulation):
         return WeightedForces(points, weighted, mean, normal, multiplier, self._own_normals(pairing, deformed, at.pose))
 
     def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
-        """Return how the normals of the nodes vary, where they are no means over the primary side."""
+        """Return the variation of the nodal normals, where they are no means over the primary side."""
         if isinstance(self.primary, RigidSide):
             nodes = self.secondary.points[:, None]
             here, all_nodes = Candidates(nodes, np.ones(nodes.shape)), np.arange(len(nodes))
@@ -218,12 +197,12 @@ class WeightedMortar(Formulation):
         return NodalNormals(self.secondary, deformed) if self.normals == "secondary" else None
 
     def _fraction(self, number: int, covered: list[Array]) -> Array:
-        """Return what part of the weights (n_facets, k) of its functions a block faces the other side with."""
-        whole = self._whole[number]
-        return np.where(whole > 0.0, covered[number] / np.where(whole > 0.0, whole, 1.0), 0.0)
+        """Return the fraction (n_facets, k) of the weights of a block's functions that faces the other side."""
+        full_area = self._whole[number]
+        return np.where(full_area > 0.0, covered[number] / np.where(full_area > 0.0, full_area, 1.0), 0.0)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
-        """Return the slip (k, m) beside that by displacements: by a rigid obstacle, or minus the part of `closing`."""
+        """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
@@ -250,16 +229,16 @@ class WeightedMortar(Formulation):
     @cached_property
     def _areas(self) -> tuple[Array, Array]:
         """The integrals (m,) of the test functions and of the shape functions over the whole secondary side [area]."""
-        whole = nodal_areas(self.secondary, self.points, self.axisymmetric)
-        tested = np.zeros_like(whole)
+        full_area = nodal_areas(self.secondary, self.points, self.axisymmetric)
+        tested = np.zeros_like(full_area)
         for block, full in zip(self.secondary.blocks, self._whole, strict=True):
             np.add.at(tested, block.local, full)
-        return tested, whole
+        return tested, full_area
 
     def _closing(self, part: Constraints, normal: Array, at: Configuration) -> Array:
         """Return the gaps (m, dim) that the step closes, along the directions in which closing is no slip [length].
 
-        As in `Formulation`: along the mean of both sides' normals, but along that of an obstacle.
+        As in `Formulation`: along the mean of both sides' normals, or along the normal of an obstacle.
         """
         between = normal
         if not isinstance(self.primary, RigidSide):
@@ -275,25 +254,25 @@ class WeightedMortar(Formulation):
     ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
         """Return rows (m, n_dofs) of the slips along tangents (m, dim).
 
-        Mostly they are those of the `mean` relative motion. In a direction in which both sides are held at a node, as in a
-        plane of symmetry, that would be the motion of the other side beside the plane, for want of any at the node: there
-        the functions of its neighbours take the place of the node's own (`Formulation.without_slip`). For each such direction
-        (m, dim) also the matrix (m, m) of what these functions take more of the motion of the secondary nodes: on curved
-        sides these close their gaps along other normals.
+        Usually these are the rows of the `mean` relative motion. In a direction in which both sides are held at a node, as in
+        a plane of symmetry, the mean would contain only the motion of the other side beside the plane: there the functions of
+        neighbouring nodes replace the node's own (`Formulation.without_slip`). For each such direction (m, dim) the matrix
+        (m, m) of the additional motion of secondary nodes in these functions is returned, too: on curved sides they close
+        their gaps along other normals.
         """
         rows, beside = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for along, nodes in without_slip:
             if not (nodes & kept).any():
                 continue
-            ours, across, _ = self._weighted(overlap, covered, kept & ~nodes)
-            other = csr_array(scaled(csr_array(ours - across), 1.0 / weight) - mean)
+            on_secondary, across, _ = self._weighted(overlap, covered, kept & ~nodes)
+            other = csr_array(scaled(csr_array(on_secondary - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
                 slip = np.einsum("md,md->m", direction, along)
                 rows[k] = csr_array(rows[k] + rows_of(other, slip[:, None] * along))
             beside.append(
-                (along, nodes, csr_array(scaled(csr_array(ours - own), 1.0 / weight)[:, self.secondary.points]))
+                (along, nodes, csr_array(scaled(csr_array(on_secondary - own), 1.0 / weight)[:, self.secondary.points]))
             )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
@@ -302,8 +281,8 @@ class WeightedMortar(Formulation):
     def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
 
-        And those of psi with by how much the smooth surfaces are closer than the facets (m,) [volume].
-        `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
+        The third result are the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
+        [volume]. `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
         """
         size = (len(self.secondary.points), len(self.points))
         rows, across, functions = Entries(), Entries(), {}
@@ -316,13 +295,13 @@ class WeightedMortar(Formulation):
             functions[block.element] = psi
             np.add.at(closer, block.local, psi @ overlap.closer[number])
         for coupling in overlap.couplings:
-            ours, theirs = coupling.pairs.T
-            values = functions[coupling.secondary.element][ours] @ coupling.integrals
-            across.add(coupling.secondary.local[ours], coupling.primary.facets[theirs], values)
+            secondary_facet, primary_facet = coupling.pairs.T
+            values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
+            across.add(coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values)
         return rows.matrix(size), across.matrix(size), closer
 
     def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
-        """Return psi of facets by their shape functions, and its integrals with those, both (n_facets, k, k)."""
+        """Return the coefficients of psi in shape functions, and its integrals with these, both (n_facets, k, k)."""
         if self.multipliers == "standard":
             psi = np.where(kept[:, :, None], T, 0.0)
             return psi, psi @ mass
@@ -332,22 +311,22 @@ class WeightedMortar(Formulation):
     def _taking_part(self, covered: list[Array]) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""
         m = len(self.secondary.points)
-        total, whole, rescued = np.zeros(m), np.zeros(m), np.zeros(m, bool)
+        total, complete, rescued = np.zeros(m), np.zeros(m), np.zeros(m, bool)
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
             np.add.at(total, block.local, weights)
-            np.add.at(whole, block.local, full)
-        enough = total > (COVERED if self.multipliers == "dual" else LEAST) * whole
+            np.add.at(complete, block.local, full)
+        enough = total > (COVERED if self.multipliers == "dual" else NO_AREA) * complete
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
-            # What a facet faces is not lost: where no node has enough, the one with most takes it.
-            lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > LEAST * full.sum(axis=1))
+            # The overlap of a facet is not lost: where no node has a sufficient part, the node with the largest takes it.
+            lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
-        return (enough | rescued) & (whole > 0.0)
+        return (enough | rescued) & (complete > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
-        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis for nodes without.
+        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis where there are none.
 
-        Against an obstacle the normals at the nodes themselves, which lie in planes of symmetry.
+        Against an obstacle these are the normals at the nodes themselves, which lie in planes of symmetry.
         """
         if isinstance(self.primary, RigidSide):
             _, normal, paired, _ = self.primary.facing(deformed[self.secondary.points], pose)
@@ -363,9 +342,9 @@ class WeightedMortar(Formulation):
         }
         tests = dict(zip((block.element for block in self.secondary.blocks), self._test, strict=True))
         for coupling in overlap.couplings:
-            ours, theirs = coupling.pairs.T
-            faced = coupling.integrals @ normals_of[coupling.primary.element][theirs]
-            np.add.at(mean, coupling.secondary.local[ours], tests[coupling.secondary.element] @ faced)
+            secondary_facet, primary_facet = coupling.pairs.T
+            faced = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
+            np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ faced)
         self.secondary.add_across_ends(mean)
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
@@ -390,15 +369,15 @@ class WeightedPressures(NodalField):
     Attributes
     ----------
     weight : ndarray (m,)
-        Area that each gap stands for, infinite where it does nothing [area].
+        Area of each gap, infinite where it takes no part [area].
     tested : ndarray (m,)
         Integrals of the positive functions over the whole secondary side [area].
     nodal_areas : ndarray (m,)
         The same of the shape functions [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
-        Kinds of quadratic facets: number of corners, positive functions by shape functions, nodes.
+        Kinds of quadratic facets: number of corners, coefficients of positive functions in shape functions, nodes.
     held : ndarray of bool (m,)
-        Nodes that supports prescribe altogether: their forces are between supports, and say nothing of their neighbours.
+        Nodes prescribed in all directions: their forces act between supports and say nothing about those of their neighbours.
     """
 
     weight: Array
@@ -423,15 +402,15 @@ class WeightedPressures(NodalField):
     def over_whole_side(self, force: Array) -> Array:
         """Return forces over the whole areas of the positive functions; see `_at_nodes`.
 
-        A node may face the other side with as little as it likes, and its force goes to nothing with that: over what it
-        faces its pressure is nearly undetermined, over all that belongs to it it is not.
+        The part of a node's area that faces the other side may be arbitrarily small, and its force vanishes with it: per
+        facing area its pressure is nearly undetermined, per whole area it is not.
         """
         return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
 
-        They are the coefficients themselves but for mid nodes of quadratic facets, where functions of corners are not
+        They are the coefficients themselves except at mid nodes of quadratic facets, where corner functions are not
         zero, or the only ones.
         """
         values = coefficients.copy()

@@ -1,6 +1,6 @@
 r"""Continuous formulation: a multiplier field on the secondary facets, contact status at integration points.
 
-The integration points stay where they are on the secondary facets; see `_pressure_field` for the equations.
+The integration points are fixed on the secondary facets; see `_pressure_field` for the equations.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ class Continuous(PressureFieldFormulation):
     Parameters
     ----------
     integration : str
-        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``, where every node keeps off
-        the other side, on the axis, too, where it has no area. On triangles Simpson's
-        place is taken by the closed rule of seven points. The nodes of six-node triangles and eight-node quadrangles
-        have no positive areas, so ``"node"`` is refused there.
+        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``, with which no node
+        penetrates the other side, not even on the axis, where its area is zero. On triangles a seven-point rule
+        replaces Simpson's. On six-node triangles and eight-node quadrangles, whose corners have no positive areas,
+        ``"node"`` is refused.
     n_gauss : int, optional
-        Gauss points in each direction of a facet, on triangles 3, 6, 12 or 16 points in all for 2 to 5; by default 3 on
-        linear and 4 on quadratic facets. They must determine the field.
+        Gauss points in each direction of a facet (on triangles, 2 to 5 stand for 3, 6, 12 or 16 points in total); by
+        default 3 on linear and 4 on quadratic facets. They must determine the pressure field.
     normals : str or sequence of float
-        ``"averaged"`` by default: with normals that jump between facets, a point opposite a node can flip for ever.
+        ``"averaged"`` by default: with discontinuous normals, the pairing of a point opposite a node may not converge.
     """
 
     normals: Normals | None = "averaged"
@@ -68,13 +68,13 @@ class Continuous(PressureFieldFormulation):
             shortest = min(shortest, size.min() ** (1 / xi.shape[1]))
         self._candidates = Candidates.inside(self.secondary, rules)
         rho = self.augmentation * self.modulus / shortest
-        whole = np.concatenate(areas)
-        areas_of_points = np.where(self.options.out(self._candidates), 0.0, whole)
+        all_areas = np.concatenate(areas)
+        areas_of_points = np.where(self.options.out(self._candidates), 0.0, all_areas)
         around = filled_up(local)
         P = shapes_at(self._candidates.shape, around, len(self.secondary.points))
         field = self.repeated(self._determined(P, areas_of_points))
         points = around, self._candidates.shape
-        self._field = PressureField.of_points(points, (areas_of_points, whole), float(rho), field, renewed=False)
+        self._field = PressureField.of_points(points, (areas_of_points, all_areas), float(rho), field, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
         if self.integration not in RULES:
@@ -110,15 +110,15 @@ class Continuous(PressureFieldFormulation):
         fine, w = fine_rule(block.element)
         measure = facet_measure(block.facets, block.element, self.points, fine, self.axisymmetric) * w
         areas = measure @ elements.get(block.element).shape(fine)
-        if block.element == "line3":  # at the axis the integral vanishes, but for the curvature of the facet
+        if block.element == "line3":  # at the axis the integral vanishes, except for the curvature of the facet
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()
 
     def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
         """Return the matrix (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
 
-        The identity, but for a quadratic line that ends on the axis when the points are the nodes: that end has no
-        area and its value no equation. The field is even about the axis, which gives it by the two other nodes.
+        This is the identity, except for a quadratic line that ends on the axis when the points are the nodes: that end has no
+        area, and its value no equation. The field is even about the axis, which determines it from the two other nodes.
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
@@ -148,9 +148,9 @@ class Continuous(PressureFieldFormulation):
 
     @cached_property
     def _at_axis(self) -> Mask:
-        """The points (m,) that are nodes on the axis: without area, but nothing else keeps those nodes apart.
+        """The points (m,) that are nodes on the axis: without area, but no other point prevents their penetration.
 
-        Not with a penalty, which acts on areas.
+        None with a penalty, which acts on areas.
         """
         areas = self._field.projection.areas
         if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:

@@ -1,10 +1,10 @@
 """Node-to-segment contact: no secondary node penetrates the primary facet it projects onto.
 
 One constraint per secondary node, enforced exactly; the multiplier is the nodal contact force. The pairing, the
-normal of the primary facet and the projection are held during an active-set solution (code_aster, R5.03.50,
-formulation DISCRETE with ALGO_CONT='CONTRAINTE'). It does not pass the patch test on meshes that do not match, and
-oscillates on quadratic facets: there, the continuous formulation is the better choice. Under a uniform pressure the
-corner forces of six-node triangles vanish and those of eight-node quadrangles pull: they are refused.
+normal of the primary facet and the projection are fixed during an active-set solution (code_aster, R5.03.50, formulation
+DISCRETE with ALGO_CONT='CONTRAINTE'). It does not pass the patch test on non-matching meshes, and oscillates on quadratic
+facets: there, the continuous formulation is the better choice. Under a uniform pressure the corner forces of six-node
+triangles vanish and those of eight-node quadrangles are tensile: both are refused.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.sparse.linalg import SuperLU, splu
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
@@ -37,8 +38,8 @@ class NodeToSegment(Formulation):
     Parameters
     ----------
     opposite : str
-        ``"facet"``: the gap is that to the primary facet a node faces. ``"node"``: to the nearest primary node, as suits
-        meshes that match and hardly slide (APPARIEMENT='NODAL' of code_aster).
+        ``"facet"``: gap to the opposite primary facet. ``"node"``: gap to the nearest primary node, for matching
+        meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"
@@ -58,7 +59,7 @@ class NodeToSegment(Formulation):
         self._candidates = Candidates.nodes_of(self.secondary)
 
     def _check_areas(self, element: str) -> None:
-        """Refuse facets whose nodes do not all push under a uniform pressure."""
+        """Refuse facets whose nodal forces under a uniform pressure are not all compressive."""
         if not all_nodes_carry(element):
             raise ContactError(
                 f"node_to_segment cannot have facets of {element} on its secondary side '{self.secondary.group}', "
@@ -70,17 +71,15 @@ class NodeToSegment(Formulation):
         pairing = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
             return pairing
-        from scipy.spatial import cKDTree
-
         assert isinstance(self.primary, Surface)
         deformed, nodes = self.points + at.displacement, Candidates.nodes_of(self.primary)
-        nearest = cKDTree(deformed[self.primary.points]).query(candidates.positions(deformed))[1]
+        rows = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
-        if self.normals in ("facet", "averaged"):  # the primary side's own: the means of the facets there
-            normal = nodal_normals(self.primary, deformed)[nearest]
+        if self.normals in ("facet", "averaged"):  # normals of the primary side: the means of the facets there
+            normal = nodal_normals(self.primary, deformed)[rows]
         assert nodes.facet is not None
         assert nodes.xi is not None
-        return replace(pairing, facet=nodes.facet[nearest], xi=nodes.xi[nearest], normal=normal, beyond=None)
+        return replace(pairing, facet=nodes.facet[rows], xi=nodes.xi[rows], normal=normal, beyond=None)
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair on the displaced configuration and return one gap per secondary node."""
@@ -111,7 +110,7 @@ class NodalForces(NodalField):
         Integrals of the nodes' shape functions [area].
     mass : SuperLU, optional
         Factors of the mass matrix of quadratic facets: their nodal areas are not positive (zero at the axis), so that
-        division by them means nothing.
+        division by them is meaningless.
     """
 
     nodal_areas: Array

@@ -1,9 +1,9 @@
-"""Rigid obstacles, one file each kind.
+"""Rigid obstacles.
 
-An obstacle answers one question, in its own frame: how far from it is a point, and where is outside? Distances are
-signed, positive outside. Where only a height is given (paraboloid, cone, a function of position), the distance is the
-vertical one, times the cosine of the slope: exact in sign and on the surface, and to first order next to it, which is
-all that contact asks, since the pairing is renewed until the points lie on the surface.
+An obstacle returns signed distances, positive outside, and outward normals in its own frame. For shapes given by a
+height (paraboloid, cone, a function of position), the distance is the vertical one times the cosine of the slope: its
+sign is exact, and it is accurate to first order near the surface. This suffices, since the pairing is repeated until
+the points lie on the surface.
 
 Coordinates are (x, y) in two dimensions (x the radius in axisymmetry) and (x, y, z) in three; the axis of a shape is
 the last coordinate.
@@ -26,7 +26,7 @@ class Obstacle(Protocol):
     def distance(self, points: Array) -> tuple[Array, Array]:
         """Return the signed distance (n,) [length] of `points` (n, dim) [length], and the unit outward normals (n, dim) [-].
 
-        The distance is infinite where there is nothing of the obstacle for a point to touch.
+        The distance is infinite if a point cannot touch the obstacle.
         """
         ...
 
@@ -54,7 +54,7 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # to whom all names are known
+if not TYPE_CHECKING:  # type checkers know all names
 
     def __getattr__(name: str) -> object:
         raise no_attribute("fastcontact.obstacles", name, __all__)

@@ -1,7 +1,7 @@
 """Facets of a rigid surface: orientation, adjacency, averaged normals.
 
-Facets are numbered through blocks of one kind each. Their ridges are what two facets share: the ends of a line in two
-dimensions, the edges of a face in three.
+Facets are numbered through blocks of one kind each. Ridges are shared by two facets: the ends of a line in two dimensions,
+the edges of a face in three.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ class Block:
 class SurfaceFacets(NamedTuple):
     """The facets of a rigid surface, their neighbours and their normals.
 
-    Smooth normals of facets are the mean over the facets at a node that turn from them by the crease at most. Those of points
-    are the mean over all facets there, not normalised; they tell in from out next to the point (Baerentzen and Aanaes,
-    2005). Both are weighted by the angles of the facets (Thuermer and Wuethrich, 1998).
+    Smooth normals of facets are the mean over the facets at a node whose angle to them is at most the crease. Normals of
+    points are the mean over all facets there, not normalised; they distinguish inside from outside next to the point
+    (Baerentzen and Aanaes, 2005). Both are weighted by the angles of the facets (Thuermer and Wuethrich, 1998).
     """
 
     blocks: list[Block]
@@ -69,7 +69,7 @@ class SurfaceFacets(NamedTuple):
 def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> SurfaceFacets:
     """Return the facets of a group, which count as a smooth surface where they meet at the angle `crease` [degrees] or less.
 
-    Raises ContactError if they are no surface that has one outside.
+    Raises ContactError if they do not form an orientable surface.
     """
     blocks = _oriented_blocks(mesh, group, flip)
     beyond = _neighbours(blocks, group)
@@ -90,13 +90,13 @@ def surface_facets(mesh: Mesh, group: str, flip: bool, crease: float) -> Surface
 def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
     """Return the facets of a group as the mesh orients them, or the other way round with `flip`.
 
-    Facets on the outside of solid cells look out of these, whatever their own order of nodes.
+    Facets on the outside of solid cells point out of these, whatever their own order of nodes.
     """
     rows = mesh.split(mesh.cell_groups[group]) if mesh.cells_of(group, dim=mesh.dim - 1) else {}
     rows = {name: block for name, block in rows.items() if elements.get(name).dim == mesh.dim - 1}
     if not rows:
         raise ContactError(
-            f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}), so it is no rigid surface: "
+            f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}), so it is not a rigid surface: "
             "name a group of lines in 2D, of triangles or quadrangles in 3D"
         )
     outer = outer_facets(mesh) if mesh.solids else {}
@@ -118,7 +118,7 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
 
 
 def _out_of_solids(nodes: Numbers, outer: Numbers | None) -> Numbers:
-    """Return facets with those that are among `outer` replaced by it."""
+    """Return the facets, replaced by the matching ones of `outer` where there are any."""
     if outer is None:
         return nodes
     rows = same_facets(outer, nodes)
@@ -139,7 +139,7 @@ def _described(blocks: list[Block], facet: int) -> str:
 def _neighbours(blocks: list[Block], group: str) -> Indices:
     """Return the facet beyond each ridge (n_facets, 4), -1 where the surface ends.
 
-    Raises ContactError, which names a facet, if the surface branches or neighbours look to different sides.
+    Raises ContactError, which names a facet, if the surface branches or neighbours have opposite orientations.
     """
     facet, ridge, key, sign = _ridge_table(blocks)
     order = np.argsort(key, kind="stable")
@@ -175,7 +175,7 @@ def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indice
 
 
 def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Indices, consistent: Mask) -> None:
-    """Refuse neighbours that look to different sides, naming a facet of the smaller part."""
+    """Refuse neighbours of opposite orientation, naming a facet of the smaller part."""
     if consistent.all():
         return
     n = sum(len(block.nodes) for block in blocks)
@@ -191,12 +191,14 @@ def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Ind
     )
 
 
-def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease: float) -> tuple[list[Array], Array]:
-    """Return the smooth normals of facets and those of points, from the `own` normals of facets and their angles."""
-    dim = own[0][0].shape[2]
+def _smooth_normals(
+    blocks: list[Block], by_block: list[tuple[Array, Array]], crease: float
+) -> tuple[list[Array], Array]:
+    """Return the smooth normals of facets and those of points, from the normals and angles of single facets."""
+    dim = by_block[0][0].shape[2]
     node = np.concatenate([block.nodes.ravel() for block in blocks])
-    normal = np.concatenate([normals.reshape(-1, dim) for normals, _ in own])
-    weight = np.concatenate([angle.ravel() for _, angle in own])
+    normal = np.concatenate([normals.reshape(-1, dim) for normals, _ in by_block])
+    weight = np.concatenate([angle.ravel() for _, angle in by_block])
     at_points = np.zeros((node.max() + 1, dim))
     np.add.at(at_points, node, weight[:, None] * normal)
     i, j = _pairs_at_nodes(node)
@@ -206,8 +208,8 @@ def _smooth_normals(blocks: list[Block], own: list[tuple[Array, Array]], crease:
     np.add.at(mean, i[alike], weight[j[alike], None] * normal[j[alike]])
     mean /= np.linalg.norm(mean, axis=1, keepdims=True)
     ends = np.cumsum([block.nodes.size for block in blocks])[:-1]
-    parts = np.split(mean, ends)
-    return [part.reshape(*block.nodes.shape, dim) for part, block in zip(parts, blocks, strict=True)], at_points
+    means = np.split(mean, ends)
+    return [values.reshape(*block.nodes.shape, dim) for values, block in zip(means, blocks, strict=True)], at_points
 
 
 def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:

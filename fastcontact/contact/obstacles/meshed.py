@@ -9,14 +9,14 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.obstacles._facets import Block, SurfaceFacets, surface_facets
-from fastcontact.contact.search.closest import Closest, closest_of_kinds
+from fastcontact.contact.search.closest import BESIDE, Closest, closest_of_kinds
 from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it stands out farther than this part of a facet, and leans
-# by more than this over its height: borders on a plane of symmetry, where facets never stand quite upright, still hold.
-BEYOND, LEAN = 0.05, 0.27
+# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE, and by more than this fraction
+# of its height: borders on a plane of symmetry, to which facets are never exactly normal, remain in contact.
+LEAN = 0.27
 
 
 @typed(ContactError)
@@ -24,10 +24,10 @@ BEYOND, LEAN = 0.05, 0.27
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals point out of the obstacle, towards the body: to the right of a line's direction in two dimensions, to where
-    a face's nodes run counter-clockwise in three; facets on the outside of solid cells of their mesh look out of these.
-    Distances are exact, from the closest point of the facets as they are curved. Beyond the border of an open surface
-    there is nothing to touch.
+    Normals point out of the obstacle, towards the body: in two dimensions to the right of a line's direction, in three
+    to the side from which the nodes of a face run counter-clockwise; facets on the outside of solid cells of their
+    mesh point out of these. Distances are exact, to the closest point of the curved facets. Beyond the border of an
+    open surface there is no contact.
 
     Parameters
     ----------
@@ -36,18 +36,18 @@ class MeshedSurface:
     group : str
         A group of facets.
     flip : bool
-        Whether to turn all normals round.
+        Whether to reverse all normals.
     crease : float
-        Facets that meet at this angle or less count as one smooth surface, whose normals turn without a jump from
-        facet to facet; at larger angles the edge is sharp [degrees]. With 0 each facet keeps its own normals.
+        Facets that meet at this angle or less form a smooth surface with continuous normals; at larger angles the edge
+        is sharp [degrees]. With 0 each facet has its own normals.
 
     Raises
     ------
     MeshError
         If there is no such group.
     ContactError
-        If the group holds no facets, a facet has no area, facets that share an edge look to different sides, or more
-        than two share one.
+        If the group holds no facets, a facet has no area, facets that share an edge have opposite orientations, or more than
+        two share one.
 
     Examples
     --------
@@ -97,51 +97,51 @@ class MeshedSurface:
             )
         closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
         sense, smooth, on_ridge, on_border = self._frames(closest)
-        apart = points - closest.position
+        offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        # There the direction to the closest point is rounding; the facet's normal takes its place.
+        # There the direction to the closest point is dominated by round-off; the facet's normal replaces it.
         touching = closest.distance <= SINGLE_PRECISION * size
-        outside = np.einsum("nd,nd->n", apart, sense) >= 0
+        outside = np.einsum("nd,nd->n", offset, sense) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
         sense /= np.linalg.norm(sense, axis=1, keepdims=True)
-        # Next to a sharp edge the closest point tells the direction; the normals of either facet do not.
+        # Next to a sharp edge the direction to the closest point is the normal, not that of either facet.
         sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         turned = on_ridge & sharp & ~touching
-        normal[turned] = apart[turned] / distance[turned, None]
-        height = np.abs(np.einsum("nd,nd->n", apart, sense))
+        normal[turned] = offset[turned] / distance[turned, None]
+        height = np.abs(np.einsum("nd,nd->n", offset, sense))
         aside = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        nothing = on_border & (aside > BEYOND * size) & (aside > LEAN * height)
+        nothing = on_border & (aside > BESIDE * size) & (aside > LEAN * height)
         return np.where(nothing, np.inf, distance), normal
 
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
-        """Return, at projections, a vector that tells in from out (n, dim), smooth normals, what is on a ridge or border.
+        """Return pseudonormals (n, dim) at projections, smooth normals, and whether projections lie on a ridge or border.
 
-        Inside a facet its normal tells; on an edge the mean of the facets that meet there, at a corner that of all
-        facets weighted by their angles: the only ones that never err (Baerentzen and Aanaes, 2005).
+        The pseudonormal, whose sign of the distance is always right, is the normal inside a facet, the mean of the adjacent
+        facets on an edge, and the angle-weighted mean of all facets at a corner (Baerentzen and Aanaes, 2005).
         """
         sense, smooth = closest.normal.copy(), np.empty_like(closest.normal)
         on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
         facets, first = self._facets, 0
         for block, normals in zip(facets.blocks, facets.smooth, strict=True):
-            mine = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
-            rows, xi = closest.facet[mine] - first, closest.xi[mine]
+            in_block = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
+            rows, xi = closest.facet[in_block] - first, closest.xi[in_block]
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
-            smooth[mine] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+            smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
             corner, edge = _place(block, xi)
             at = np.flatnonzero(corner >= 0)
             node = block.nodes[rows[at], corner[at]]
-            sense[mine[at]], on_border[mine[at]] = facets.at_points[node], facets.on_border[node]
+            sense[in_block[at]], on_border[in_block[at]] = facets.at_points[node], facets.on_border[node]
             at = np.flatnonzero(edge >= 0)
-            sense[mine[at]] += self._across(block, first, rows[at], edge[at], xi[at])
-            on_border[mine[at]] = facets.beyond[first + rows[at], edge[at]] < 0
-            on_ridge[mine] = (corner >= 0) | (edge >= 0)
+            sense[in_block[at]] += self._across(block, first, rows[at], edge[at], xi[at])
+            on_border[in_block[at]] = facets.beyond[first + rows[at], edge[at]] < 0
+            on_ridge[in_block] = (corner >= 0) | (edge >= 0)
             first += len(block.nodes)
         return sense, smooth, on_ridge, on_border
 
     def _across(self, block: Block, first: int, rows: Indices, edge: Indices, xi: Array) -> Array:
-        """Return the normals (n, 3) of the facets beyond edges, at the same places; zero where there is none."""
+        """Return the normals (n, 3) of the facets beyond edges, at the same points; zero where there is none."""
         ends = np.array(block.element.edges)[edge]
         a, b = block.element.nodes[ends[:, 0]], block.element.nodes[ends[:, 1]]
         along = np.linalg.norm(xi - a, axis=1) / np.linalg.norm(b - a, axis=1)
@@ -149,12 +149,12 @@ class MeshedSurface:
         directions = np.zeros((len(rows), self.mesh.dim))
         start = 0
         for other, normals in zip(self._facets.blocks, self._facets.normals, strict=True):
-            mine = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
-            facet = beyond[mine] - start
+            in_block = np.flatnonzero((beyond >= start) & (beyond < start + len(other.nodes)))
+            facet = beyond[in_block] - start
             for weight, end in ((1.0 - along, ends[:, 0]), (along, ends[:, 1])):
-                node = block.nodes[rows[mine], end[mine]]
+                node = block.nodes[rows[in_block], end[in_block]]
                 local = np.argmax(other.nodes[facet] == node[:, None], axis=1)
-                directions[mine] += weight[mine, None] * normals[facet, local]
+                directions[in_block] += weight[in_block, None] * normals[facet, local]
             start += len(other.nodes)
         return directions
 

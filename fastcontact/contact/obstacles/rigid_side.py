@@ -22,7 +22,7 @@ class Pose:
     displacement : ndarray (dim,)
         [length].
     angle : float
-        By which it has turned [radian].
+        Rotation angle [radian].
     """
 
     displacement: Array
@@ -33,7 +33,7 @@ class Pose:
 class RigidSide:
     """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 
-    obstacle: Obstacle  # where it stands at rest
+    obstacle: Obstacle  # in its initial position
     motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]
     rotation: Rotation | None = None
 
@@ -45,7 +45,7 @@ class RigidSide:
     def facing(self, positions: Array, at: Pose) -> tuple[Array, Array, Mask, Array]:
         """Return (gap, normal, paired, offset) of points at `positions` (n, dim) [length].
 
-        Near there the gap is ``offset + normal . x``.
+        Near a position x the gap is ``offset + normal . x``.
         """
         local = positions - at.displacement
         if self.rotation is None or at.angle == 0.0:
@@ -65,16 +65,17 @@ class RigidSide:
             raise ContactError(
                 f"the distance from a rigid obstacle {REFUSAL}; a gap that is infinite leaves a point out"
             )
-        if any(np.iscomplexobj(part) for part in distance_and_normal):
+        if any(np.iscomplexobj(values) for values in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
     def turning(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array | None:
-        """Return how far the rotation alone carries points of the obstacle's surface (n, dim) [length]; None without any.
+        """Return the displacement of points of the obstacle's surface by rotation alone (n, dim) [length]; None without any.
 
-        What faces the surface at `positions` (n, dim) [length] and was at `before` has slid over it by its own displacement
-        less that of the obstacle and less this. The slip is the change of place on the obstacle, seen from halfway through
-        the turn and as long as the arc: zero where a point sticks, and along the circle where it stands still in space.
+        A point now at `positions` (n, dim) [length] and before at `before` has slid over the surface by its own displacement
+        minus that of the obstacle and minus this result. The slip is the change of position on the obstacle, in the frame of
+        half the rotation and of the length of the arc: zero where a point sticks, along the circle where it is at rest
+        in space.
         """
         angle = now.angle - then.angle
         if self.rotation is None or angle == 0.0:

@@ -1,4 +1,4 @@
-"""The rotation of a rigid obstacle: about which axis, and what it does to positions."""
+"""Rotation of a rigid obstacle about an axis."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Rotation:
     axis : tuple of float (3,)
         Direction of the axis, of any length [-]; (0, 0, 1) in the plane.
     angle : float
-        At multiplier 1, by the right-hand rule [radian].
+        Angle at multiplier 1, by the right-hand rule [radian].
     """
 
     centre: tuple[float, ...]
@@ -42,7 +42,7 @@ class Rotation:
 
     @cached_property
     def generators(self) -> tuple[Array, Array]:
-        """What sine, and one minus cosine, of an angle multiply in its matrix (dim, dim) [-]."""
+        """Coefficient matrices (dim, dim) of the sine, and of one minus the cosine, of the angle in `matrix` [-]."""
         x, y, z = self.direction
         across, dim = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]), len(self.centre)
         return across[:dim, :dim], (across @ across)[:dim, :dim]
@@ -50,7 +50,7 @@ class Rotation:
     def axes(self, positions: Array) -> Array:
         """Return cylindrical axes (n, dim, dim) at positions (n, dim) [length], in columns: radial, tangential, axial [-].
 
-        On the axis itself, where no direction is radial, any.
+        On the axis itself, where the radial direction is undefined, the choice is arbitrary.
         """
         dim = positions.shape[1]
         arm, along = np.zeros((len(positions), 3)), self.direction

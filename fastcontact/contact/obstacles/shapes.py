@@ -37,7 +37,7 @@ def _direction(side: str) -> float:
 @typed(ContactError)
 @dataclass(frozen=True)
 class HalfSpace:
-    """Everything behind a plane.
+    """The half space behind a plane.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class HalfSpace:
 @typed(ContactError)
 @dataclass(frozen=True)
 class Sphere:
-    """A ball, or with ``hollow`` everything but one. In two dimensions a circular cylinder, or a sphere on the axis.
+    """A ball, or a spherical cavity if `hollow`; in plane models a circular cylinder, in axisymmetry a ball on the axis.
 
     Parameters
     ----------
@@ -103,18 +103,18 @@ class Sphere:
 
     def distance(self, points: Array) -> tuple[Array, Array]:
         """See `Obstacle.distance`."""
-        apart = points - _vector("centre", self.centre, points.shape[1])
-        length = np.linalg.norm(apart, axis=1)
-        away = np.zeros_like(apart)
-        away[:, -1] = 1.0  # at the centre itself every direction leads out
-        np.divide(apart, length[:, None], out=away, where=length[:, None] > 0)
+        offset = points - _vector("centre", self.centre, points.shape[1])
+        length = np.linalg.norm(offset, axis=1)
+        away = np.zeros_like(offset)
+        away[:, -1] = 1.0  # at the centre itself every direction is outward
+        np.divide(offset, length[:, None], out=away, where=length[:, None] > 0)
         return (self.R - length, -away) if self.hollow else (length - self.R, away)
 
 
 @typed(ContactError)
 @dataclass(frozen=True)
 class Cylinder:
-    """A circular cylinder of any direction in three dimensions, or with ``hollow`` everything but one.
+    """A circular cylinder of any direction in three dimensions, or a cylindrical cavity if `hollow`.
 
     Parameters
     ----------
@@ -148,22 +148,22 @@ class Cylinder:
         if points.shape[1] != 3:
             raise ContactError("a rigid cylinder needs a three-dimensional model; in two dimensions use a sphere")
         axis = np.asarray(self.axis) / np.linalg.norm(self.axis)
-        apart = points - np.asarray(self.point)
-        apart -= np.outer(apart @ axis, axis)
-        return Sphere((0.0, 0.0, 0.0), self.R, self.hollow).distance(apart)
+        offset = points - np.asarray(self.point)
+        offset -= np.outer(offset @ axis, axis)
+        return Sphere((0.0, 0.0, 0.0), self.R, self.hollow).distance(offset)
 
 
 @typed(ContactError)
 @dataclass(frozen=True)
 class Height:
-    """Everything below (or above) a height over the other coordinates.
+    """The region below (or above) a height that is a function of the other coordinates.
 
     Parameters
     ----------
     function : callable
         Height [length] for positions (n, dim - 1), and its slopes: ``f(x) -> (h (n,), slope (n, dim - 1))``.
     side : str
-        ``"below"`` the body (the obstacle is what lies lower), or ``"above"`` it.
+        Position of the obstacle: ``"below"`` or ``"above"`` the body.
 
     Examples
     --------
@@ -197,7 +197,7 @@ class Height:
 def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a paraboloid of revolution (a parabola in two dimensions) of radius `R` [length] at its tip.
 
-    `tip` is the height of its tip over the origin [length]; the obstacle lies `side` ("above" or "below") the body.
+    `tip` is the height of its tip above the origin [length], and `side` ("above" or "below" the body) its position.
 
     Examples
     --------
@@ -220,7 +220,7 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
 def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a cone (a wedge in two dimensions) that rises by `slope` from its tip.
 
-    Slope is the tangent of the angle between its side and the plane. At the tip itself the normal is the axis.
+    `slope` is the tangent of the angle between its side and the plane. At the tip the normal is the axis.
 
     Examples
     --------
@@ -244,14 +244,14 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
 @typed(ContactError)
 @dataclass(frozen=True)
 class FlatPunch:
-    """A flat punch of a given radius (half-width in plane problems): a face, and nothing beyond its edge.
+    """A flat punch of a given radius (half-width in plane problems), without sides.
 
     Parameters
     ----------
     radius : float
         [length].
     height : float
-        Of the face over the origin [length].
+        Height of the face over the origin [length].
     side : str
         ``"above"`` or ``"below"`` the body.
 
@@ -273,7 +273,7 @@ class FlatPunch:
         _direction(self.side)
 
     def distance(self, points: Array) -> tuple[Array, Array]:
-        """See `Obstacle.distance`; infinite beyond the edge, where a body may rise beside the punch."""
+        """See `Obstacle.distance`; infinite beyond the edge."""
         sign = _direction(self.side)
         normal = np.zeros_like(points)
         normal[:, -1] = sign

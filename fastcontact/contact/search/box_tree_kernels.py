@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""A binary tree of bounding boxes over facets in 2D or 3D: it finds the few facets that are worth a closer look.
+"""A binary tree of bounding boxes over facets in 2D or 3D, which selects the few facets that may be closest.
 
 Facets are first sorted so that neighbours in space follow each other (`tree_order`). Box 1 is the root, the children of box
 k are 2 k and 2 k + 1, and the last half of the boxes are those of the facets in this order. Their number is rounded up to a
@@ -13,8 +13,10 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array
 
-# Room for the boxes that a search has still to open; a squared distance that no facet exceeds.
+# Capacity of the stack of boxes still to open; a squared distance that no facet exceeds.
 DEPTH, FAR = 64, 1e300
+# Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
+ROUNDING = 1.0 + 1e-14
 
 
 class Tree(NamedTuple):
@@ -26,10 +28,10 @@ class Tree(NamedTuple):
 
 @interpretable_kernel
 def tree_order(points, together):
-    """Return the permutation (n,) that sorts points (n, dim) by halving them along their longest side, and again the halves.
+    """Return the permutation (n,) that sorts points (n, dim) by recursive bisection along the longest side.
 
-    The left half has a power of two of them, so that the facets below a box of the tree are one of these parts. Parts of
-    so many points `together` stay in the order given, which is enough to find neighbours one after the other.
+    The number of points in the left half is a power of two, so that the facets below a box of the tree form one of these
+    parts. Parts of at most `together` points are not sorted, which suffices to process neighbours one after the other.
     """
     n = points.shape[0]
     sorted_, order, size = points.copy(), np.arange(n), 1
@@ -84,7 +86,7 @@ def build(low, high):
     while leaves < n:
         leaves *= 2
     tree = Tree(np.full((2 * leaves, dim), np.inf), np.full((2 * leaves, dim), -np.inf))
-    for k in range(n):  # element by element: a slice compiles its message about shapes, too, seconds of it
+    for k in range(n):  # element by element: a slice would compile its error message as well, which takes seconds
         for d in range(dim):
             tree.low[leaves + k, d], tree.high[leaves + k, d] = low[k, d], high[k, d]
     for box in range(leaves - 1, 0, -1):

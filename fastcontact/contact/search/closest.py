@@ -15,8 +15,11 @@ from fastcontact.contact.search.facet_tables import flat_triangles, tables
 from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 from fastcontact.errors import ContactError
 
-# So many points that follow each other in the order of the search need not be sorted among themselves.
+# Number of consecutive points in the order of the search that need not be sorted among themselves.
 TOGETHER = 16
+# Overhang up to which a point still faces a side that ends there: nodes on an axis or plane of symmetry lie slightly beyond
+# inclined facets, and nodes at the end of one side beyond that of the other if the two strain differently.
+BESIDE = 0.05
 
 
 class Closest(NamedTuple):
@@ -28,7 +31,7 @@ class Closest(NamedTuple):
     facet: Indices  # (n,): row of the facet; of equally close ones the first
     xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
     normal: Array  # (n, dim): unit normal of the facet there [-]
-    overhang: Array  # (n,): how far the point stands out beyond the end of its facet, in facet lengths; 0 within [-]
+    overhang: Array  # (n,): distance of the point beyond the end of its facet, in facet lengths; 0 within [-]
     position: Array  # (n, dim): the projection [length]
     distance: Array  # (n,): distance to it [length]
 
@@ -74,7 +77,7 @@ def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
         hull[:, 2] = 2.0 * corners[:, 2] - 0.5 * (corners[:, 0] + corners[:, 1])
     tree = build(hull.min(axis=1), hull.max(axis=1))
     shared(
-        lambda part: search_2d_kernels.closest_facets(points, order, *part, corners, numbers, tree, closest),
+        lambda portion: search_2d_kernels.closest_facets(points, order, *portion, corners, numbers, tree, closest),
         portions(len(points)),
     )
 
@@ -85,10 +88,14 @@ def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))
     facets = Facets(corners[numbers], midst, np.empty(corners.shape), np.empty(n), np.empty(n))
     low, high = np.empty((n, 3)), np.empty((n, 3))
-    shared(lambda part: facets_3d_kernels.prepare(facets, *part, kind.to_terms, kind.weights, low, high), portions(n))
+    shared(
+        lambda portion: facets_3d_kernels.prepare(facets, *portion, kind.to_terms, kind.weights, low, high), portions(n)
+    )
     tree, domain = build(low, high), Domain(kind.nodes, flat_triangles(len(kind.nodes)), kind.sides)
     shared(
-        lambda part: search_3d_kernels.closest_facets(points, order, *part, facets, domain, numbers, tree, closest),
+        lambda portion: search_3d_kernels.closest_facets(
+            points, order, *portion, facets, domain, numbers, tree, closest
+        ),
         portions(len(points)),
     )
 

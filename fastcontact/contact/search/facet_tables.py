@@ -35,9 +35,9 @@ _FLAT = {
 
 
 class Tables(NamedTuple):
-    """Constants of facets of m nodes, all [-]; `weights` bound what a term of unit size adds at most.
+    """Constants of facets of m nodes, all [-]; `weights` bound the contribution of a term of unit size.
 
-    Its rows belong to the distance from the flat triangles, the change of the tangents, and the second derivative.
+    The rows of `weights` bound the distance from the flat triangles, the change of the tangents, and the second derivative.
     """
 
     nodes: Array  # (m, 2): reference coordinates

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Facets in 3D made ready for a search: polynomials, boxes, and bounds on their curvature (see `projection_3d_kernels`)."""
+"""Preparation of facets in 3D for a search: polynomials, boxes, and curvature bounds (see `projection_3d_kernels`)."""
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 def prepare(facets, begin, end, to_terms, weights, low, high):
     """Fill all but the nodes and the midst of the facets `begin` to `end`, and their boxes `low`, `high` (n_facets, 3).
 
-    These hold the nodes and, around curved sides, as much room as the facet strays at most. `to_terms` and `weights` are
-    those of `facet_tables.Tables`.
+    The boxes contain the nodes, extended at curved sides by the bound on the deviation of the facet from flat triangles.
+    `to_terms` and `weights` are those of `facet_tables.Tables`.
     """
     nodes, midst, terms, bend, convex = facets
     m = nodes.shape[1]
@@ -31,7 +31,7 @@ def prepare(facets, begin, end, to_terms, weights, low, high):
         for d in range(3 if m > 4 else 0):
             low[i, d], high[i, d] = low[i, d] - stray, high[i, d] + stray
         extent = high[i, 0] - low[i, 0], high[i, 1] - low[i, 1], high[i, 2] - low[i, 2]
-        if stray >= LENGTH_ROUND_OFF * max(extent):  # else the facet is flat
+        if stray >= LENGTH_ROUND_OFF * max(extent):  # otherwise the facet is flat
             bend[i] = stray
         p, q = vector(terms, i, 1), vector(terms, i, 2)
         diagonal = np.sqrt(dot(extent, extent))
@@ -66,7 +66,7 @@ def _fill_curved(nodes, midst, i, d, to_terms, terms, low, high):
 
 @inlined_kernel
 def _curvature(terms, i, weights):
-    """Return how far a facet strays from flat triangles, how much its tangents change, its second derivative, at most."""
+    """Return bounds on a facet's deviation from flat triangles, the change of its tangents, and its second derivative."""
     stray, turn, second = 0.0, 0.0, 0.0
     for k in range(3, terms.shape[1]):
         term = vector(terms, i, k)

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Closest point of one facet in 3D, flat or curved, near or far: the distance is minimised from several starting places.
+"""Closest point of one facet in 3D, flat or curved, near or far: the distance is minimised from several starting points.
 
 A facet is a polynomial with coefficients ``terms`` (n_facets, m, 3) of the terms in `facet_tables`, on a polygon of
 ``sides`` (n_sides, 3), rows (a, b, c) for a s + b t <= c.
@@ -19,16 +19,16 @@ MAX_ITERATIONS = 100
 
 
 class Facets(NamedTuple):
-    """Facets of one kind, seen from a place in their midst: far from the origin, rounding would exceed STEP.
+    """Facets of one kind, relative to a point in their midst: far from the origin, round-off would exceed STEP.
 
-    `convex` tells up to where a minimum of the distance is the only one: with four nodes the bound of
-    `straight_3d_kernels.room`, with more the square of a distance below which half the squared distance is convex.
+    `convex` bounds the distance up to which a local minimum is unique: with four nodes by `straight_3d_kernels.room`,
+    with more nodes by the square of a distance below which half the squared distance is convex.
     """
 
-    nodes: Array  # (n_facets, m, 3), seen from the origin [length]
-    midst: Array  # (3,): that place [length]
+    nodes: Array  # (n_facets, m, 3), relative to the origin [length]
+    midst: Array  # (3,): that point [length]
     terms: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
-    bend: Array  # (n_facets,): how far a facet strays at most from the flat triangles between its nodes [length]
+    bend: Array  # (n_facets,): bound on a facet's deviation from the flat triangles between its nodes [length]
     convex: Array  # (n_facets,) [length^2]
 
 
@@ -48,7 +48,7 @@ def vector(vectors, f, k):
 
 @inlined_kernel
 def node(facets, f, k):
-    """Return node `k` of facet `f`, seen from the midst."""
+    """Return node `k` of facet `f`, relative to the midst."""
     return minus(vector(facets.nodes, f, k), (facets.midst[0], facets.midst[1], facets.midst[2]))
 
 
@@ -189,8 +189,8 @@ def _fits(sides, s, t):
 def descend(terms, f, s, t, sides, point):
     """Return the local minimum (s, t) of the distance from `point` to facet `f`, and whether the iteration converged.
 
-    Newton's method on the squared distance over the polygon of the reference domain: at its sides it goes on along
-    them, as an active-set method does, and it never steps uphill.
+    Newton's method for the squared distance over the polygon of the reference domain: an active-set method that
+    continues along the sides it reaches, and never increases the distance.
     """
     for _ in range(MAX_ITERATIONS):
         value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
@@ -221,9 +221,9 @@ def descend(terms, f, s, t, sides, point):
 def project(facets, f, domain, point, reach):
     """Return (s, t) of the point of facet `f` closest to `point`, half the squared distance, and whether it converged.
 
-    The facet strays from the flat triangles between its nodes by at most `bend`: the descent starts from the closest one.
-    With more than four nodes, what it finds within `convex` is the only minimum. Else it starts again wherever a closer
-    point might hide. The distance is infinite where even a squared distance of `reach` is out of reach.
+    The facet deviates from the flat triangles between its nodes by at most `bend`: the descent starts from the closest one.
+    With more than four nodes, a minimum within `convex` is the only one. Otherwise the descent is restarted wherever a closer
+    point is possible. The distance is infinite if its square exceeds `reach`.
     """
     terms, bend = facets.terms, facets.bend[f]
     nodes, triangles, sides = domain
@@ -274,11 +274,11 @@ def _on_triangle(facets, f, nodes, triangles, k, point):
 
 @kernel
 def onto_sides(sides, s, t):
-    """Return (s, t) moved exactly onto the sides that it lies on but for rounding."""
+    """Return (s, t) moved exactly onto the sides that it lies on up to round-off."""
     for k in range(sides.shape[0]):
         room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
         if room <= ON_SIDE:
-            # Of a + b <= c the first coordinate is solved for: it comes out as exact as the other.
+            # Of a + b <= c the first coordinate is solved for: it is as exact as the other.
             if sides[k, 0] != 0.0:
                 s = (sides[k, 2] - sides[k, 1] * t) / sides[k, 0]
             else:
@@ -290,8 +290,7 @@ def onto_sides(sides, s, t):
 def frame(terms, f, s, t, point, sides, nodes):
     """Return the unit normal of facet `f` at (s, t) and the overhang of `point` beyond the domain's sides.
 
-    The point's reference coordinates on the plane tangent to the facet tell how far it lies outside, in spans of the
-    domain.
+    The overhang, in spans of the domain, follows from the point's reference coordinates on the tangent plane of the facet.
     """
     x, xs, xt, _, _, _ = component(terms, f, 0, s, t)
     y, ys, yt, _, _, _ = component(terms, f, 1, s, t)

@@ -7,10 +7,7 @@ Facets are straight lines (2 nodes) or parabolas (3 nodes, the middle last): ``c
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
-
-# Squared distances to boxes and facets are rounded.
-ROUNDING = 1.0 + 1e-14
+from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, open_box, square_to_box
 
 
 @inlined_kernel
@@ -96,7 +93,7 @@ def closest_facets(points, order, begin, end, corners, numbers, tree, result):
 
 @inlined_kernel
 def _write(closest, i, corners, f, s, x, y):
-    """Fill what is found for point `i`, at (x, y), but for the number of the facet `f`."""
+    """Fill the results for point `i`, at (x, y), except the number of the facet `f`."""
     px, py, tx, ty, _, _ = _curve(corners, f, s)
     square = tx * tx + ty * ty
     length, along = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square

@@ -4,13 +4,10 @@
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
-from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
+from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, open_box, square_to_box
 from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
 from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, along, cross, dot, minus, on_bilinear, on_flat, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF
-
-# Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
-ROUNDING = 1.0 + 1e-14
 
 
 @interpretable_kernel
@@ -42,7 +39,7 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
             if square == np.inf:
                 continue
             gap = minus(trial, place)
-            # Facets whose closest points are the same place meet there and are equally close.
+            # Facets whose closest points coincide meet there and are equally close.
             tied = closest >= 0 and (dot(gap, gap) <= same * same or square == best)
             if (numbers[f] < numbers[closest]) if tied else (square < best):
                 closest, best_s, best_t, place, certain, converged = f, s, t, trial, inside, good
@@ -59,7 +56,7 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
 
 @inlined_kernel
 def _write(closest, i, facets, f, domain, s, t, point, place, inside, converged):
-    """Fill what is found for point `i`, but for the number of the facet `f`."""
+    """Fill the results for point `i`, except the number of the facet `f`."""
     if inside:
         a, b, c = vector(facets.terms, f, 1), vector(facets.terms, f, 2), _twist(facets.terms, f)
         normal, overhang = unit(cross(along(a, c, t), along(b, c, s))), 0.0

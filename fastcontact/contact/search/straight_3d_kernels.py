@@ -9,11 +9,11 @@ import numpy as np
 from fastcontact._jit.decorators import kernel
 from fastcontact.round_off import ROUND_OFF
 
-# A point nearer to a side of the domain, in reference coordinates, lies on it.
+# A point nearer to a side of the domain than this, in reference coordinates, lies on it.
 ON_SIDE = ROUND_OFF
-# Steps of Newton's method shrink quadratically: after one like this the next would be lost in rounding.
+# Steps of Newton's method shrink quadratically: the next one after a step of this size is below round-off.
 FINAL = 1e-8
-# Sines squared between the sides of a triangle: below the first, area is lost in rounding; below the other, half its digits.
+# Squared sines between the sides of a triangle: below the first, the area is round-off; below the second, half its digits.
 COLLAPSED, NEEDLE = 1e-14, 1e-10
 
 
@@ -62,7 +62,7 @@ def rest(r, a, b, c, s, t):
 def on_flat(r, a, b):
     """Return (s, t) of the point ``a s + b t`` of a flat triangle closest to `r`.
 
-    By the regions of Voronoi around corners and sides (Ericson, 2005, section 5.1.5).
+    By the Voronoi regions of corners and sides (Ericson, 2005, section 5.1.5).
     """
     d1, d2 = dot(a, r), dot(b, r)
     aa, ab, bb = dot(a, a), dot(a, b), dot(b, b)
@@ -96,7 +96,7 @@ def on_flat(r, a, b):
 
 @kernel
 def _on_longest_side(r, a, b):
-    """Return (s, t) of the closest point of a triangle that is no more than its longest side."""
+    """Return (s, t) of the closest point of a triangle degenerate to its longest side."""
     c = minus(b, a)
     aa, bb, cc = dot(a, a), dot(b, b), dot(c, c)
     if aa >= bb and aa >= cc:
@@ -111,9 +111,10 @@ def _on_longest_side(r, a, b):
 def on_bilinear(r, a, b, c, reach):
     """Return (s, t) of the point ``a s + b t + c s t`` of a bilinear facet closest to `r`, and the squared distance.
 
-    Right wherever the squared distance has only one minimum on the facet (see `room`), else NaN or a stationary point. It
-    is infinite where the distance clearly exceeds `reach`. Newton's method from the closest point on the plane of a and
-    b, on products of vectors formed once; from where that leaves the facet, to the closest point of its straight sides.
+    Exact where the squared distance has only one minimum on the facet (see `room`), else NaN or a stationary point. The
+    distance is infinite where it clearly exceeds `reach`. Newton's method starts from the closest point on the plane of
+    a and b, and uses precomputed products of vectors; where it leaves the facet, the result is the closest point of the
+    straight sides.
     """
     aa, ab, bb, ac, bc, cc = dot(a, a), dot(a, b), dot(b, b), dot(a, c), dot(b, c), dot(c, c)
     ar, br, cr = dot(a, r), dot(b, r), dot(c, r)
@@ -122,18 +123,18 @@ def on_bilinear(r, a, b, c, reach):
         return 0.0, 0.0, np.nan
     s, t = (bb * ar - ab * br) / determinant, (aa * br - ab * ar) / determinant
     if abs(s) > 1.0 or abs(t) > 1.0:
-        # Beyond a parallelogram by so much in its plane, and the facet strays from it by |c| at most.
+        # In-plane distance to the parallelogram, from which the facet deviates by at most |c|.
         beyond = max((abs(s) - 1.0) * np.sqrt(determinant / bb), (abs(t) - 1.0) * np.sqrt(determinant / aa))
         if beyond > reach + np.sqrt(cc):
             return s, t, np.inf
-    # The second time from inside, where the first step left the facet for good although the minimum lies in it.
+    # The second start is inside, for minima in the facet that the first one misses by leaving it.
     for _ in range(2):
         s, t, stationary = _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t)
         if stationary:
             v = rest(r, a, b, c, s, t)
             return s, t, dot(v, v)
         s, t, square = _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr)
-        # The least on the sides is the least of all where the facet comes no closer further in.
+        # The minimum over the sides is the global one where the facet comes no closer in its interior.
         v = rest(r, a, b, c, s, t)
         inward = (abs(s) == 1.0 and s * dot(v, along(a, c, t)) < 0.0) or (
             abs(t) == 1.0 and t * dot(v, along(b, c, s)) < 0.0
@@ -184,7 +185,7 @@ def _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr):
 
 @kernel
 def room(a, b, c):
-    """Return how large |(r - X) . c| may be for a local minimum X of the distance to r to be the only one on the facet.
+    """Return the bound on |(r - X) . c| below which a local minimum X of the distance to r is the only one on the facet.
 
     From X, with r - X = v, to another point X + ds p + dt q, where p and q are the tangents along s and t at the other and
     at this t and s, the squared distance changes by ``|ds p + dt q|^2 - 2 v . (ds p + dt q)``. At a minimum that is at

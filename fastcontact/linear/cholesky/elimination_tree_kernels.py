@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""What the Cholesky factor of a sparse symmetric matrix looks like, found without computing it.
+"""Structure of the Cholesky factor of a sparse symmetric matrix: elimination tree, column counts, supernodes.
 
 The matrix A (n, n) is given by columns, both triangles: ``start`` (n + 1,) and ``rows`` (nnz,). In its elimination tree the
 parent of a column is the first row below the diagonal of that column of the factor, -1 for roots (Liu, 1990).
@@ -20,7 +20,7 @@ Offsets = NDArray[np.int64]
 def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
     """Fill `parent` (n,) with the elimination tree."""
     n = len(parent)
-    ancestor = np.full(n, -1, np.int32)  # like the parent, but on a shorter way to the root
+    ancestor = np.full(n, -1, np.int32)  # like the parent, but with path compression
     for j in range(n):
         parent[j] = -1
         for k in range(start[j], start[j + 1]):
@@ -35,7 +35,7 @@ def parents(start: Numbers, rows: Numbers, parent: Numbers) -> None:
 
 @interpretable_kernel
 def postordered(parent: Numbers, order: Numbers) -> None:
-    """Fill `order` (n,) with the columns so that every subtree stands together, children before their parent."""
+    """Fill `order` (n,) with a postorder: columns of every subtree are contiguous, children before their parent."""
     n, count = len(parent), 0
     first, beside, stack = np.full(n, -1, np.int32), np.full(n, -1, np.int32), np.empty(n, np.int32)
     for j in range(n - 1, -1, -1):
@@ -81,7 +81,7 @@ def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count
             i = rows[at]
             if i <= j or first[j] <= farthest[i]:
                 continue
-            # Column j is a leaf of the subtree of row i; what it has in common with the leaf before counts once.
+            # Column j is a leaf of the subtree of row i; its common path with the previous leaf counts once.
             farthest[i] = first[j]
             before, last[i] = last[i], j
             count[j] += 1
@@ -96,7 +96,7 @@ def counts(start: Numbers, rows: Numbers, parent: Numbers, order: Numbers, count
 
 @inlined_kernel
 def _common(j: int, ancestor: Numbers) -> int:
-    """Return the root of the set that j belongs to; the way there is shortened."""
+    """Return the root of the set of j, with path compression."""
     root = j
     while root != ancestor[root]:
         root = ancestor[root]
@@ -111,19 +111,19 @@ def _common(j: int, ancestor: Numbers) -> int:
 def supernodes(
     parent: Numbers, count: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets
 ) -> int:
-    """Find runs of columns with the same rows below them, or nearly so; return how many.
+    """Find supernodes, runs of columns with (nearly) the same rows below them; return their number.
 
     Parameters
     ----------
     parent, count : ndarray of int (n,)
         Tree and entries of columns that are numbered as in `postordered`.
     given : ndarray of bool (n,)
-        No run has columns of both kinds.
+        No supernode has columns of both kinds.
     widths : ndarray (k,), shares : ndarray (k + 1,)
-        Runs that follow each other in the tree become one where zeros are at most a share of its entries: which one, the
-        first of the widths ascending that is no smaller than that of the run says. The last share is that of all wider ones.
+        Adjacent supernodes are merged if the fraction of explicit zeros in the result is at most ``shares[i]``, i the
+        first of the ascending `widths` not smaller than the width of the result. The last share applies to all wider ones.
     first, below : ndarray of int (n + 1,)
-        Filled: the first column of each run, n at the end, and the number of rows below.
+        Filled: the first column of each supernode, n at the end, and the number of rows below.
     """
     n, top = len(parent), -1
     entries = np.empty(n, np.int64)
@@ -147,7 +147,7 @@ def _joined(
     parent: Numbers, given: Mask, widths: Offsets, shares: Array, first: Offsets, below: Offsets, entries: Offsets,
     top: int, end: int,
 ) -> int:  # fmt: skip
-    """Join the run `top`, which ends before column `end`, with those just before it while that adds few zeros."""
+    """Merge the supernode `top`, which ends before column `end`, with its predecessors while that adds few zeros."""
     while top > 0 and first[top] <= parent[first[top] - 1] < end and given[first[top] - 1] == given[first[top]]:
         width = end - first[top - 1]
         all_entries = width * (width + 1) // 2 + width * below[top]
@@ -167,16 +167,17 @@ def rows_below(
     start: Numbers, rows: Numbers, order: Numbers, position: Numbers, parent: Numbers, first: Offsets, begin: Offsets,
     row_indices: Numbers,
 ) -> None:  # fmt: skip
-    """Fill `row_indices` with the rows of each run of columns below it, ascending; those of run s begin at ``begin[s]``.
+    """Fill `row_indices` with the rows below each supernode, ascending; those of supernode s begin at ``begin[s]``.
 
-    The matrix is numbered as it was, everything else as in `postordered`: ``order[k]`` is column k, ``place`` the inverse.
+    The matrix has its original numbering, everything else that of `postordered`: ``order[k]`` is column k, `position` the
+    inverse.
     """
     n, count = len(order), len(first) - 1
     members, seen, at = np.empty(n, np.int32), np.full(count, -1, np.int32), begin[:count].copy()
     for s in range(count):
         members[first[s] : first[s + 1]] = s
     for i in range(n):
-        # The row runs up the tree from each of its entries until it meets a way taken before, or its own column.
+        # From each entry of the row, go up the tree to a column visited before, or to the diagonal.
         for k in range(start[order[i]], start[order[i] + 1]):
             j = position[rows[k]]
             if j >= i:

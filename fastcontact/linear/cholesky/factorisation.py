@@ -1,4 +1,4 @@
-"""Cholesky factors with the contact unknowns last: first the order of elimination, then the pattern, then the numbers."""
+"""Cholesky factorisation with the contact unknowns last: elimination order, symbolic and numeric factorisation."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_kernels
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 
-# Zeros that supernodes may take in so that there are fewer of them, as shares of their entries, by their width.
+# Largest fraction of explicit zeros in merged supernodes, by their width.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
-# Pivots that are smaller than this in units of what was on the diagonal are round-off.
+# Pivots below this fraction of the diagonal are round-off.
 SINGULAR = 1e-10
 
 
@@ -27,15 +27,15 @@ def singular() -> ModelError:
 
 
 def fill_reducing(K: bsr_array, last: Indices) -> Indices:
-    """Return the unknowns (n,) in an order of elimination that keeps factors small, those in `last` (m,) at the end.
+    """Return the unknowns (n,) in a fill-reducing elimination order, those in `last` (m,) at the end.
 
-    The order is that of the points, by minimum degree on the pattern of K (Liu, 1985). SciPy offers it only as a part of
-    SuperLU's factorisations; an incomplete one that drops every entry costs little more than the order itself.
+    The order of the points is that of minimum degree on the pattern of K (Liu, 1985). SciPy only provides it as part of
+    SuperLU's factorisations; an incomplete one that drops every entry costs little more than the ordering.
     """
     size = K.blocksize[0]
     n = K.shape[0] // size
     pattern = csc_array((np.ones(len(K.indices)), K.indices, K.indptr), shape=(n, n))
-    # A dominant diagonal, so that nothing is pivoted; one column at a time, since nearly nothing is computed.
+    # A dominant diagonal prevents pivoting; one column at a time, because almost nothing is computed.
     pattern = csc_array(pattern + 2.0 * n * eye_array(n))
     incomplete = spilu(
         pattern, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1,
@@ -50,16 +50,16 @@ def fill_reducing(K: bsr_array, last: Indices) -> Indices:
 def reordered(K: bsr_array, order: Indices) -> csc_array:
     """Return the symmetric matrix K (n, n) with its unknowns in the given order (n,)."""
     rows = K.tocsr()[order][:, order]
-    return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # its rows are its columns
+    return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # symmetric: rows are columns
 
 
 class SymbolicFactors:
-    """Order of elimination and pattern of the factors of symmetric matrices with one pattern.
+    """Symbolic factorisation of symmetric matrices with a common pattern.
 
     Parameters
     ----------
     K : bsr_array (n, n)
-        One of them.
+        One of these matrices.
     last : ndarray of int (m,)
         Unknowns that are eliminated last.
     """
@@ -105,7 +105,7 @@ class SymbolicFactors:
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
     def _numbered(self, K: bsr_array) -> csc_array:
-        """Return K in the order of elimination; where its numbers go is remembered from the second matrix on."""
+        """Return K in the order of elimination; the permutation of its numbers is cached from the second matrix on."""
         if self._first is not None:
             A, self._first = self._first, None
             return A
@@ -117,7 +117,7 @@ class SymbolicFactors:
 
 
 class Tree(NamedTuple):
-    """Elimination tree: its order, the inverse of that, and parents and entries of columns in this order, all (n,)."""
+    """Elimination tree: postorder, its inverse, and parents and column counts in this order, all (n,)."""
 
     order: Numbers
     place: Numbers
@@ -126,7 +126,7 @@ class Tree(NamedTuple):
 
 
 class Supernodes(NamedTuple):
-    """First columns, where the rows below begin, and these; see `triangular_kernels`."""
+    """First columns of supernodes, offsets of the rows below, and these rows; see `triangular_kernels`."""
 
     first: NDArray[np.int64]
     begin: NDArray[np.int64]
@@ -146,7 +146,7 @@ def elimination_tree(A: csc_array) -> Tree:
 
 
 def supernodes(A: csc_array, tree: Tree, late: Mask) -> Supernodes:
-    """Return the supernodes of A (n, n), none of which has both columns that are `late` (n,) and others."""
+    """Return the supernodes of A (n, n), none of which mixes `late` columns (n,) and others."""
     n = A.shape[0]
     first, below = np.empty(n + 1, np.int64), np.empty(n + 1, np.int64)
     count = elimination_tree_kernels.supernodes(tree.parent, tree.entries, late, WIDTHS, SHARES, first, below)

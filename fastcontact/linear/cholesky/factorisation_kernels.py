@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Factors ``L D L.T`` of a sparse symmetric positive definite matrix, supernode by supernode (Duff and Reid, 1983).
+"""Multifrontal factorisation ``L D L.T`` of a sparse symmetric positive definite matrix (Duff and Reid, 1983).
 
-Every supernode gathers a small dense matrix, its front: its own columns of the matrix and what the supernodes below it in
-the elimination tree leave. Its columns are eliminated there, and the rest of the front is left to the supernode above.
+Every supernode assembles a dense frontal matrix from its own columns of the matrix and the update matrices of its children in
+the elimination tree. Its columns are eliminated there, and the update matrix is passed to the parent.
 Fronts are symmetric, and only their upper triangles count: row j of a front is column j of L.
 """
 
@@ -16,18 +16,18 @@ from fastcontact.arrays import Array, Numbers
 
 Offsets = NDArray[np.int64]
 
-# Columns that are eliminated together, and rows of what they change that are computed together.
+# Number of columns in a panel, and of rows of the update that are computed together.
 PANEL, ROWS = 48, 96
-# Products of fewer multiplications are no work for BLAS.
+# Smallest number of multiplications for which a product is passed to BLAS.
 SMALL = 20_000
 
 
 @interpretable_kernel
 def room(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
-    """Return the entries of the largest front, and those that fronts leave at most at a time."""
+    """Return the size of the largest front, and the peak size of the stack of update matrices."""
     count = len(first) - 1
     front = most = used = top = 0
-    left = np.empty(count, np.int64)  # supernodes whose rest waits
+    left = np.empty(count, np.int64)  # supernodes whose update matrix is on the stack
     for s in range(count):
         below = begin[s + 1] - begin[s]
         front = max(front, (first[s + 1] - first[s] + below) ** 2)
@@ -52,10 +52,10 @@ def factorise(
     Parameters
     ----------
     start, rows, values
-        The matrix by columns, both triangles, numbered as it was; everything else is numbered as in
+        The matrix by columns, both triangles, in its original numbering; everything else is numbered as in
         `elimination_tree_kernels.postordered`.
-    order, place : ndarray of int (n,)
-        The column that is eliminated at a time, and when each is.
+    order, position : ndarray of int (n,)
+        Elimination order and its inverse.
     parent : ndarray of int (n,)
         Elimination tree.
     first, begin, below
@@ -63,7 +63,7 @@ def factorise(
     sizes : (int, int)
         See `room`.
     begins : ndarray of int (n + 1,)
-        Where the columns of L begin.
+        Offsets of the columns of L.
     L : ndarray
         Filled column by column, the unit diagonal first.
     d : ndarray (n,)
@@ -72,7 +72,7 @@ def factorise(
     count = len(first) - 1
     front, waiting = np.empty(sizes[0]), np.empty(sizes[1])
     local, left = np.empty(len(order), np.int64), np.empty(count, np.int64)
-    # Room for a panel, its transpose and product.
+    # Work space for a panel, its transpose and product.
     widest = 0
     for s in range(count):
         widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
@@ -107,7 +107,7 @@ def _gather(
     start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, low: int, high: int, rest: Numbers,
     local: Offsets, F: Array,
 ) -> None:  # fmt: skip
-    """Fill a front with the columns `low` to ``high - 1`` of the matrix, and `local` with the places of its rows."""
+    """Fill a front with the columns `low` to ``high - 1`` of the matrix, and `local` with the positions of its rows."""
     width = high - low
     for i in range(len(F)):
         F[i, i:] = 0.0
@@ -124,7 +124,7 @@ def _gather(
 
 @kernel
 def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, rest: Array) -> None:
-    """Move the eliminated columns of a front to L and `d`, and what is left to `rest` (m, m)."""
+    """Move the eliminated columns of a front to L and `d`, and the update matrix to `rest` (m, m)."""
     size = len(F)
     for j in range(width):
         d[low + j] = F[j, j]
@@ -139,7 +139,7 @@ def _store(F: Array, low: int, width: int, begins: Offsets, L: Array, d: Array, 
 
 @kernel
 def _add(rest: Array, rows: Numbers, local: Offsets, F: Array) -> None:
-    """Add what a front left for its `rows` (m,) to the front above."""
+    """Add the update matrix `rest` of a front, with `rows` (m,), to the parent's front (extend-add)."""
     m = len(rows)
     for i in range(m):
         target, source = F[local[rows[i]]], rest[i]
@@ -151,7 +151,7 @@ def _add(rest: Array, rows: Numbers, local: Offsets, F: Array) -> None:
 def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) -> int:
     """Eliminate the first `width` columns of a front; return the first without a positive pivot, or -1.
 
-    The pivots stay on the diagonal, to the right of it the columns of L.
+    The pivots remain on the diagonal, the columns of L to the right of it.
     """
     size = len(F)
     for begin in range(0, width, PANEL):
@@ -178,7 +178,7 @@ def _eliminated(F: Array, width: int, one: Array, other: Array, product: Array) 
 
 @inlined_kernel
 def _reduced_by_rows(F: Array, begin: int, end: int) -> None:
-    """Subtract from the rest of a front what the columns `begin` to `end` of L make there."""
+    """Subtract the contribution of the columns `begin` to `end` of L from the rest of a front."""
     size = len(F)
     for j in range(begin, end):
         row, pivot = F[j], F[j, j]
@@ -190,7 +190,7 @@ def _reduced_by_rows(F: Array, begin: int, end: int) -> None:
 
 @kernel
 def _reduced_by_blocks(F: Array, begin: int, end: int, one: Array, other: Array, product: Array) -> None:
-    """The same by products of matrices."""
+    """Do the same as `_reduced_by_rows` by matrix products."""
     size, width = len(F), end - begin
     m = size - end
     plain, scaled = one[: m * width].reshape(m, width), other[: m * width].reshape(m, width)

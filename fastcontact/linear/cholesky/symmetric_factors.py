@@ -1,4 +1,4 @@
-"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: solutions, and K condensed to the last unknowns."""
+"""Factors ``P K P.T = L D L.T`` of a symmetric positive definite matrix: solution, and condensation to the last unknowns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastcontact.linear.cholesky import triangular_kernels
 
 
 class LowerTriangle(NamedTuple):
-    """L (n, n) by columns, row numbers once for all columns of a supernode; see `triangular_kernels`."""
+    """L (n, n) by columns, with row indices once per supernode; see `triangular_kernels`."""
 
     start: NDArray[np.int64]
     values: Array
@@ -32,10 +32,10 @@ class SymmetricFactors:
         Lower triangular (n, n) with a unit diagonal.
     d : ndarray (n,)
         Diagonal of D.
-    place : ndarray of int (n,)
-        Where each unknown stands in the factors.
+    position : ndarray of int (n,)
+        Position of each unknown in the factors.
     last : ndarray of int (m,)
-        Unknowns that are eliminated after all others: no column of theirs in L has a row of another one.
+        Unknowns that are eliminated after all others: their columns of L only have rows among them.
     """
 
     def __init__(self, L: LowerTriangle, d: Array, position: Indices, last: Indices) -> None:
@@ -75,7 +75,7 @@ class SymmetricFactors:
         return np.ascontiguousarray(inverse[np.ix_(order, order)])
 
     def extended(self, u: Array) -> Array:
-        """Return the displacement (n,) [length] under forces on the unknowns `last` alone, which move by u (m,)."""
+        """Return the displacement (n,) [length] under forces on the unknowns `last` alone, whose displacement is u (m,)."""
         x = np.zeros(self.n)
         x[self._place[self._last]] = u
         triangular_kernels.backward(*self._L, self._given, x)

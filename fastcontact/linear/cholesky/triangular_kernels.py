@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Triangular solutions with the factors of a symmetric matrix, column blocks of equal structure (supernodes) at a time.
+"""Triangular solutions with the factors of a symmetric matrix, supernode by supernode.
 
 L (n, n) is lower triangular with a unit diagonal, column by column: `start` (n + 1,) and `values`, the diagonal first.
 The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows ``rows[begin[s] : begin[s + 1]]`` below
-them; between themselves they are full.
+them; their diagonal block is full.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ Offsets = NDArray[np.int64]
 def block(
     start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, wanted: Offsets, out: Array
 ) -> None:
-    """Fill `out` (m, m), zero before, with the rows and columns of L that `wanted` (n,) numbers; it is -1 for the others."""
+    """Fill `out` (m, m), initially zero, with the rows and columns of L numbered by `wanted` (n,), which is -1 for others."""
     for s in range(len(first) - 1):
         high = first[s + 1]
         for j in range(first[s], high):
@@ -66,7 +66,7 @@ def backward(
 ) -> None:
     """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
 
-    Nothing that is given may stand before something that it depends on: with j given, so are all rows of column j.
+    The given unknowns must be closed under dependence: with j given, so are all rows of column j.
     """
     gathered = np.empty(len(x))
     for s in range(len(first) - 2, -1, -1):
@@ -79,13 +79,13 @@ def backward(
         below = begin[s + 1] - begin[s]
         for k in range(below):
             gathered[k] = x[rows[begin[s] + k]]
-        # Two columns at a time read only once what both are multiplied with; the last one may be alone.
+        # Two columns at a time, which share the loads of the vector; the last one may be single.
         while j >= low:
-            alone = j == low
+            single = j == low
             one = start[j] + 1
-            other = one if alone else start[j - 1] + 2
+            other = one if single else start[j - 1] + 2
             first_sum, second_sum = 0.0, 0.0
-            # Slices, since the compiler sees of those that their entries lie side by side.
+            # Slices, because they tell the compiler that entries are contiguous.
             n = high - 1 - j
             a, b, beside = values[one : one + n], values[other : other + n], x[j + 1 : high]
             for k in range(n):
@@ -96,6 +96,6 @@ def backward(
                 first_sum += a[k] * gathered[k]
                 second_sum += b[k] * gathered[k]
             x[j] -= first_sum
-            if not alone:
+            if not single:
                 x[j - 1] -= second_sum + values[other - 1] * x[j]
             j -= 2

@@ -1,6 +1,6 @@
 """Condition estimate of a factorised matrix from a few solutions.
 
-The diagonal of triangular factors does not tell: that of two equal rows among many may be as large as the others'.
+The diagonal of triangular factors is no indicator: for two equal rows among many it may be as large as for the others.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ Apply = Callable[[Array], Array]
 def condition(P: csr_array, solve: Apply, solve_transposed: Apply) -> float:
     """Return an estimate of the condition number ``max(|P^-1| |P| 1)`` of P (m, m) (Skeel, 1979).
 
-    It does not depend on the scale of its rows. A lower bound, seldom less than a third of it (Hager, 1984; Higham, 1988);
-    not a number where products overflow.
+    It is independent of the scaling of the rows. The estimate is a lower bound, seldom less than a third of it (Hager, 1984;
+    Higham, 1988), and NaN where products overflow.
 
     Parameters
     ----------

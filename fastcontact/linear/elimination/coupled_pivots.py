@@ -1,8 +1,8 @@
 """Inverse of the pivot columns: small independent blocks, or a factorisation where constraints of many nodes are coupled.
 
 Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
-factors are not: a solution is cheap beside a product with the stiffness. Preconditioners need sparse weights
-and take a sparse inverse instead, that of one block a node which does the same to translations.
+factors are sparse: a solution is cheap compared with a product with the stiffness. Preconditioners need sparse weights and
+use a sparse inverse instead, with one block per node and the same effect on translations.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.linear.elimination.condition import condition
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Entries are added up on the blocks of nodes where at least this part of them does not cancel.
+# Entries are lumped into nodal blocks where at least this fraction of them does not cancel.
 LUMPED = 0.3
 
 
@@ -84,21 +84,19 @@ class CoupledPivots:
     ----------
     sparse : SparseInverse
         Close enough to the inverse for a preconditioner: that of `lumped`.
-    beyond_lumped : csr_array (m, m)
-        The matrix less `lumped`.
 
     Raises
     ------
     CoupledError
-        If it is singular or nearly so, or there is no such sparse inverse.
+        If P is singular or nearly so, or has no such sparse inverse.
     """
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
         L = lumped(P, pivots, size)
-        kept = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
-        if not kept.min() >= LUMPED:
+        ratio = np.asarray(abs(L).sum(axis=1)) / np.asarray(abs(P).sum(axis=1))
+        if not ratio.min() >= LUMPED:
             raise CoupledError()
-        self.sparse, self.beyond_lumped = SparseInverse(block_inverse(L)), csr_array(P - L)
+        self.sparse = SparseInverse(block_inverse(L))
         try:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular
@@ -119,18 +117,18 @@ Inverse = SparseInverse | CoupledPivots
 
 
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
-    """Return P (m, m) with its entries added up on the blocks of nodes: those of each row by the direction of its pivots.
+    """Return P (m, m) with the entries of each row lumped into the block of its node, by direction.
 
-    Translations of the pivots, of which a node has `size` components, then need the same forces. Entries of directions that
-    are no pivots of the row's own node are left out.
+    Translations of the pivots, with `size` components per node, then need the same forces. Entries in directions that have no
+    pivot at the node of the row are left out.
     """
     node, direction = pivots // size, pivots % size
     column = np.full((node.max() + 1) * size, -1, np.intp)
     column[pivots] = np.arange(len(pivots))
     entries = coo_array(P)
     columns = column[node[entries.row] * size + direction[entries.col]]
-    kept = columns >= 0
-    return csr_array((entries.data[kept], (entries.row[kept], columns[kept])), shape=P.shape)
+    valid = columns >= 0
+    return csr_array((entries.data[valid], (entries.row[valid], columns[valid])), shape=P.shape)
 
 
 def block_inverse(A: csr_array) -> csr_array:
@@ -153,10 +151,10 @@ def block_inverse(A: csr_array) -> csr_array:
         alike = np.flatnonzero(size == k)
         number = np.full(len(size), -1, np.intp)
         number[alike] = np.arange(len(alike))
-        mine = number[label[entries.row]] >= 0
-        row, col = entries.row[mine], entries.col[mine]
+        selected = number[label[entries.row]] >= 0
+        row, col = entries.row[selected], entries.col[selected]
         blocks = np.zeros((len(alike), k, k))
-        np.add.at(blocks, (number[label[row]], position[row], position[col]), entries.data[mine])
+        np.add.at(blocks, (number[label[row]], position[row], position[col]), entries.data[selected])
         members = order[first[alike][:, None] + np.arange(k)]
         rows.append(np.repeat(members, k, axis=1).ravel())
         cols.append(np.tile(members, k).ravel())

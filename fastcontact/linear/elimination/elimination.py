@@ -26,14 +26,14 @@ class Elimination:
         Weights of the other unknowns; those of pivots are zero.
     offset : ndarray (m,)
     force_weights : csr_array (m, n)
-        Shares of the force at each pivot that go to the other unknowns: `weights`, unless multipliers act through other
-        rows than B.
+        Fractions of the force at each pivot that are moved to the other unknowns: `weights`, unless multipliers act through
+        other rows than B.
     inverse : SparseInverse or CoupledPivots
         Inverse of the pivots' columns of the rows that multipliers act through.
     own : SparseInverse or CoupledPivots
-        Inverse of the pivots' columns of the equations. Where these are coupled, it is not yet part of the weights.
+        Inverse of the pivots' columns of the equations. Where these are coupled, the weights do not include it.
     compliance : ndarray (m,), optional
-        Compliance of the equations themselves: ``B u + compliance * multiplier = c`` [length / force].
+        Compliance of the equations: ``B u + compliance * multiplier = c`` [length / force].
     """
 
     pivots: Indices
@@ -81,7 +81,7 @@ class Elimination:
         return csr_array((full.data, columns[full.indices], full.indptr), shape=self.weights.shape)
 
     def with_sparse_weights(self) -> Elimination:
-        """Return this, or, where pivots are coupled, nearly the same with weights that a preconditioner can use."""
+        """Return this elimination or, where pivots are coupled, an approximation with sparse weights for a preconditioner."""
         if not self.coupled:
             return self
         weights = _weighted(self.own.sparse, self.weights)
@@ -100,7 +100,7 @@ def eliminate(
     force_rows : csr_array (m, n), optional
         Rows that multipliers act through, ``K u = f + force_rows.T multiplier``; B by default.
     nodes : ndarray of int (m,), optional
-        The node that each equation belongs to: its equations may share unknowns of their own.
+        The node of each equation; equations of one node may share unknowns.
     size : int
         Unknowns of a node.
 

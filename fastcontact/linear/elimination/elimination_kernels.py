@@ -21,17 +21,11 @@ def complete(pivots, indptr, indices, weights, x):
 
 @kernel
 def move_forces(pivots, indptr, indices, weights, r):
-    """Move the forces at the pivots to the unknowns that they follow: ``r[pivots] = 0``, then ``r += W.T r[pivots]``."""
+    """Move the forces at the pivots to the other unknowns: ``r += W.T r[pivots]``, then ``r[pivots] = 0``."""
     forces = np.empty(pivots.shape[0], r.dtype)
     for p in range(pivots.shape[0]):
         forces[p] = r[pivots[p]]
         r[pivots[p]] = 0
-    add_rows(indptr, indices, weights, forces, r)
-
-
-@kernel
-def add_rows(indptr, indices, weights, factors, r):
-    """Add ``W.T factors`` to r (n,), factors (m,)."""
-    for p in range(factors.shape[0]):
+    for p in range(pivots.shape[0]):
         for k in range(indptr[p], indptr[p + 1]):
-            r[indices[k]] += weights[k] * factors[p]
+            r[indices[k]] += weights[k] * forces[p]

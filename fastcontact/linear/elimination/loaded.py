@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.delassus import multipliers
-from fastcontact.linear.elimination.basis_transformation import eliminated
+from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Monitor
@@ -35,11 +35,6 @@ class LoadedIteration:
     def __init__(self, solver: Any, f: Array) -> None:
         self._solver, self._f = solver, np.ascontiguousarray(f, float)
 
-    @property
-    def _functions(self) -> csr_array | None:
-        """See `basis_transformation.eliminated`: None where the solver does not use them."""
-        return None
-
     @functools.cached_property
     def _free(self) -> Array:
         """Displacement (n,) without equations."""
@@ -53,9 +48,7 @@ class LoadedIteration:
         solver = self._solver
         if C is None or not B.shape[0]:
             try:
-                elimination = (
-                    eliminated(B, c, None, nodes, solver.K.blocksize[0], self._functions) if B.shape[0] else None
-                )
+                elimination = eliminate(B, c, None, nodes, solver.K.blocksize[0]) if B.shape[0] else None
             except RepeatedError as repeated:
                 log.info("%s: their compliance is formed", repeated)
             else:

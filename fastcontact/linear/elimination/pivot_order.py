@@ -1,9 +1,9 @@
 """Choice of the pivot of each constraint, and the inverse of the pivot columns.
 
-The equations of a node together, or each by itself, take unknowns that no others have, or none of a later layer
-(`of_groups`). Where there are too few, the equations of a node take large enough entries in that node's unknowns
-(`of_nodes`), or what is left over is assigned (`of_most_groups`, `assigned`). The columns of the pivots are inverted in small
-blocks, independent or in layers, or, where equations of many nodes share unknowns otherwise, factorised (`coupled_pivots`).
+The pivots of a node's equations, or of single equations, are unknowns that no other equations involve, or none of a later
+layer (`of_groups`). If there are too few, pivots are sufficiently large entries in the unknowns of that node (`of_nodes`), or
+the remaining equations are assigned unknowns (`of_most_groups`, `assigned`). The columns of the pivots are inverted in small
+blocks, independent or in layers, or factorised where equations of many nodes share unknowns otherwise (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from fastcontact.linear.elimination.coupled_pivots import (
     block_inverse,
 )
 
-# An unknown is taken as pivot where its entry is at least this part of the largest one of the equation.
+# Smallest pivot over the largest entry of the equation.
 SMALLEST = 0.25
-# Up to so many equations that share unknowns are inverted as a block; and where factors do not suit them. So many are also
-# assigned pivots by a dense factorisation.
+# Largest number of equations with shared unknowns that are inverted as a block, and the same if they cannot be factorised,
+# which is also the largest number that are assigned pivots by a dense factorisation.
 LARGEST_BLOCK, FULL_UP_TO = 64, 500
-# With more layers than this the sum of products costs more than it saves.
+# Number of layers beyond which the sum of products costs more than it saves.
 MOST_LAYERS = 4
 
 
@@ -40,7 +40,7 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     B : csr_array (m, n)
         Equations, in canonical format, without stored zeros.
     nodes : ndarray of int (m,), optional
-        The node that each equation belongs to.
+        The node of each equation.
     size : int
         Unknowns of a node.
 
@@ -71,12 +71,12 @@ def _chosen(B: csr_array, nodes: Indices | None, size: int) -> Indices:
 
 
 def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
-    """Return the inverse of the columns `pivots` (m,) of B, small blocks or factors; a node has `size` unknowns.
+    """Return the inverse of the columns `pivots` (m,) of B as small blocks or factors; a node has `size` unknowns.
 
     Raises
     ------
     RepeatedError
-        If it is singular.
+        If they are singular.
     """
     P = csr_array(B[:, pivots])
     if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
@@ -94,14 +94,14 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
 
 
 def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInverse | None:
-    """Return the inverse of a matrix of blocks on its diagonal, at most so large, in so many layers; None for others."""
+    """Return the inverse of a block triangular matrix with blocks up to `largest` and up to `layers`; None for others."""
     label = connected_components(P, connection="strong")[1]
     if np.bincount(label).max(initial=0) > largest:
         return None
     inside = np.repeat(label, np.diff(P.indptr)) == label[P.indices]
     diagonal, beyond = (
-        csr_array((np.where(part, P.data, 0.0), P.indices, P.indptr), shape=P.shape, copy=True)
-        for part in (inside, ~inside)
+        csr_array((np.where(mask, P.data, 0.0), P.indices, P.indptr), shape=P.shape, copy=True)
+        for mask in (inside, ~inside)
     )
     diagonal.eliminate_zeros()
     beyond.eliminate_zeros()
@@ -109,27 +109,27 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
 
 
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
-    """Return the unknown (m,) of each row among those of its group alone; None where there are too few.
+    """Return the unknown (m,) of each row among the exclusive ones of its group; None where there are too few.
 
-    In so many layers at most: unknowns of a group alone are those that no other group of its own and later layers has. Such
-    are the weighted gaps of quadratic facets with dual multipliers: no other mid node has the unknowns of a mid node, and
-    without the mid nodes the same holds for corners.
+    Exclusive unknowns of a group are those that no other group of its own and later layers involves, with up to `layers`
+    layers. An example are weighted gaps of quadratic facets with dual multipliers: no other mid node involves the unknowns of
+    a mid node, and without the mid nodes the same holds for corners.
     """
     pivots = _in_layers(B, groups, layers)
     return pivots if (pivots >= 0).all() else None
 
 
 def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the unknown (m,) of each row: as `of_groups` where there are enough, assigned to the other rows by themselves.
+    """Return the unknown (m,) of each row: as in `of_groups` where there are enough, assigned otherwise.
 
-    Such are slips where a support holds the node, but not what it sticks to: they have no unknowns of their own. None where
-    all rows are of that kind, or too many.
+    Assigned rows are, for example, slips at supported nodes that stick to a moving side: they have no exclusive
+    unknowns. None where all rows are of that kind, or too many.
     """
     pivots = _in_layers(B, groups, MOST_LAYERS)
     left = np.flatnonzero(pivots < 0)
     if len(left) == len(pivots):
         return None
-    # Unknowns of earlier layers are none of theirs. Rows of a group that has too few may still have one of their own.
+    # Unknowns of earlier layers are excluded. Single rows of a group with too few unknowns may still have exclusive ones.
     pivots[left] = _in_layers(csr_array(B[left]), np.arange(len(left)), layers=1)
     left = left[pivots[left] < 0]
     if len(left) > FULL_UP_TO:
@@ -140,7 +140,7 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
 
 
 def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
-    """Return the unknown (m,) of each row in so many layers, see `of_groups`; -1 where there is none."""
+    """Return the unknown (m,) of each row in up to `layers` layers, see `of_groups`; -1 where there is none."""
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
     pivots = np.full(m, -1, np.intp)
@@ -164,10 +164,10 @@ def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
 
 
 def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
-    """Return pivots (m,) among the entries of B that are its group's own, whose unknowns no two groups share.
+    """Return pivots (m,) among the entries of B that are exclusive to their groups (`is_own`).
 
-    Complete pivoting in each group, in all of them at once; a pivot is at least SMALLEST of the largest entry of its row.
-    Groups without as many pivots as rows have none, -1.
+    Complete pivoting in all groups simultaneously; a pivot is at least SMALLEST times the largest entry of its row.
+    Groups with fewer pivots than rows get none, -1.
     """
     m, n = B.shape
     row, entries = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
@@ -192,9 +192,9 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
         i, pivot = equation[left, r], table[left, r, c]
         good = (np.abs(pivot) >= SMALLEST * largest[i]) & (pivot != 0.0)
         failed[left[~good]] = True
-        left, r, c, i, pivot = (part[good] for part in (left, r, c, i, pivot))
+        left, r, c, i, pivot = (array[good] for array in (left, r, c, i, pivot))
         pivots[i] = unknown[left, c]
-        # The row of the pivot becomes zero, too: it is not found again.
+        # The row of the pivot is eliminated, too, so that it is not selected again.
         factor = table[left, :, c] / pivot[:, None]
         table[left] -= factor[:, :, None] * table[left, r][:, None]
     pivots[failed[group]] = -1
@@ -202,7 +202,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
 
 
 def _place_in_group(group: Indices) -> Indices:
-    """Return how many earlier entries have the same number, for each entry of `group`."""
+    """Return, for each entry of `group`, the number of earlier entries of equal value."""
     order = np.argsort(group, kind="stable")
     position = np.empty(len(group), np.intp)
     position[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
@@ -212,7 +212,7 @@ def _place_in_group(group: Indices) -> Indices:
 def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> SparseInverse | None:
     """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series.
 
-    `inner` is the inverse of what couples no layers, `beyond` what does. None where there are more than so many `layers`.
+    `inner` is the inverse of the diagonal blocks, `beyond` the coupling between layers. None with more than `layers` layers.
     """
     total = term = inner
     for _ in range(layers):

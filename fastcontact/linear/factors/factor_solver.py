@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
@@ -17,96 +17,69 @@ from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 
 log = logging.getLogger("fastcontact")
-# Beyond this many unknowns last, their dense block costs more than the solutions it saves.
+# Number of last unknowns above which their dense block costs more than the solutions it saves.
 LAST_UP_TO = 4000
-# Unknowns up to which a factorisation is affordable, by the number of components of a displacement.
+# Number of unknowns up to which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 ATTAINABLE = 1e-14
-# Errors of one solution, in units of those of another.
-MARGIN = 10.0
+NONE = np.empty(0, np.intp)
 
 
 class FactorSolver(LinearSolver):
-    """A direct solver; sub-classes factorise and solve.
+    """A direct solver; sub-classes factorise.
 
-    Where a sub-class gives factors with the unknowns last that equations may involve, their Delassus operator is the inverse
-    of the trailing block, ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the
-    other unknowns under contact forces follows from theirs by half a solution.
+    Unknowns that equations may involve are eliminated last. Their Delassus operator is the inverse of the trailing block,
+    ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the other unknowns under
+    contact forces follows from theirs by half a solution.
 
     Parameters
     ----------
     tolerance : float
-        Not needed: direct solutions are exact but for round-off.
+        Ignored: direct solutions are exact up to round-off.
     """
 
     name: str
     iterative = False
 
     def __init__(self, tolerance: float = ATTAINABLE) -> None:
-        self.tolerance = ATTAINABLE  # whatever was asked
+        self.tolerance = ATTAINABLE  # regardless of the argument
         self.counters = Counters()
         self.n = 0
-        self._factors: SymmetricFactors | None = None
+        self._factors: SymmetricFactors
         self.last: Indices | None = None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
 
-    def _factorise(self, K: csc_array) -> None:
-        """Factorise K (n, n) in any order, or raise ModelError if it is singular."""
-        raise NotImplementedError
-
-    def _solve(self, F: Array) -> Array:
-        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k), after `_factorise`."""
-        raise NotImplementedError
-
-    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
-        """Factorise K (n, n), as `_factorise`, with the unknowns `last` (m,) last; None where nothing is gained by that."""
+    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+        """Return the factors of K (n, n), with the unknowns `last` (m,) last, or raise ModelError if it is singular."""
         raise NotImplementedError
 
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
-        """Factorise K, and leave it as it is; see `LinearSolver.prepare`.
+        """Factorise K without modifying it; see `LinearSolver.prepare`.
 
         Raises
         ------
         ModelError
             If K is singular.
         """
-        self.n, self._factors, self.last = K.shape[0], None, None
-        self._K, self.refines = K, False
-        if involved is not None and len(involved) <= LAST_UP_TO:
-            self._factors = self._with_last(K, involved)
-        self.error = 0.0
-        if self._factors is None:
-            self._factorise(K.tocsc())
-            self.error = MARGIN * self._error(K)
+        self.n, self._K, self.refines = K.shape[0], K, False
+        last = NONE if involved is None or len(involved) > LAST_UP_TO else involved
+        self._factors = self._factorised(K, last)
         self.counters.setups += 1
-        self.columns, self.known_loads = InverseColumns(self.n, self._solution), KnownLoads()
-        if self._factors is not None and involved is not None and len(involved):
-            self.last, self.inverse = involved, self._factors.last_inverse()
+        self.columns, self.known_loads = InverseColumns(self.n, self._factors.solve), KnownLoads()
+        self.last = last if len(last) else None
+        if self.last is not None:
+            self.inverse = self._factors.last_inverse()
             self.columns.give(self.last, self.inverse)
         return K
-
-    def _error(self, K: bsr_array) -> float:
-        """Return by how much, in its largest component, a second solution corrects the first one.
-
-        Displacements of unknowns that are last come from one and the same inverse, so that errors of the factors do not show
-        from one pairing to the next; those of whole solutions do.
-        """
-        f = np.random.default_rng(0).normal(size=self.n)
-        u = self._solve(f)
-        size = float(np.abs(u).max(initial=0.0))
-        return float(np.abs(self._solve(f - K @ u)).max(initial=0.0)) / size if size else 0.0
 
     @property
     def condenses(self) -> bool:
         """See `LinearSolver`."""
         return self.last is not None
-
-    def _solution(self, F: Array) -> Array:
-        return self._solve(F) if self._factors is None else self._factors.solve(F)
 
     def load(self, f: Array) -> Any:
         """Return the prepared matrix with right-hand side `f` (n,)."""
@@ -114,38 +87,35 @@ class FactorSolver(LinearSolver):
 
     def snapshot(self) -> dict[str, Any]:
         """See `LinearSolver.snapshot`: columns of ``K^-1`` computed so far, and stored right-hand sides."""
-        kept = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
-        return {**kept, "refines": True} if self.refines else kept
+        state = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
+        return {**state, "refines": True} if self.refines else state
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
         """See `LinearSolver.put_back`."""
         self.refines = snapshot.get("refines", False)
         self.columns.put_back(snapshot["asked"])
-        self.known_loads.put_back(snapshot["loads"], self.n, self._solution)
+        self.known_loads.put_back(snapshot["loads"], self.n, self._factors.solve)
 
     def improve(self, excess: float) -> bool:
         """See `LinearSolver.improve`: one step of iterative refinement for later solutions."""
         if self.refines:
             return False
-        log.info(
-            "linear solver: forces are out of balance by %.1e times what is allowed, solutions are refined", excess
-        )
+        log.info("linear solver: forces are out of balance by %.1e times the bound, solutions are refined", excess)
         self.refines = True
         return True
 
     def refined(self, f: Array) -> Array:
-        """Return ``K^-1 f``, shape (n,), corrected once."""
+        """Return ``K^-1 f``, shape (n,), with one step of iterative refinement."""
         u = self.back_substitute(f)
         return u + self.back_substitute(f - self._K @ u)
 
     def back_substitute(self, f: Array) -> Array:
         """Return ``K^-1 f``, shape (n,)."""
         self.counters.iterations += 1
-        return self._solution(f)
+        return self._factors.solve(f)
 
     def extend(self, u: Array) -> Array:
         """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
-        assert self._factors is not None
         self.counters.iterations += 1
         return self._factors.extended(u)
 
@@ -202,7 +172,7 @@ class LoadedFactor:
 
 
 class CondensedProblem:
-    """K condensed to the k contact unknowns by a dense inverse; see `linear.protocol.Loaded`. Vectors are theirs.
+    """K condensed to the k contact unknowns by a dense inverse; see `linear.protocol.Loaded`. Vectors have length k.
 
     Parameters
     ----------

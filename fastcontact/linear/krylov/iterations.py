@@ -1,7 +1,7 @@
 """Conjugate gradients and conjugate residuals on compiled vector kernels.
 
-Both improve an iterate `x` step by step and know its residual `r`, so that a caller can look at the iterate, stop, change the
-problem a little and go on.
+Both update an iterate `x` and its residual `r` step by step, so that the caller can examine the iterate, stop, modify the
+problem slightly and continue.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from fastcontact.linear.krylov import krylov_kernels
 # given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
-# Search directions of conjugate residuals that a new one is made orthogonal to; older ones are forgotten.
+# Number of earlier search directions of conjugate residuals that a new one is orthogonalised against.
 KEPT = 20
-# A step of conjugate residuals that leaves more of the residual than this is lost.
+# A step of conjugate residuals fails if the residual stays above this fraction.
 LOST = 0.98
 
 
@@ -50,7 +50,7 @@ class Iteration:
         return float(krylov_kernels.dot(a, b, self._sums))
 
     def start(self) -> None:
-        """Begin anew from `x` and its residual `r`, both set by the caller."""
+        """Restart from `x` and its residual `r`, both set by the caller."""
         self.norm = float(np.sqrt(self.dot(self.r, self.r)))
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
@@ -61,9 +61,8 @@ class Iteration:
 class ConjugateGradients(Iteration):
     """Preconditioned conjugate gradients; see `Iteration`.
 
-    Round-off of a preconditioner in single precision makes it vary a little; the search directions are therefore
-    turned by what the preconditioned residual has in common with the change of the residual (Polak and Ribiere's
-    formula; Notay, 2000), which costs one more dot product.
+    Round-off of a preconditioner in single precision makes it slightly variable; the search directions are therefore updated
+    with the Polak-Ribiere formula (flexible conjugate gradients; Notay, 2000), which costs one more dot product.
     """
 
     def __init__(self, n: int) -> None:
@@ -82,7 +81,7 @@ class ConjugateGradients(Iteration):
         self._rz = 0.0
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Make one iteration; return False, nothing changed, where the preconditioner or A is not positive definite."""
+        """Make one iteration; return False, without changes, if the preconditioner or A is not positive definite."""
         precondition(self.r, self.norm, self.z)
         rz = self.dot(self.r, self.z)
         beta = 0.0
@@ -103,16 +102,16 @@ class ConjugateGradients(Iteration):
 class ConjugateResiduals(Iteration):
     """Preconditioned generalised conjugate residuals, truncated (Eisenstat, Elman and Schultz, 1983); see `Iteration`.
 
-    For matrices that are not symmetric. Every iteration makes the residual as small as the directions kept allow, so it
-    never grows; the preconditioner may vary.
+    For nonsymmetric matrices. Every iteration minimises the residual over the stored directions, so it never grows; the
+    preconditioner may vary.
     """
 
     def __init__(self, n: int) -> None:
         super().__init__(n)
-        # Directions of unit image, and their images with the sign reversed: `advance` then serves to orthogonalise.
+        # Directions of unit image, and the negative of their images, so that `advance` orthogonalises.
         self._kept: deque[tuple[Array, Array]] = deque()
         self._spare: list[tuple[Array, Array]] = []
-        self._lost = False  # the last step
+        self._lost = False  # whether the last step failed
 
     @property
     def nbytes(self) -> int:
@@ -127,7 +126,7 @@ class ConjugateResiduals(Iteration):
         self._lost = False
 
     def step(self, multiply: Multiply, precondition: Precondition) -> bool:
-        """Make one iteration; return False where no direction is left that reduces the residual."""
+        """Make one iteration; return False if no direction reduces the residual."""
         z, q, norm = self.z, self.q, self.norm
         if self._lost:
             precondition(self._kept[-1][1], 1.0, z)

@@ -1,25 +1,25 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Vector work of conjugate gradients: sums in fixed chunks, the same for any number of threads."""
+"""Vector operations of conjugate gradients: sums in fixed chunks, equal for any number of threads."""
 
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
 
-# Numbers that one thread takes at a time.
+# Length of the chunks.
 CHUNK = 4096
 
 
 @kernel
-def _dot(a, b, low, high):
+def stretch_dot(a, b, low, high):
     """Return the dot product of a stretch, in four sums that the processor can add side by side."""
     s0 = s1 = s2 = s3 = 0.0
-    whole = low + (high - low) // 4 * 4
-    for i in range(low, whole, 4):
+    unrolled_end = low + (high - low) // 4 * 4
+    for i in range(low, unrolled_end, 4):
         s0 += a[i] * b[i]
         s1 += a[i + 1] * b[i + 1]
         s2 += a[i + 2] * b[i + 2]
         s3 += a[i + 3] * b[i + 3]
-    for i in range(whole, high):
+    for i in range(unrolled_end, high):
         s0 += a[i] * b[i]
     return (s0 + s1) + (s2 + s3)
 
@@ -37,7 +37,7 @@ def dot(a, b, sums):
     """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
     n = a.shape[0]
     for c in prange(sums.shape[0]):
-        sums[c] = _dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
+        sums[c] = stretch_dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
     return _total(sums)
 
 
@@ -46,7 +46,7 @@ def _advance_part(alpha, p, q, x, r, low, high):
     for i in range(low, high):
         x[i] += alpha * p[i]
         r[i] -= alpha * q[i]
-    return _dot(r, r, low, high)
+    return stretch_dot(r, r, low, high)
 
 
 @parallel_kernel
@@ -60,7 +60,7 @@ def advance(alpha, p, q, x, r, sums):
 
 @parallel_kernel
 def turn(beta, z, p):
-    """Turn the search direction: ``p = z + beta p``."""
+    """Update the search direction: ``p = z + beta p``."""
     for i in prange(p.shape[0]):
         p[i] = z[i] + beta * p[i]
 

@@ -1,14 +1,14 @@
 """Products of small blocks with vectors and with each other, written by hand in vector instructions.
 
-Of a plain loop over the nine numbers of a 3 x 3 block the compiler makes nine single products: it cannot see that places
-found in an index array follow each other. Here a row of a block is one vector instruction. That halves the time of a product
-with a matrix (16.7 to 8.5 ns an unknown in single precision, 311 469 unknowns, one thread). With plain compiled loops in the
-place of `add_product` and `add_transposed` the results have the same bits, but the set-up takes 1.5 s in place of 0.5, and an
-analysis of one step 3.7 to 4.4 in place of 3.0 to 3.4 (sphere on a block, 279 447 unknowns).
+The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products: it cannot see that positions
+from an index array are contiguous. Here a row of a block is one vector instruction. This halves the time of a product with a
+matrix (16.7 to 8.5 ns per unknown in single precision, 311 469 unknowns, one thread). With plain compiled loops instead of
+`add_product` and `add_transposed` the results have the same bits, but the set-up takes 1.5 instead of 0.5 s, and an analysis
+of one step 3.7 to 4.4 instead of 3.0 to 3.4 s (sphere on a block, 279 447 unknowns).
 
-This is the only place in `linear` where code is written for the processor. `block_products_llvm` holds the instructions; the
-functions `..._plain` say the same in NumPy. They run where kernels are not compiled, and the tests compare both. Indices are
-not checked here.
+This is the only place in `linear` with processor-specific code. `block_products_llvm` contains the instructions; the
+functions `..._plain` are the equivalent in NumPy. They run where kernels are not compiled, and the tests compare both.
+Indices are not checked here.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def row_times_both_ways_plain(
     indices: Any, numbers: tuple[Any, ...], x: Any, begin: int, end: int, own: int, factor: Any, y: Any,
     rows: tuple[int, ...],
 ) -> tuple[Any, ...]:  # fmt: skip
-    """Return the product of blocks of a row with a vector, and add what their transposes make of the row's own part of it.
+    """Return the product of blocks of a row with a vector, and add their transposed product with the row's part of it.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def row_times_both_ways_plain(
     own : int
         Number of the block row.
     factor : float
-        Of what is added.
+        Factor of the added product.
     y : ndarray (n_columns * m,)
         Changed in place at the columns of the blocks; not x.
     rows : tuple
@@ -76,7 +76,7 @@ def add_row_transposed_plain(
     indices: Any, numbers: tuple[Any, ...], begin: int, end: int, own: int, x: Any, y: Any, at: int,
     rows: tuple[int, ...], cols: tuple[int, ...],
 ) -> None:  # fmt: skip
-    """Add what the transposed blocks of a row make of the row's own part of a vector.
+    """Add the product of the transposed blocks of a row and the row's part of a vector.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def add_row_transposed_plain(
         Number of the block row.
     x : ndarray (n_rows * m,)
     y : ndarray, at : int
-        Changed in place; block column j begins at number ``at + j n``, which may be beside `at`.
+        Changed in place; block column j begins at number ``at + j n``.
     rows, cols : tuple
         Tuples of m and n zeros: the size of a block.
     """
@@ -127,7 +127,7 @@ def add_transposed_plain(
 
 
 def _kernel(written: Any, plain: Any) -> Any:
-    """Return what kernels call: the vector instructions, or the plain function where kernels are not compiled."""
+    """Return the function that kernels call: the vector instructions, or the plain function without compilation."""
     return numba.extending.intrinsic(written) if compiled() else plain
 
 

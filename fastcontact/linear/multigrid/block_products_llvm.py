@@ -1,7 +1,7 @@
-"""The compiler's instructions for `block_products`: functions that write LLVM code while Numba compiles a kernel.
+"""Numba intrinsics for `block_products`: functions that generate LLVM code while Numba compiles a kernel.
 
-Each public function here stands for the function of the same name in `block_products`. It is called with the Numba types of
-the arguments and returns the signature and a function that writes the code. None of this runs when the kernel runs.
+Each public function here implements the function of the same name in `block_products`. It is called with the Numba types of
+the arguments and returns the signature and a code generator. None of this runs when the kernel runs.
 """
 
 from __future__ import annotations
@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-# Numbers in a vector: four in double precision are what most processors have, and blocks have three or six columns.
+# Vector length: most processors have four numbers in double precision, and blocks have three or six columns.
 WIDTH = 4
 
 
 class Piece(NamedTuple):
-    """A part of a row of a block: `used` numbers from column `column` on, taken with those beside in vectors of `width`."""
+    """A part of a row of a block: `used` numbers from column `column` on, loaded in vectors of `width`."""
 
     column: int
     width: int
@@ -22,7 +22,7 @@ class Piece(NamedTuple):
 
 
 def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, rows: Any, cols: Any) -> Any:
-    """Return the types of `block_products.row_times`, and what writes it."""
+    """Return the signature and the code generator of `block_products.row_times`."""
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -35,7 +35,7 @@ def row_times(_context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end
 def row_times_both_ways(
     _context: Any, indices: Any, numbers: Any, x: Any, begin: Any, end: Any, own: Any, factor: Any, y: Any, rows: Any
 ) -> Any:
-    """Return the types of `block_products.row_times_both_ways`, and what writes it."""
+    """Return the signature and the code generator of `block_products.row_times_both_ways`."""
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -46,7 +46,7 @@ def row_times_both_ways(
 
 
 def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
-    """Write the loop over the blocks of a row, from ``args[3]`` to ``args[4]``, and return its sums."""
+    """Generate the loop over the blocks of a row, from ``args[3]`` to ``args[4]``, and return its sums."""
     from numba.core import cgutils
 
     step = args[3].type(1)
@@ -68,7 +68,7 @@ def add_row_transposed(
     rows: Any,
     cols: Any,
 ) -> Any:
-    """Return the types of `block_products.add_row_transposed`, and what writes it."""
+    """Return the signature and the code generator of `block_products.add_row_transposed`."""
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -97,17 +97,17 @@ def add_row_transposed(
 
 
 def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
-    """Return the types of `block_products.add_product`, and what writes it."""
+    """Return the signature and the code generator of `block_products.add_product`."""
     return _added(lambda r, t, _m, k: r * k + t, to, left, right, sizes)
 
 
 def add_transposed(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
-    """Return the types of `block_products.add_transposed`, and what writes it."""
+    """Return the signature and the code generator of `block_products.add_transposed`."""
     return _added(lambda r, t, m, _k: t * m + r, to, left, right, sizes)
 
 
 def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right: Any, sizes: Any) -> Any:
-    """Return the types of a product that is added, and what writes it, given where the left factor has (row, inner)."""
+    """Return the signature and the code generator of an added product; `place` locates (row, inner) of the left factor."""
     from numba.core import types
 
     def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -131,7 +131,7 @@ def _added(place: Callable[[int, int, int, int], int], to: Any, left: Any, right
 
 
 class _Writer:
-    """Writes loads of vectors, and what is done with them, in the precision `kind`."""
+    """Generator of vector loads and operations in the precision `kind`."""
 
     def __init__(self, context: Any, builder: Any, kind: Any) -> None:
         from llvmlite import ir
@@ -152,12 +152,12 @@ class _Writer:
         return [self.start(kind, self.builder.extract_value(arrays, k)) for k, kind in enumerate(kinds)]
 
     def where(self, start: Any, at: Any, column: int, width: int) -> Any:
-        """Return the address of a vector: that of a number, counted from `at`."""
+        """Return the address of a vector that begins at `column` after `at`."""
         place = self.builder.gep(start, [self.builder.add(at, at.type(column))])
         return self.builder.bitcast(place, self.kind(start.type.pointee, width).as_pointer())
 
     def numbers(self, starts: list[Any], at: Any, column: int, width: int) -> Any:
-        """Return a vector of what begins at `starts`, the high and low parts of each number added."""
+        """Return the vector at `starts`, with the high and low parts of each number added."""
         from llvmlite import ir
 
         parts = [
@@ -171,9 +171,10 @@ class _Writer:
         return parts[0] if len(parts) == 1 else self.builder.fadd(*parts)
 
     def plus(self, total: Any, one: Any, other: Any) -> Any:
-        """Return a total and a product, rounded at once wherever the processor does that, and nowhere else.
+        """Return a total plus a product, as a fused multiply-add if the processor has one.
 
-        Left to the compiler, it would depend on the code around it, and copies of a kernel would differ in the last bit.
+        Left to the compiler, fusing would depend on the surrounding code, and copies of a kernel would differ in the
+        last bit.
         """
         if not self.fused:
             return self.builder.fadd(total, self.builder.fmul(one, other))
@@ -193,7 +194,7 @@ class _Writer:
         self.builder.store(total, self.where(start, at, column, width), align=align)
 
     def everywhere(self, number: Any, width: int) -> Any:
-        """Return a vector with the same number everywhere."""
+        """Return a vector with the same number in all lanes."""
         from llvmlite import ir
 
         if width == 1:
@@ -222,10 +223,10 @@ class _Writer:
 
 
 class _Row(_Writer):
-    """Writes the loop over the blocks of a row; a sum for every row of the blocks and lane of a vector.
+    """Generator of the loop over the blocks of a row, with a sum for every row of the blocks and lane of a vector.
 
     With three columns a vector has one number too many. In the last row of a block it is the one before the row, in others
-    the one behind, so that nothing is read beside the block.
+    the one after, so that nothing outside the block is read.
     """
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
@@ -244,7 +245,7 @@ class _Row(_Writer):
         ]
 
     def add_block(self, k: Any) -> None:
-        """Add the product of block `k` with what it meets of x."""
+        """Add the product of block `k` with its part of x."""
         builder, m, n = self.builder, self.m, self.n
         column = builder.load(builder.gep(self.indices, [k]))
         if column.type != self.offset:
@@ -264,17 +265,17 @@ class _Row(_Writer):
         self.leave(j)
 
     def met(self, r: int, p: int, numbers: Any, last: bool) -> None:
-        """Do what else is done with the numbers of row r and piece p of a block, and whether they begin one before it."""
+        """Process the numbers of row r and piece p of a block further; `last` if they begin one number before it."""
 
     def leave(self, j: Any) -> None:
-        """Do what is done at the end of a block whose first column is j."""
+        """Finish a block whose first column is j."""
 
     def sums(self) -> list[Any]:
         """Return the sum of every row of the blocks."""
         return [self._sum(totals, int(self.shifted and r == self.m - 1)) for r, totals in enumerate(self.totals)]
 
     def _sum(self, totals: list[Any], first: int) -> Any:
-        """Return the sum of the lanes that count, from the first on."""
+        """Return the sum of the used lanes, starting at the first one."""
         lanes = []
         for piece, total in zip(self.pieces, totals, strict=True):
             vector = self.builder.load(total)
@@ -288,13 +289,13 @@ class _Row(_Writer):
         return partial
 
     def _three(self, j: Any) -> list[Any]:
-        """Return three numbers of x and any fourth, without a look beyond them."""
+        """Return three numbers of x and an arbitrary fourth, without reading beyond them."""
         pair = self.shuffled(self.numbers([self.x], j, 0, 2), [0, 1, 0, 1])
         return [self.builder.insert_element(pair, self.numbers([self.x], j, 2, 1), self.lane(2))]
 
 
 class _RowBothWays(_Row):
-    """Writes the same, and what the transposed blocks make of the row's own part of x, added to y at their columns."""
+    """The same, plus the product of the transposed blocks and the row's part of x, added to y at their columns."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
         super().__init__(context, builder, signature, args, m, n)
@@ -313,7 +314,7 @@ class _RowBothWays(_Row):
         self.added[p] = self.plus(self.added[p], numbers, self.everywhere(self.own[r], width))
 
     def leave(self, j: Any) -> None:
-        """Add the sums to y; nothing beside them is touched."""
+        """Add the sums to y, without touching other entries."""
         for piece, vector in zip(self.pieces, self.added, strict=True):
             if piece.used == piece.width:
                 self.add(self.y, j, piece.column, piece.width, vector)
@@ -324,7 +325,7 @@ class _RowBothWays(_Row):
 
 
 def _pieces(n: int) -> list[Piece]:
-    """Return the pieces of n columns: as many whole vectors as there are, half a one, a single number."""
+    """Return the pieces of n columns: full vectors, then a half vector, then a single number."""
     pieces, column = [], 0
     for width in (WIDTH, WIDTH // 2, 1):
         while n - column >= width:

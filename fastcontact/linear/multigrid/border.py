@@ -15,11 +15,10 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
+from fastcontact.round_off import ROUND_OFF
 
-# Compliance of displacements in units of the inverse diagonal of their matrix.
+# Compliance of displacements over the inverse diagonal of their matrix.
 SOFTER = 2.0
-# Part of what they have by themselves that is added to multipliers in the preconditioner: some are linearly dependent.
-REPEATED = 1e-10
 
 
 class Border:
@@ -43,9 +42,10 @@ class Border:
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
         diagonal_of_S = S.diagonal()
-        # Residuals of these equations become forces.
+        # Residuals of these equations are scaled to forces.
         self.stiffness = 1.0 / diagonal_of_S
-        self._factors = splu(csc_array(S + diags_array(REPEATED * diagonal_of_S)))
+        # Some multipliers are linearly dependent.
+        self._factors = splu(csc_array(S + diags_array(ROUND_OFF * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
         """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""

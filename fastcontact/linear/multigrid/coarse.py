@@ -12,12 +12,12 @@ from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.round_off import ROUND_OFF
 
-# A dense factor of more unknowns costs more than a sparse one.
+# Number of unknowns above which a dense factor costs more than a sparse one.
 DENSE_UP_TO = 1500
 
 
 class Coarse:
-    """Solves with a symmetric positive semidefinite matrix; unknowns without stiffness of their own stay at zero.
+    """Solver for a symmetric positive semidefinite matrix; unknowns without stiffness stay at zero.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Coarse:
     Attributes
     ----------
     matrix : csc_array (n, n)
-        `A`; what is solved with also holds the last change.
+        `A`, without the last change.
     """
 
     def __init__(self, A: csc_array) -> None:
@@ -54,9 +54,9 @@ class Coarse:
             return
         diagonal = A.diagonal()
         self._idle = np.flatnonzero(diagonal <= ROUND_OFF * diagonal.max())
-        kept = np.ones(self.n)
-        kept[self._idle] = 0.0
-        K = diags_array(kept) @ A @ diags_array(kept) + diags_array(1.0 - kept)
+        active = np.ones(self.n)
+        active[self._idle] = 0.0
+        K = diags_array(active) @ A @ diags_array(active) + diags_array(1.0 - active)
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, b: AnyArray, x: AnyArray) -> None:

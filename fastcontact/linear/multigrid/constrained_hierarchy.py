@@ -1,9 +1,9 @@
 """Multigrid hierarchy under eliminated constraints: local updates of its levels, applied and undone.
 
-The prolongators stay those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
-products near the pivots change. The changes are stored beside the matrices of the levels, which stay as they are. On the
-finest level only diagonal blocks are formed: products with the matrix move displacements and forces at the pivots instead.
-Springs between unknowns, such as penalties and those across sliding contacts, are added on all levels: beside smooth
+The prolongators are those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
+products near the pivots change. The changes are stored separately from the matrices of the levels, which are not modified. On
+the finest level only diagonal blocks are formed: products with the matrix move displacements and forces at the pivots
+instead. Springs between unknowns, such as penalties and those of sliding contacts, are added on all levels: for smooth
 displacements, which coarser levels correct, they are far stiffer than the bodies.
 """
 
@@ -24,26 +24,27 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, 
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.springs import Springs
 
-# Largest eigenvalue of the finest level, beside its diagonal, from which it counts as wide; 3 to 4 on well-shaped hexahedra.
+# Largest eigenvalue of the finest level, over its diagonal, above which the spectrum is wide; 3 to 4 on well-shaped
+# hexahedra.
 WIDE = 6.0
-# Nodes that equations stiffen by this factor need more than the smoother, its bounds, and the coarser levels of K.
+# Nodes stiffened by equations by this factor need more than the smoother, its bounds, and the coarser levels of K.
 MUCH = 4.0
 
 
 class ConstrainedHierarchy:
-    """Changes the levels of a hierarchy to those under equations, and back.
+    """Hierarchy whose levels are modified for equations, and restored.
 
     Parameters
     ----------
     hierarchy : Hierarchy
     A : BlockMatrix
-        Its finest matrix, all digits.
+        Its finest matrix in full precision.
 
     Attributes
     ----------
     stiffening : float
-        By how much equations stiffen the node that they stiffen most, beside its own stiffness: large where pivots belong to
-        a much stiffer body than the unknowns that they follow, which the prolongators of K do not suit.
+        Largest factor by which equations stiffen a node: large where pivots belong to a much stiffer body than the unknowns
+        that they follow, for which the prolongators of K are unsuitable.
     """
 
     def __init__(self, hierarchy: Hierarchy, A: BlockMatrix) -> None:
@@ -52,7 +53,7 @@ class ConstrainedHierarchy:
         self._kept: list[tuple[Level, Indices, AnyArray]] = []
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """Make the hierarchy that of the matrix under the equations eliminated; None: without equations.
+        """Change the hierarchy to that of the matrix with the equations eliminated; None: without equations.
 
         `springs` are added to the matrix of the hierarchy.
         """
@@ -63,15 +64,15 @@ class ConstrainedHierarchy:
         added = springs
         if springs is not None and elimination is not None:
             added = springs.under(elimination.pivots, elimination.weights)
-        if added is not None and not added.rows.nnz:  # of slips that supports prevent, or of pivots alone
+        if added is not None and not added.rows.nnz:  # slips that supports prevent, or that only involve pivots
             added = None
         if elimination is None and added is None:
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
             return
         self._change_levels(elimination, added)
-        # Equations raise the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
-        # where it is wide already: on flat and on nearly incompressible cells.
+        # Equations widen the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
+        # where it is already wide: on flat and on nearly incompressible cells.
         self.hierarchy.set_bounds()
         finest = added is not None or self.stiffening > MUCH or self.hierarchy.bounds[0] > WIDE
         self.hierarchy.set_bounds(range(0 if finest else 1, len(self.hierarchy.levels) - 1))
@@ -113,10 +114,10 @@ class ConstrainedHierarchy:
             level.followers = level.free_motions = None
 
     def _stiffened(self, change: LocalChange, elimination: Elimination) -> Indices:
-        """Return the nodes without pivots that equations stiffen by much, and set `stiffening`."""
+        """Return the nodes without pivots that equations stiffen strongly, and set `stiffening`."""
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
-        trace, more = (np.einsum("kii->k", part.reshape(-1, size, size)) for part in (of_all, change.diagonal()))
+        trace, more = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (of_all, change.diagonal()))
         by = np.divide(more, trace, out=np.zeros(len(more)), where=trace > 0.0)
         self.stiffening = float(by.max(initial=0.0))
         return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]
@@ -124,7 +125,7 @@ class ConstrainedHierarchy:
     def _turned_round(
         self, elimination: Elimination, springs: Springs | None, stiffened: Indices, of_springs: list[LocalChange]
     ) -> list[SymmetricChange]:
-        """Let coarser levels see stiffened nodes follow the pivots; return the changes there. See `stiffened_nodes`."""
+        """Make stiffened nodes follow the pivots on coarser levels; return the changes there. See `stiffened_nodes`."""
         top, size = self.hierarchy.levels[0], len(self.A.rows)
         top.free_motions = FreeMotions(elimination.weights, stiffened, self._own_inverses(stiffened, of_springs))
         following = followers(elimination, stiffened, size)
@@ -147,7 +148,7 @@ class ConstrainedHierarchy:
         return inverses.reshape(-1, size, size)
 
     def _change_diagonal(self, level: Level, change: LocalChange) -> None:
-        """Add the diagonal blocks of a change to those of a level, and remember what the inverses were."""
+        """Add the diagonal blocks of a change to those of a level, and save the previous inverses."""
         size, nodes = len(level.A.rows), change.nodes
         blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change.diagonal()
         inverse = np.empty(blocks.size, level.inverse.dtype)

@@ -12,10 +12,11 @@ import numpy as np
 from numba import prange
 
 from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact.linear.krylov.krylov_kernels import stretch_dot
 from fastcontact.linear.multigrid.block_products import row_times
 from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, FIRST
 
-# Up to so many block rows, waking another thread costs more than it saves.
+# Number of block rows up to which waking another thread costs more than it saves.
 ALONE = 4 * CHUNK
 
 
@@ -74,10 +75,10 @@ def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
 
 @parallel_kernel
 def relax(inverse, r, first, second, d, x, rows, begin):
-    """One step of a Chebyshev iteration: ``d = first d + second D^-1 r`` and ``x = x + d``.
+    """Make one step of a Chebyshev iteration: ``d = first d + second D^-1 r`` and ``x = x + d``.
 
-    `inverse` (n_rows * m * m,) holds the inverted diagonal blocks. With ``first = 0``, d need not be set before, and
-    with `begin` x neither: it then starts from zero.
+    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be set before; with
+    `begin`, x starts from zero and need not be set either.
     """
     n = r.shape[0] // len(rows)
     if n <= ALONE:
@@ -88,26 +89,11 @@ def relax(inverse, r, first, second, d, x, rows, begin):
 
 
 @kernel
-def _dot_rows(a, b, length):
-    """Return the dot product of the beginnings of two vectors, in four sums side by side."""
-    s0 = s1 = s2 = s3 = 0.0
-    whole = length // 4 * 4
-    for k in range(0, whole, 4):
-        s0 += a[k] * b[k]
-        s1 += a[k + 1] * b[k + 1]
-        s2 += a[k + 2] * b[k + 2]
-        s3 += a[k + 3] * b[k + 3]
-    for k in range(whole, length):
-        s0 += a[k] * b[k]
-    return (s0 + s1) + (s2 + s3)
-
-
-@kernel
 def factorise_dense(A, reciprocal):
     """Replace the lower triangle of a symmetric positive semidefinite `A` (n, n) by its Cholesky factor.
 
-    `reciprocal` (n,) takes the inverses of its diagonal; unknowns without stiffness of their own, or that follow from
-    those before them, get zero and are left out of solutions.
+    `reciprocal` (n,) receives the inverses of its diagonal; unknowns without stiffness, or that depend on earlier ones, get
+    zero and are left out of solutions.
     """
     n = A.shape[0]
     largest = 0.0
@@ -115,8 +101,8 @@ def factorise_dense(A, reciprocal):
         largest = max(largest, A[i, i])
     for i in range(n):
         for j in range(i):
-            A[i, j] = (A[i, j] - _dot_rows(A[i], A[j], j)) * reciprocal[j]
-        pivot = A[i, i] - _dot_rows(A[i], A[i], i)
+            A[i, j] = (A[i, j] - stretch_dot(A[i], A[j], FIRST, j)) * reciprocal[j]
+        pivot = A[i, i] - stretch_dot(A[i], A[i], FIRST, i)
         if pivot > 1e-12 * A[i, i] and A[i, i] > 1e-12 * largest:
             reciprocal[i] = 1.0 / np.sqrt(pivot)
         else:
@@ -128,7 +114,7 @@ def solve_dense(L, reciprocal, b, work, x):
     """Fill `x` (n,) with the solution for the right-hand side `b`, from `factorise_dense`; `work` (n,) is scratch."""
     n = L.shape[0]
     for i in range(n):
-        work[i] = (b[i] - _dot_rows(L[i], work, i)) * reciprocal[i]
+        work[i] = (b[i] - stretch_dot(L[i], work, FIRST, i)) * reciprocal[i]
     for i in range(n - 1, -1, -1):
         value = work[i] * reciprocal[i]
         x[i] = value
@@ -163,7 +149,7 @@ def subtract_rows(numbers, indptr, indices, data, x, y, rows):
 def invert_blocks(blocks, size, out):
     """Fill `out` (n * size * size,) with the inverses of symmetric positive semidefinite `blocks` (n * size * size,).
 
-    Unknowns without stiffness of their own get rows and columns of zeros: Gauss-Jordan elimination passes them by.
+    Unknowns without stiffness get rows and columns of zeros: Gauss-Jordan elimination skips them.
     """
     a = np.empty((size, 2 * size))
     for i in range(blocks.shape[0] // (size * size)):

@@ -13,13 +13,13 @@ from fastcontact._jit.decorators import kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
 from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, part_of, place_of
 
-# Parts of Galerkin products, each with its own work space.
+# Number of parts of Galerkin products, each with its own work space.
 PARTS = 8
 
 
 @kernel
 def _near(i, indptr, indices, storage, data, square, near):
-    """Fill `near` with the columns of the blocks of row i that are not zero, but for the diagonal; return their number."""
+    """Fill `near` with the columns of the nonzero off-diagonal blocks of row i; return their number."""
     part, count = part_of(storage, i), 0
     for k in range(indptr[i], indptr[i + 1]):
         if indices[k] == i:
@@ -35,9 +35,9 @@ def _near(i, indptr, indices, storage, data, square, near):
 
 @parallel_kernel
 def graph(indptr, indices, storage, data, size):
-    """Return (start, neighbours) of the blocks that are not zero; the diagonal is left out.
+    """Return the offsets and columns of the nonzero off-diagonal blocks.
 
-    A row without neighbours is a node that no other moves with: all its unknowns are supported.
+    A row without neighbours is a node without coupling: all its unknowns are supported.
     """
     n = indptr.shape[0] - 1
     start, widest = np.zeros(n + 1, np.int32), 0
@@ -110,14 +110,14 @@ def _smooth_row(
     start,
     columns,
     out,
-    found,
+    aggregates,
     sums,
     rows,
     cols,
 ):
     part = part_of(storage, i)
     m, n = len(rows), len(cols)
-    count = _aggregates_of(i, indptr, indices, aggregate, found)
+    count = _aggregates_of(i, indptr, indices, aggregate, aggregates)
     for e in range(count * m * n):
         sums[e] = 0.0
     for k in range(indptr[i], indptr[i + 1]):
@@ -125,7 +125,7 @@ def _smooth_row(
         if aggregate[j] < 0:
             continue
         at = 0
-        while found[at] != aggregate[j]:
+        while aggregates[at] != aggregate[j]:
             at += 1
         slot, turned = place_of(storage, part, i, j, k)
         if turned:
@@ -134,13 +134,13 @@ def _smooth_row(
             add_product(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
     for at in range(count):
         base = (start[i] + at) * m * n
-        columns[start[i] + at] = found[at]
+        columns[start[i] + at] = aggregates[at]
         for r in range(m):
             for c in range(n):
                 s = 0.0
                 for t in range(m):
                     s += inverse[(i * m + r) * m + t] * sums[(at * m + t) * n + c]
-                first = tentative[(i * m + r) * n + c] if found[at] == aggregate[i] else 0.0
+                first = tentative[(i * m + r) * n + c] if aggregates[at] == aggregate[i] else 0.0
                 out[base + r * n + c] = first - omega * s
 
 
@@ -169,7 +169,7 @@ def smooth_prolongator(indptr, indices, storage, data, inverse, aggregate, tenta
 
 @kernel
 def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached):
-    """Find the fine nodes next to those of a coarse node, and the coarse nodes that these reach; return both counts."""
+    """Find the fine neighbours of the nodes of a coarse node, and the coarse nodes of these; return both counts."""
     n_near = n_found = 0
     for e in range(tstart[row], tstart[row + 1]):
         i = torigin[e]
@@ -192,7 +192,7 @@ def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, se
 
 @parallel_kernel
 def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near_count):
-    """Fill, for each coarse row of ``P.T A P``, the number of its blocks and of fine nodes it is summed over."""
+    """Fill, for each coarse row of ``P.T A P``, the numbers of its blocks and of fine nodes in its sum."""
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     for part in prange(PARTS):
         seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
@@ -208,7 +208,7 @@ def _galerkin_row(
     row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, low,
     places, out, rows, cols,
 ):  # fmt: skip
-    """Sum one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed: A is symmetric."""
+    """Compute one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed since A is symmetric."""
     m, n = len(rows), len(cols)
     for e in range(n_near):
         place[near[e]] = e
@@ -251,7 +251,7 @@ def galerkin(
 ):
     """Fill the columns and blocks of ``P.T A P``, A symmetric; `low` are its row pointers, `out` holds zeros.
 
-    `largest` is the largest number of fine nodes that a coarse row is summed over.
+    `largest` is the largest number of fine nodes in the sum of a coarse row.
     """
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
     m, size = len(rows), len(cols)

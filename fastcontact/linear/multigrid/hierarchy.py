@@ -1,11 +1,11 @@
 """A multigrid hierarchy of smoothed aggregation and its V-cycle, on compiled block kernels.
 
-Neighbouring nodes are gathered into aggregates, each of which moves like a rigid body at first. One step of block Jacobi
-smooths these motions (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother of the
-levels is a Chebyshev iteration (`smoother`).
+Neighbouring nodes form aggregates, whose tentative prolongator consists of rigid-body modes. One step of block Jacobi smooths
+it (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother of the levels is a Chebyshev
+iteration (`smoother`).
 
-Two functions are pyamg's: `standard_aggregation` gathers the nodes and `fit_candidates` makes an orthonormal basis of the
-rigid motions of each aggregate. Everything else is ours. `linear.solvers.pyamg` is pyamg's own multigrid, to compare with.
+Two functions are pyamg's: `standard_aggregation` forms the aggregates and `fit_candidates` computes an orthonormal basis
+of the rigid-body modes of each. Everything else is our own. `linear.solvers.pyamg` is pyamg's own multigrid, for comparison.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
-# The coarsest level has at most so many unknowns, or a level fewer than this part of the unknowns of the one above.
+# Largest number of unknowns of the coarsest level, and largest ratio of unknowns from one level to the next.
 COARSEST = 200
 STAGNANT = 0.7
 
@@ -36,9 +36,9 @@ class Hierarchy:
     Parameters
     ----------
     A : BlockMatrix
-        Square blocks. Its `data` are in the precision of the cycle; the set-up is done in double precision.
+        Matrix of square blocks. Its `data` have the precision of the cycle; the set-up is done in double precision.
     modes : ndarray (n, n_modes)
-        Displacements that cost little energy: zero at supported unknowns.
+        Near null space, zero at supported unknowns.
     """
 
     def __init__(self, A: BlockMatrix, modes: Array) -> None:
@@ -90,7 +90,8 @@ class Hierarchy:
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
         cols = (0,) * n_modes
         indptr = galerkin_kernels.count_prolongator(A.indptr, A.indices, aggregate)
-        # In the precision of the cycle from the start: the coarse matrix is then the exact product of what is used.
+        # In the precision of the cycle from the start, so that the coarse matrix is the exact product of the
+        # prolongators used.
         blocks = np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
         columns = galerkin_kernels.smooth_prolongator(
             A.indptr, A.indices, A.storage, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks,
@@ -131,14 +132,14 @@ class Hierarchy:
         self.bounds = [factor * bound for bound in self.bounds]
 
     def set_bounds(self, anew: Sequence[int] = ()) -> None:
-        """Set the bounds of the smoothers to those of K, but for levels `anew`, where they are estimated again."""
+        """Set the bounds of the smoothers to those of K, except for levels `anew`, where they are estimated again."""
         self.bounds = [
             max(bound, SAFETY * largest_eigenvalue(level)) if number in anew else bound
             for number, (level, bound) in enumerate(zip(self.levels, self._free_bounds, strict=True))
         ]
 
     def cycle(self, number: int = 0) -> None:
-        """Improve by one V-cycle: from ``levels[number].b`` to ``levels[number].x``, starting at zero."""
+        """Apply one V-cycle to ``levels[number].b``, starting at zero; the result is in ``levels[number].x``."""
         level = self.levels[number]
         if level.P is None:
             self.coarse.solve(level.b, level.x)
@@ -159,7 +160,7 @@ class Hierarchy:
 
 
 def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
-    """Return where the blocks of each of n block columns begin, their rows, ascending, and their numbers."""
+    """Return the offsets of the blocks of each of n block columns, their rows, ascending, and their numbers."""
     numbers = np.arange(len(P.indices), dtype=np.int32)
     columns = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
     return columns.indptr, columns.indices, columns.data

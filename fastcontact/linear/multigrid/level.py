@@ -17,13 +17,13 @@ from fastcontact.linear.springs import Springs
 
 @dataclass(eq=False)
 class Level:
-    """A matrix of the hierarchy with its smoother, the way to the next coarser one, and work space.
+    """A matrix of the hierarchy with its smoother, the transfer to the next coarser level, and work space.
 
     Attributes
     ----------
     A : BlockMatrix
     diagonal, inverse : ndarray (n_nodes * size * size,)
-        Diagonal blocks, and their inverses as the smoother takes them.
+        Diagonal blocks, and their inverses for the smoother.
     bound : float
         Upper bound of the eigenvalues of ``D^-1 A``.
     P : BlockMatrix or None
@@ -31,16 +31,16 @@ class Level:
     R : Restriction or None
         Its transpose.
     eliminated : Elimination or None
-        Equations, on the finest level: weights in the precision of the cycle, the same for forces.
+        Equations on the finest level: weights in the precision of the cycle, the same for forces.
     change : tuple of ndarray, or None
-        What eliminated equations and springs add to the matrix, on coarser levels: the block rows that change (k,), and
-        the change on them as `indptr`, `indices` and `data` of a `BlockMatrix`.
+        Contribution of eliminated equations and springs to the matrix on coarser levels: the block rows that change (k,), and
+        the change as `indptr`, `indices` and `data` of a `BlockMatrix`.
     springs : Springs or None
         Springs on the finest level, under the equations.
     followers : Elimination or None
         Unknowns that follow the eliminated ones in corrections from coarser levels, on the finest level.
     free_motions : FreeMotions or None
-        What the smoother adds at nodes that equations stiffen by much, on the finest level.
+        Correction of the smoother at nodes that equations stiffen strongly, on the finest level.
     b, x, r, d : ndarray (n,)
         Right-hand side, iterate, residual and step of the cycle.
     """
@@ -95,7 +95,7 @@ class Level:
             cycle_kernels.subtract_rows(numbers, indptr, indices, (data,), x, r, self.A.rows)
 
     def restrict(self, coarse: AnyArray) -> None:
-        """Fill the right-hand side of the next coarser level with the residual `r`, which is lost."""
+        """Restrict the residual `r`, which is overwritten, to the right-hand side of the next coarser level."""
         assert self.R is not None
         if self.followers is not None:
             self.followers.move_forces(self.r)

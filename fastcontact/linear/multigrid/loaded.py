@@ -1,7 +1,7 @@
-"""Multigrid solution under linear constraints, some of which have a compliance of their own.
+"""Multigrid solution under linear constraints, some of which have a compliance.
 
-An equation with a compliance of its own is a spring along its row. Springs not much stiffer than the body become part of the
-matrix and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
+An equation with a compliance is a spring along its row. Springs not much stiffer than the body become part of the matrix
+and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.linear.elimination.basis_transformation import eliminated
 from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.loaded import LoadedIteration
 from fastcontact.linear.elimination.pivot_order import RepeatedError
@@ -25,15 +24,15 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Equations whose own stiffness exceeds that of the unknowns they act on by this factor are eliminated: as springs they
-# take half as many iterations again there, and the root of the ratio as many beyond.
+# Equations whose stiffness exceeds that of their unknowns by this factor are eliminated: as springs they need 1.5 times the
+# iterations at this ratio, and more with its square root beyond.
 STIFF = MILD
 
 
 class LoadedMultigrid(LoadedIteration):
     """See `LoadedIteration`; its solver is a `Multigrid`."""
 
-    # Values of a pressure field at the edge of the contact, as they were in the last pairing.
+    # Values of a pressure field at the edge of the contact in the last pairing.
     _at_edge: Array = np.empty(0)
 
     def solve(
@@ -52,11 +51,6 @@ class LoadedMultigrid(LoadedIteration):
         if parts is None:
             return super().solve(B, c, C, guess, monitor, tolerance, nodes)
         return self._solved(parts, c, guess, monitor, tolerance)
-
-    @property
-    def _functions(self) -> csr_array | None:
-        functions: csr_array | None = self._solver.basis_transformation
-        return functions
 
     @property
     def contrast(self) -> float:
@@ -97,19 +91,14 @@ class LoadedMultigrid(LoadedIteration):
             assert monitor is not None
             return monitor(u, parts.multiplier(u, multiplier, c), error)
 
-        if parts.giving and self._functions is not None:
-            # Excesses at mid nodes are not eliminated here: conjugate gradients broke down, conjugate residuals go on.
-            start = np.zeros(len(f)) if guess is None else guess
-            u = solver.nonsymmetric_solution(f, elimination, springs, start, tolerance or solver.tolerance)
-        else:
-            u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
+        u = solver.solution(f, elimination, guess, monitor and watch, tolerance, springs)
         return u, parts.multiplier(u, solver.multiplier(elimination, u, f, springs), c)
 
     def _solved_for_field(
         self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
         tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return u and the forces of points (m,); see `field_compliance`."""
+        """Return u and the point forces (m,); see `field_compliance`."""
         solver = self._solver
         parts = _FieldParts.of(B, c, C, solver.K.blocksize[0])
         elimination, springs, f, border = parts.elimination, parts.springs, parts.pushed(self._f, c), parts.border()
@@ -144,15 +133,15 @@ class LoadedMultigrid(LoadedIteration):
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
-            elimination = eliminated(B, c, through, nodes, size, self._functions) if len(c) else None
+            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
             return _Parts(np.ones(len(c), bool), elimination, None)
         diagonal = self._solver.diagonal()
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         softness = B.multiply(B) @ yielding
         try:
-            return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through, self._functions)
+            return _Parts.of(B, c, C, softness > STIFF * C, nodes, size, through)
         except RepeatedError:
-            return _Parts.of(B, c, C, C == 0.0, nodes, size, through, self._functions)
+            return _Parts.of(B, c, C, C == 0.0, nodes, size, through)
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,39 +155,31 @@ class _Parts:
     @classmethod
     def of(
         cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
-        through: csr_array | None, functions: csr_array | None,
+        through: csr_array | None,
     ) -> _Parts:  # fmt: skip
         """Return the parts of ``B u + C multiplier = c``; RepeatedError if stiff ones are linearly dependent."""
-        gives = C[stiff].any()
-        if gives:  # excesses take the places of nodal pivots
-            functions = None
         if stiff.all():
-            elimination = eliminated(B, c, through, nodes, size, functions) if len(c) else None
+            elimination = eliminate(B, c, through, nodes, size) if len(c) else None
         else:
             rows, acting = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
             of_rows = None if nodes is None else nodes[stiff]
-            elimination = eliminated(rows, c[stiff], acting, of_rows, size, functions) if stiff.any() else None
-        if elimination is not None and gives:
+            elimination = eliminate(rows, c[stiff], acting, of_rows, size) if stiff.any() else None
+        if elimination is not None and C[stiff].any():  # excesses take the places of pivots
             elimination = dataclasses.replace(elimination, compliance=C[stiff])
         if stiff.all():
             return cls(stiff, elimination, None)
         acting = None if through is None else csr_array(through[~stiff])
         return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], acting))
 
-    @property
-    def giving(self) -> bool:
-        """Whether eliminated constraints have a compliance."""
-        return self.elimination is not None and self.elimination.compliance is not None
-
     def pushed(self, f: Array, c: Array) -> Array:
-        """Return forces f (n,) and those of the springs at u = 0."""
+        """Return forces f (n,) plus those of the springs at u = 0."""
         if self.springs is None:
             return f
         acting = self.springs.rows if self.springs.through is None else self.springs.through
         return f + acting.T @ (self.springs.stiffness * c[~self.stiff])
 
     def multiplier(self, u: Array, of_stiff: Array, c: Array) -> Array:
-        """Return all multipliers (m,), given those of the equations eliminated."""
+        """Return all multipliers (m,), given those of the eliminated equations."""
         if self.springs is None:
             return of_stiff
         multiplier = np.empty(len(c))
@@ -238,12 +219,12 @@ class _FieldParts:
         return f + self.springs.rows.T @ (self.springs.stiffness * c)
 
     def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
-        """Return the forces (m,) of the points, given what multiplies the equations of the field."""
+        """Return the forces (m,) of the points, given the multipliers of the equations of the field."""
         p = np.empty(len(self.field.right))
         p[~self.field.edge], p[self.field.edge] = inside, at_edge
         return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
 
 
 def _nodes(rows: csr_array, size: int) -> Indices:
-    """Return the node (m,) that each row involves most; a node has `size` unknowns."""
+    """Return the node (m,) with the largest entry in each row; a node has `size` unknowns."""
     return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

@@ -29,7 +29,7 @@ class LocalChange:
 
     @classmethod
     def of_diagonal(cls, nodes: Indices, blocks: Array) -> LocalChange:
-        """Return the change of diagonal `blocks` (k, size, size) alone."""
+        """Return a change of the diagonal `blocks` (k, size, size) only."""
         n = blocks.shape[0] * blocks.shape[1]
         return cls(nodes, bsr_array((blocks, np.arange(len(nodes)), np.arange(len(nodes) + 1)), shape=(n, n)))
 
@@ -43,7 +43,7 @@ class LocalChange:
         return diagonal_blocks(self.blocks.indptr, self.blocks.indices, self.blocks.data, self.size)
 
     def rows(self, kind: DTypeLike) -> tuple[AnyArray, ...]:
-        """Return nodes, and `indptr`, `indices` (of all nodes) and `data` of their block rows, in a precision."""
+        """Return the nodes, and `indptr`, `indices` (of all nodes) and `data` of their block rows, in a given precision."""
         columns = self.nodes[self.blocks.indices].astype(np.int32)
         return self.nodes, self.blocks.indptr, columns, self.blocks.data.astype(kind).ravel()
 
@@ -64,7 +64,7 @@ class LocalChange:
         return bsr_array((change.data, self.nodes[change.indices], indptr), shape=(n, n)).tocsc()
 
     def spread(self, nodes: Indices) -> bsr_array:
-        """Return the blocks on more `nodes` (l,), ascending."""
+        """Return the blocks on a superset `nodes` (l,), ascending."""
         index = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
         count[index] = np.diff(self.blocks.indptr)
@@ -88,5 +88,5 @@ def block_rows(A: BlockMatrix, nodes: Indices, n: int) -> bsr_array:
     count = np.diff(A.indptr)[nodes]
     indptr = np.concatenate([[0], np.cumsum(count)])
     blocks = np.repeat(A.indptr[nodes] - indptr[:-1], count) + np.arange(indptr[-1])
-    data = sum(part.reshape(-1, rows, cols)[blocks].astype(float) for part in A.exact)
+    data = sum(values.reshape(-1, rows, cols)[blocks].astype(float) for values in A.exact)
     return bsr_array((data, A.indices[blocks], indptr), shape=(len(nodes) * rows, n))

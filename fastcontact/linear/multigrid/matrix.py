@@ -1,9 +1,9 @@
 """Block matrices of multigrid, and the stiffness matrix stored once for two precisions.
 
-The multigrid cycle reads K in single precision, the iteration around it in double precision. Each number of K is therefore
-stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high part,
-exact products add both. That takes 8 bytes a number in place of 12. K is symmetric: most of its blocks are stored, and read,
-once for both triangles (see `symmetric_storage_kernels`).
+The multigrid cycle uses K in single precision, the outer iteration in double precision. Each number of K is therefore
+stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high
+part, exact products use both. This takes 8 instead of 12 bytes per number. K is symmetric: most of its blocks are
+stored, and read, once for both triangles (see `symmetric_storage_kernels`).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ Storage = tuple[Numbers, Numbers, Numbers, int]
 
 # Every block is stored.
 ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int32), 0)
-# Parts of the rows of a symmetric matrix, of so many rows at least: enough of them for many threads, and for what a part
-# writes to stay in the cache. More parts store more blocks twice.
+# Number of parts of the rows of a symmetric matrix, and their smallest size: enough parts for many threads, and small
+# enough for their results to stay in the cache. More parts store more blocks twice.
 PARTS, SHORTEST = 32, 1024
 
 
@@ -33,7 +33,7 @@ class BlockMatrix:
     Attributes
     ----------
     indptr : ndarray (n_rows + 1,)
-        Where the blocks of each block row begin.
+        Offsets of the block rows.
     indices : ndarray (n_blocks,)
         Block column of each block.
     data : ndarray (n_blocks * len(rows) * len(cols),)
@@ -43,8 +43,8 @@ class BlockMatrix:
     low : ndarray, optional
         Low parts, in single precision, where `data` are the high parts of a split matrix.
     storage : tuple
-        Which blocks of the pattern `indptr`, `indices` are stored, and in what order, where the matrix is symmetric and not
-        all of them are: see `symmetric_storage_kernels`.
+        Stored blocks of the pattern `indptr`, `indices`, and their order, for a symmetric matrix of which only a part is
+        stored: see `symmetric_storage_kernels`.
     """
 
     indptr: Numbers
@@ -57,7 +57,7 @@ class BlockMatrix:
 
     @property
     def exact(self) -> tuple[AnyArray, ...]:
-        """The numbers as kernels take them that need them all: (data,) or (high part, low part)."""
+        """The numbers in full precision, as arguments of kernels: (data,) or (high part, low part)."""
         return (self.data,) if self.low is None else (self.data, self.low)
 
     @property
@@ -87,15 +87,15 @@ class BlockMatrix:
     def diagonal_blocks(self) -> Array:
         """Return the diagonal blocks (n_rows, size, size) of a square matrix, in double precision."""
         size = len(self.rows)
-        parts = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
-        return np.asarray(sum(parts[1:], parts[0])).reshape(-1, size, size)
+        blocks = [self.diagonal_part(part).astype(float, copy=False) for part in self.exact]
+        return np.asarray(sum(blocks[1:], blocks[0])).reshape(-1, size, size)
 
-    def diagonal_part(self, part: AnyArray) -> AnyArray:
+    def diagonal_part(self, data: AnyArray) -> AnyArray:
         """Return the diagonal blocks (n_rows * size * size,) of a square matrix, from the high or the low part."""
         size = len(self.rows)
         if self.storage is ALL:
-            return diagonal_blocks(self.indptr, self.indices, part, size)
-        return part.reshape(-1, size * size)[self.storage[1] - 1].ravel()
+            return diagonal_blocks(self.indptr, self.indices, data, size)
+        return data.reshape(-1, size * size)[self.storage[1] - 1].ravel()
 
     def row_sums(self, u: Array) -> Array:
         """Return ``|A| |u|``, shape (n,), of a square matrix, from its high part."""
@@ -147,17 +147,17 @@ class ScaledMatrix:
     K : bsr_array (n, n)
         Square blocks [force / length].
     precision : {"single", "double"}
-        Of the multigrid cycle. For "single", numbers are split into a high and a low part.
+        Precision of the multigrid cycle. For "single", numbers are split into a high and a low part.
     release : bool
-        Whether the low parts may overwrite K's numbers, so that K and its parts never need memory at the same time: a
-        tenth of the peak with a million unknowns. K is empty afterwards.
+        Whether the low parts may overwrite K's numbers, so that K and its parts are never in memory at the same time,
+        which saves a tenth of the peak with a million unknowns. K is empty afterwards.
 
     Attributes
     ----------
     scaled : BlockMatrix
-        ``unit K``. Numbers of any unit system fit single precision when the largest stiffness is about one.
+        ``unit K``. With a largest stiffness of about one, numbers of any unit system fit single precision.
     unit : float
-        A power of two, which changes no digit.
+        Scaling factor, a power of two, which is exact.
     shape, blocksize : (int, int)
     """
 
@@ -180,7 +180,7 @@ class ScaledMatrix:
         self._store(self.restored(), precision, release=True)
 
     def restored(self) -> bsr_array:
-        """Return K as it was given, but for round-off."""
+        """Return K as given, up to round-off."""
         K = self.scaled.to_scipy()
         K.data /= self.unit
         return K
@@ -214,10 +214,10 @@ class ScaledMatrix:
 
 def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
     """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`."""
-    indptr, indices = (part.astype(np.int32, copy=False) for part in (K.indptr, K.indices))
+    indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
     if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
-        # Every number is read before another overwrites it. K must have no numbers then: these are none any more.
+        # Every number is read before it is overwritten. K's numbers are invalid then, and are removed.
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
         numbers = K.data.copy()
@@ -226,7 +226,7 @@ def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
     if storage is not ALL:
         _keep_stored(indptr, indices, storage, numbers.reshape(-1), size * size)
         n = len(storage[2]) * size * size
-        with contextlib.suppress(ValueError):  # another array uses the memory, all of which stays then
+        with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
             numbers.resize((n,))
     high = np.empty(n, np.float32)
     _halve(unit, numbers.reshape(-1)[:n], high)
@@ -240,7 +240,7 @@ def _keep_stored(indptr: Numbers, indices: Numbers, storage: Storage, numbers: A
     """Move the stored blocks, of `square` numbers, to the beginning of the numbers of all blocks."""
     start, widest = storage[0], int(np.diff(indptr).max(initial=0))
     end, n = 0, len(indptr) - 1
-    while end < n:  # rows whose stored blocks lie before what is still read: on all threads, or else one chunk
+    while end < n:  # rows whose stored blocks lie before unread ones: in parallel, otherwise one chunk
         first = end
         behind = int(np.searchsorted(start, indptr[first], side="right")) - 1
         end = max(behind, min(n, first + symmetric_storage_kernels.CHUNK))
@@ -248,7 +248,7 @@ def _keep_stored(indptr: Numbers, indices: Numbers, storage: Storage, numbers: A
 
 
 def _halve(unit: float, numbers: AnyArray, high: AnyArray) -> None:
-    """Fill the high parts (n,) of ``unit numbers``; the low parts take the place of the first half of the numbers."""
+    """Fill the high parts (n,) of ``unit numbers``; the low parts overwrite the first half of the numbers."""
     end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
     while end < n:
         first, end = end, min(n, max(2 * end, end + split_matrix_kernels.CHUNK))
@@ -256,9 +256,9 @@ def _halve(unit: float, numbers: AnyArray, high: AnyArray) -> None:
 
 
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
-    """Return how a symmetric matrix is stored.
+    """Return the storage of a symmetric matrix.
 
-    That is `ALL` where the pattern is not sorted, or has no diagonal or a block without its transpose.
+    It is `ALL` where the pattern is not sorted, lacks a diagonal block, or has a block without its transpose.
     """
     n = len(indptr) - 1
     length = max(SHORTEST, -(-n // PARTS))

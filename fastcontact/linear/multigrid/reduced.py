@@ -1,9 +1,10 @@
 """Reduced operator of the iteration: K and springs under eliminated constraints, with or without compliance.
 
-Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like others, but their pivots move by
-``P^-1 s`` more, P the pivots' columns of B. Their excess ``s = B u - c = -C multiplier`` is an unknown of its own, with the
-stiffness ``1 / C``: in the vectors of the iteration it stands in the place of the pivot. However stiff, it costs no digits
-and no iterations, since it is solved for by itself; the stiffer, the less it has to do with the other unknowns.
+Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like exact ones, but their pivots have the
+additional displacement ``P^-1 s``, P the pivots' columns of B. Their excess ``s = B u - c = -C multiplier`` is an
+unknown with the stiffness ``1 / C``, which replaces the pivot in the vectors of the iteration. Even a large stiffness
+costs no digits and no iterations, since it is solved for separately; the stiffer, the weaker its coupling with the other
+unknowns.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class Reduced:
     springs : Springs, optional
         Added to K.
     diagonal : ndarray (n,), optional
-        That of K [force / length], where equations have a compliance.
+        Diagonal of K [force / length], where equations have a compliance.
 
     Attributes
     ----------
@@ -47,7 +48,7 @@ class Reduced:
             self._excess = _Excess(diagonal, elimination, elimination.compliance)
 
     def begin(self, x: Array, f: Array, r: Array) -> None:
-        """Turn the displacement x (n,) [length] into a vector of the iteration, and fill r (n,) with its residual."""
+        """Convert the displacement x (n,) [length] to a vector of the iteration, and fill r (n,) with its residual."""
         if self._excess is not None:
             self._excess.begin(x, self.multiplier(x, f) if x.any() else None)
         elif self.elimination is not None:
@@ -55,9 +56,9 @@ class Reduced:
         self._subtract(self.displacement(x), f, x, r)
 
     def displacement(self, x: Array, moved: bool = True) -> Array:
-        """Return the displacement (n,) of a vector of the iteration, or, where not `moved`, that of a change of it.
+        """Return the displacement (n,) of a vector of the iteration or, if not `moved`, of an increment of it.
 
-        Until the next call: it may be work space, or x itself.
+        Valid until the next call: it may be work space, or x itself.
         """
         if self._excess is None:
             return x
@@ -73,7 +74,7 @@ class Reduced:
         self._reduce(p, q, 1.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
-        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`; `cycle` is multigrid's, for equations."""
+        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`; `cycle` is for exact equations."""
         if self._excess is None:
             cycle(r, norm, z)
             if self.elimination is not None:
@@ -114,16 +115,16 @@ class _Excess:
 
     def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
-        gives, self._compliance = compliance > 0.0, compliance
-        self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=gives)
-        # Its own stiffness and that of the pivot; an exact equation stays as it is.
+        compliant, self._compliance = compliance > 0.0, compliance
+        self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=compliant)
+        # Stiffness of the excess plus that of the pivot; exact equations are unchanged.
         of_pivots = elimination.own.sparse.matrix.power(2).T @ diagonal[self._pivots]
-        self._inverse = np.where(gives, 1.0 / (self._stiffness + of_pivots), 0.0)
-        self._gives = gives
+        self._inverse = np.where(compliant, 1.0 / (self._stiffness + of_pivots), 0.0)
+        self._compliant = compliant
         self._u = np.empty(len(diagonal))
 
     def begin(self, x: Array, multiplier: Array | None) -> None:
-        """Replace pivots by the violations that balance the forces there; constraints that were open begin with none."""
+        """Replace pivots by the violations that balance the forces there; constraints that were open start with zero."""
         x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
 
     def displacement(self, x: Array, offset: Array | None) -> Array:
@@ -136,7 +137,7 @@ class _Excess:
     def reduce(self, x: Array, r: Array, sign: float) -> None:
         multiplier = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
-        r[self._pivots] = np.where(self._gives, multiplier, 0.0)
+        r[self._pivots] = np.where(self._compliant, multiplier, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
         residual = r[self._pivots]

@@ -10,7 +10,7 @@ from fastcontact.linear.multigrid.matrix import PARTS, SHORTEST, BlockMatrix
 
 
 class Restriction:
-    """The transpose of a prolongator P, which is not stored; parts of its rows have work space of their own.
+    """The transpose of a prolongator P, which is not stored; each part of its rows has its own work space.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Products with the transpose of a block matrix stored by rows.
 
-The rows are divided into parts. Each part adds into a stretch of its own, from the first to the last column that it has; the
-stretches are then added in the order of the parts, so that the number of threads changes no bit.
+The rows are divided into parts. Each part is summed in its own buffer, from its first to its last column; the buffers
+are then added in the order of the parts, so that results do not depend on the number of threads.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, FIRST
 
 @parallel_kernel
 def reach(indptr, indices, ends, first, last):
-    """Fill the first block column of each part and the one behind its last; part p begins at row ``ends[p]``."""
+    """Fill the first block column of each part and the one after its last; part p begins at row ``ends[p]``."""
     for p in prange(ends.shape[0] - 1):
         low, high = 2**30, 0
         for k in range(indptr[ends[p]], indptr[ends[p + 1]]):
@@ -51,12 +51,12 @@ def multiply_transposed(indptr, indices, data, ends, first, last, begin, x, work
 
     Part p adds into the blocks of `work` from ``begin[p]`` on, for the columns ``first[p]`` to ``last[p] - 1``, see `reach`.
     """
-    parts, n = ends.shape[0] - 1, y.shape[0] // len(cols)
-    if parts == 1:
+    n_parts, n = ends.shape[0] - 1, y.shape[0] // len(cols)
+    if n_parts == 1:
         _add_part(FIRST, indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
         _gather(FIRST, n, first, last, begin, work, y, cols)
         return
-    for p in prange(parts):
+    for p in prange(n_parts):
         _add_part(np.int64(p), indptr, indices, data, ends, first, last, begin, x, work, rows, cols)
     for c in prange((n + CHUNK - 1) // CHUNK):
         _gather(c * CHUNK, min(n, (c + 1) * CHUNK), first, last, begin, work, y, cols)

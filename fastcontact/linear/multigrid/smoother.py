@@ -1,7 +1,7 @@
 """Chebyshev smoother, preconditioned by the diagonal blocks.
 
 It smooths the eigenvalues of ``D^-1 A`` in [SMOOTHED bound, bound], D the diagonal blocks (Adams, Brezina, Hu and Tuminaro,
-2003). Unlike Gauss-Seidel it gives the same bits for any number of threads. `Level.relax` makes one of its steps.
+2003). Unlike Gauss-Seidel it is bitwise reproducible for any number of threads. `Level.relax` makes one of its steps.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.round_off import ROUND_OFF
 
-# Lanczos steps for the largest eigenvalue, what is added to their estimate, and the part of the spectrum smoothed.
+# Lanczos steps for the largest eigenvalue, safety margin of the estimate, and the fraction of the spectrum that is smoothed.
 LANCZOS_STEPS = 8
 SAFETY = 1.08
 SMOOTHED = 1 / 24

@@ -1,8 +1,8 @@
-"""Conjugate gradients preconditioned by multigrid, with the rigid-body modes as near-nullspace.
+"""Conjugate gradients preconditioned by multigrid, with the rigid-body modes as near null space.
 
-Aggregates and prolongators are those of K and serve the whole analysis. Equations ``B u = c`` are eliminated: the
-iterates obey them, forces at the eliminated unknowns, the pivots, are moved to the other unknowns, and the hierarchy is
-changed near the pivots.
+Aggregates and prolongators are those of K and are used in the whole analysis. Equations ``B u = c`` are eliminated: the
+iterates satisfy them, forces at the eliminated unknowns, the pivots, are moved to the other unknowns, and the hierarchy is
+updated near the pivots.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array
+from scipy.sparse import bsr_array
 
 from fastcontact._jit.decorators import check_threads
 from fastcontact.arrays import Array
@@ -34,24 +34,22 @@ from fastcontact.linear.protocol import MILD, TOLERANCE, Counters, Monitor
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-MAX_ITERATIONS, MAX_NONSYMMETRIC = 1000, 300
+MAX_ITERATIONS = 1000
 # Columns of K^-1, each a solution, up to which they cost less than factors do.
 MOST_COLUMNS = 300
 # Iterations between two calls of a monitor.
 WATCH_EVERY = 2
-# Iterations before the first call where contrasts are large: fewer tell too little of the errors of what is soft.
+# Iterations before the first call where contrasts are large: after fewer, errors of soft parts are unknown.
 WATCH_CONTRAST_FROM = 6
 # Equations with the same pivots whose weights differ by less than this share a hierarchy.
 ALIKE = 0.02
-# What a change of the hierarchy costs, the elimination of its equations included, in iterations.
+# Cost of an update of the hierarchy, including the elimination of its equations, in iterations.
 CHANGE = 15
-# A warm start of a nonsymmetric solution is improved by this factor, but not to less than this part of its tolerance, and by
-# so many iterations at most where that is met. Beside much stiffer pivots, each time that the next start is not better by
-# STOOD these were too few, and become twice as many, up to LONGEST_WARM.
+# A warm start of a nonsymmetric solution is improved by the first factor, but at most to the second fraction of its
+# tolerance, and by at most this many iterations once the tolerance is met. With much stiffer pivots the number is
+# doubled, up to LONGEST_WARM, each time that the next start is not better by STOOD.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
-# A nonsymmetric iteration whose residual does not fall to this part in so many iterations stands still for good.
-FALLS, STANDING = 0.99, 40
 # Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
 RAISE, RAISES = 1.3, 4
 
@@ -61,7 +59,7 @@ class StallError(ConvergenceError):
 
 
 class TooManyIterationsError(StallError):
-    """The work done so far costs more than another way of solving."""
+    """The work done so far costs more than another solution method."""
 
 
 class Multigrid:
@@ -72,18 +70,16 @@ class Multigrid:
     tolerance : float
         The residual is reduced below this fraction of the right-hand side (2-norms).
     precision : {"single", "double"}
-        Of the numbers inside the multigrid cycle; the iteration around it is in double precision.
+        Precision of the multigrid cycle; the outer iteration is in double precision.
 
     Attributes
     ----------
-    contrast, basis_transformation
+    contrast
         See `LinearSolver`.
-    patience : int
-        Nonsymmetric iterations of one solution at most.
     work : int
-        Iterations so far, and changes of the hierarchy in units of them.
+        Iterations so far, with updates of the hierarchy converted to iterations.
     allowed : int, optional
-        Up to which work; None for any.
+        Largest work; None for unlimited.
 
     Raises
     ------
@@ -97,13 +93,12 @@ class Multigrid:
         self.tolerance, self.precision = tolerance, precision
         self.counters = Counters()
         self.contrast = 1.0
-        self.basis_transformation: csr_array | None = None
-        self.patience, self.work = MAX_NONSYMMETRIC, 0
+        self.work = 0
         self.allowed: int | None = None
         self.begin()
 
     def begin(self) -> None:
-        """Forget how warm the starts of the last load step were."""
+        """Reset the statistics of warm starts for a new load step."""
         self._most_warm, self._cut_short = MOST_WARM, np.inf
 
     @property
@@ -116,7 +111,7 @@ class Multigrid:
         check_threads()
         n = K.shape[0]
         self.K = ScaledMatrix(K, self.precision, release)
-        self._modes = rigid_modes.astype(np.float32)  # if they are needed again: single precision is enough
+        self._modes = rigid_modes.astype(np.float32)  # for a second set-up: single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
@@ -126,16 +121,16 @@ class Multigrid:
     def _build(self, rigid_modes: Array) -> None:
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
-        # The equations and springs that hold, and those that the hierarchy was changed for.
+        # The current equations and springs, and those of the hierarchy.
         self._reduced = Reduced(self.K, None)
         self._hierarchy_equations: Elimination | None = None
         self._hierarchy_springs: Springs | None = None
         self.counters.setups += 1
 
     def build_in(self, precision: str) -> None:
-        """Build the hierarchy again, in another precision."""
+        """Rebuild the hierarchy in another precision."""
         self.precision = precision
-        del self._constrained, self.hierarchy  # so that there are not two hierarchies at a time
+        del self._constrained, self.hierarchy  # avoids two hierarchies in memory
         self.K.change(precision)
         self._build(self._modes.astype(float))
 
@@ -145,10 +140,10 @@ class Multigrid:
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """Change the hierarchy to that of the eliminated matrix, `springs` included.
 
-        A hierarchy for the same pivots that follow others with nearly the same weights is kept: it preconditions as
-        well, since only the unknowns beside the pivots count. Pivots that are coupled have sparse weights there.
+        A hierarchy for the same pivots with nearly the same weights is kept: it preconditions equally well, since only the
+        neighbourhood of the pivots matters. Coupled pivots have sparse weights there.
         """
-        check_threads()  # every solution begins here, also that of a child forked after the hierarchy was built
+        check_threads()  # every solution begins here, including those of a child process forked after the set-up
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
             known = self._hierarchy_springs
@@ -156,8 +151,8 @@ class Multigrid:
             if not (alike and _alike(sparse, self._hierarchy_equations)):
                 self._change_hierarchy(sparse, springs)
                 self._worked(CHANGE)
-            gives = elimination is not None and elimination.compliance is not None
-            self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if gives else None)
+            compliant = elimination is not None and elimination.compliance is not None
+            self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if compliant else None)
 
     def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
         """Change the hierarchy to that under equations with sparse weights and springs."""
@@ -170,7 +165,7 @@ class Multigrid:
     ) -> Array:  # fmt: skip
         """Solve ``K u = f``, `springs` added to K, under the equations of `elimination`.
 
-        To the solver's tolerance, or a larger one.
+        The residual is reduced to the solver's tolerance, or to a larger one.
 
         Raises
         ------
@@ -179,7 +174,7 @@ class Multigrid:
         """
         cg = self._cg
         scale = self._scale(f, elimination)
-        if scale == 0.0:  # nothing moves anything
+        if scale == 0.0:  # no loads
             return np.zeros_like(f)
         self.constrain(elimination, springs)
         cg.x[:] = 0.0 if guess is None else guess
@@ -190,7 +185,7 @@ class Multigrid:
         while cg.norm > enough:
             if made >= MAX_ITERATIONS or raised > RAISES:
                 raise StallError(
-                    f"conjugate gradients stand at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
+                    f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
             if monitor is not None and made >= watched_from and made % WATCH_EVERY == 0:
@@ -211,9 +206,9 @@ class Multigrid:
     ) -> Array:
         """Solve ``K u + S u = f + F.T multiplier`` and ``B u = c``, F the rows that multipliers act through.
 
-        A sliding contact keeps its gap closed, but the force that does so also acts sideways. Unknowns are eliminated
-        as they are without friction, forces move along the rows F; the reduced matrix is not symmetric. The hierarchy
-        of the equations and springs alone preconditions it.
+        A sliding contact keeps its gap closed, but its force also has a tangential component. Unknowns are eliminated as
+        without friction, forces move along the rows F; the reduced matrix is not symmetric. The hierarchy of the
+        equations and springs without F preconditions it.
 
         Parameters
         ----------
@@ -240,7 +235,7 @@ class Multigrid:
         enough = self._enough(tolerance) * scale
         iteration.x[:] = guess
         self._begin(iteration, f)
-        # Beside what is much stiffer the solver's own tolerance leaves errors that pairings would reduce one by one.
+        # With much stiffer parts the solver's own tolerance leaves errors that pairings would reduce one by one.
         aim = tolerance / self._contrast * scale
         self._reduce(iteration, enough, self._reduced.multiply, self.precondition, aim)
         return self._reduced.displacement(iteration.x).copy()
@@ -285,31 +280,27 @@ class Multigrid:
         self, iteration: ConjugateResiduals, enough: float, multiply: Multiply, precondition: Precondition,
         aim: float = np.inf,
     ) -> None:  # fmt: skip
-        """Iterate until the residual is `enough` [force]; a warm start is improved beyond that, to `aim` where that is less.
+        """Iterate until the residual is `enough` [force]; a warm start is improved further, to `aim` if that is smaller.
 
-        It may meet the tolerance while the forces of a small contact are not right yet.
+        It may satisfy the tolerance while the forces of a small contact are still inaccurate.
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
         begun = iteration.norm
         if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
-        least, fallen = iteration.norm, 0  # the residual when it last fell, and the iterations until then
         while iteration.norm > wanted:
             done = iteration.norm <= enough
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
-            stands = made - fallen >= STANDING
-            if stands or made >= self.patience or not iteration.step(multiply, precondition):
+            if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
                 if done:
                     return
                 left = iteration.norm / enough
-                raise StallError(f"conjugate residuals stand at {left:.1e} times the tolerance after {made} iterations")
+                raise StallError(f"conjugate residuals stall at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self._count()
-            if iteration.norm < FALLS * least:
-                least, fallen = iteration.norm, made
 
     def _count(self) -> None:
         self.counters.iterations += 1
@@ -322,7 +313,7 @@ class Multigrid:
 
     def diagonal(self) -> Array:
         """Return the diagonal (n,) of K."""
-        if self._diagonal is None:  # needed in every pairing with friction, never without
+        if self._diagonal is None:  # only needed with friction
             self._diagonal = self.K.diagonal()
         return self._diagonal
 
@@ -337,7 +328,7 @@ class Multigrid:
         self.constrain(reduced.elimination, reduced.springs)
 
     def _begin(self, iteration: Iteration, f: Array) -> None:
-        """Make the iterate obey the equations and compute its residual."""
+        """Make the iterate satisfy the equations, and compute its residual."""
         self._reduced.begin(iteration.x, f, iteration.r)
         iteration.start()
 
@@ -357,11 +348,11 @@ class Multigrid:
 
     @property
     def _contrast(self) -> float:
-        """By how much relative residuals flatter a solution: that of the softer body beside stiffer pivots, of shear."""
+        """Factor by which relative errors may exceed residuals: in softer bodies beside stiffer pivots, and in shear."""
         return max(1.0, self._constrained.stiffening) * (self.contrast if self.contrast > MILD else 1.0)
 
     def precondition(self, r: Array, norm: float, z: Array) -> None:
-        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`; it obeys the equations that hold."""
+        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`, that satisfies the equations."""
         self._reduced.precondition(r, norm, z, self._cycle)
 
     def _cycle(self, r: Array, norm: float, z: Array) -> None:

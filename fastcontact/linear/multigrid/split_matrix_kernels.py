@@ -17,7 +17,7 @@ from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, par
 def split(first, end, factor, numbers, high, low):
     """Fill the parts of ``factor`` times numbers `first` to ``end - 1``.
 
-    `low` may be in the place of the beginning of `numbers` where ``end <= 2 first``, or where there is one chunk.
+    `low` may share memory with the beginning of `numbers` if ``end <= 2 first``, or if there is one chunk.
     """
     for c in prange((end - first + CHUNK - 1) // CHUNK):
         for k in range(first + c * CHUNK, min(end, first + (c + 1) * CHUNK)):
@@ -52,7 +52,7 @@ def forces_at(dofs, indptr, indices, storage, K, factor, size, u, f, out):
 
 @kernel
 def rows_of(dofs, indptr, indices, storage, K, size, out):
-    """Fill `out` with rows `dofs` (m,) of the block matrix K, the entries of one row behind those of the other."""
+    """Fill `out` with rows `dofs` (m,) of the block matrix K, one row after the other."""
     at = 0
     for p in range(dofs.shape[0]):
         i, a = dofs[p] // size, dofs[p] % size

@@ -1,14 +1,15 @@
 """Nodes constrained to a much stiffer body: corrections of the smoother and of coarser levels.
 
-Equations let the unknowns of one side, the pivots, follow those of the other. Where the pivots' side is much stiffer, nodes
-of the other side become as stiff as that, and two things go wrong:
+Equations make the unknowns of one side, the pivots, follow those of the other. If the pivots' side is much stiffer, nodes of
+the other side inherit its stiffness, with two consequences:
 
-- Their motions that move no pivot are as soft as their own body, while the smoother takes them for stiff. `FreeMotions`
-  corrects these by the stiffness of their body alone.
-- Aggregates that they share with softer neighbours would move the stiff body: such coarse motions cost far too much energy,
-  and coarse levels correct neither side. Their corrections therefore see it the other way round: the unknowns of stiffened
-  nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow them as usual, ``u = T u``. Coarse matrices
-  are Galerkin products with ``T S P`` (`composed`).
+- Motions that move no pivot are as soft as their own body, while the smoother treats them as stiff. `FreeMotions`
+corrects these
+  with the stiffness of their body alone.
+- Aggregates with softer neighbours would move the stiff body: such coarse motions have far too much energy, and coarse levels
+  correct neither side. In coarse corrections the roles are therefore exchanged: the unknowns of stiffened nodes follow the
+  pivots, ``u = S u`` (`followers`), and the pivots then follow them as usual, ``u = T u``. Coarse matrices are Galerkin
+  products with ``T S P`` (`composed`).
 """
 
 from __future__ import annotations
@@ -19,27 +20,26 @@ from scipy.sparse.linalg import splu
 
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.round_off import SINGLE_PRECISION
 
-# Constraints that are linearly dependent on the stiffened nodes are regularised by this part of their own compliance.
-REPEATED = 1e-6
-# Unknowns follow where translations of their side move the pivots by at least this part of them.
+# Unknowns follow the pivots if translations of their side move these by at least this fraction.
 LEAST = 0.3
 
 
 class FreeMotions:
     """Corrections of motions of stiffened nodes that move no pivot.
 
-    With the weights W of the pivots on these nodes and the diagonal blocks D of their body's own stiffness, the correction
-    for a residual r is ``D^-1 r - D^-1 W.T (W D^-1 W.T)^-1 W D^-1 r``: what D gives under ``W u = 0``.
+    With the weights W of the pivots on these nodes and the diagonal blocks D of their body's stiffness, the correction for a
+    residual r is ``D^-1 r - D^-1 W.T (W D^-1 W.T)^-1 W D^-1 r``: the solution with D under ``W u = 0``.
 
     Parameters
     ----------
     weights : csr_array (m, n)
-        Of the pivots.
+        Weights of the pivots.
     nodes : ndarray of int (k,)
         Those stiffened, without pivots of their own.
     inverse : ndarray (k, size, size)
-        Inverses of the diagonal blocks of these nodes, as they are without equations.
+        Inverses of the diagonal blocks of these nodes without equations.
     """
 
     def __init__(self, weights: csr_array, nodes: Indices, inverse: Array) -> None:
@@ -49,9 +49,10 @@ class FreeMotions:
         W = csr_array(weights[:, self._at])
         W = W[np.diff(W.indptr) > 0]
         self._moves = csr_array(self._yielding @ W.T)
-        self._pulls = csr_array(self._moves.T)  # in rows: products are many
+        self._pulls = csr_array(self._moves.T)  # stored by rows for fast products
         compliance = csr_array(W @ self._moves)
-        shifted = compliance + diags_array(REPEATED * compliance.diagonal(), format="csr")
+        # Some are linearly dependent on the stiffened nodes, as far as the cycle's precision tells.
+        shifted = compliance + diags_array(SINGLE_PRECISION * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def correct(self, r: AnyArray, factor: float, step: AnyArray, x: AnyArray) -> None:
@@ -64,10 +65,10 @@ class FreeMotions:
 
 
 def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
-    """Return how the unknowns of stiffened nodes follow the pivots, S.
+    """Return the transformation S by which the unknowns of stiffened nodes follow the pivots.
 
-    Each follows the mean of the equations it is part of, weighted with its share in them. The other unknowns of its own side
-    are taken to move as it does, so that translations of both sides together stay what they are.
+    Each unknown follows the mean of its equations, weighted with its coefficients. The other unknowns of its own side are
+    assumed to move with it, so that translations of both sides together are preserved.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     through = stiffened[W.col // size] & (along == (pivots % size)[W.row]) & (W.data > 0.0)
     unknowns, column = np.unique(W.col[through], return_inverse=True)
     share = csr_array((W.data[through], (column, W.row[through])), shape=(len(unknowns), m))
-    # What the opposite side moves each pivot by, if all of it moves by one along each direction.
+    # Displacement of each pivot for unit translations of the opposite side along each direction.
     together = csr_array((W.data[other], (W.row[other], along[other])), shape=(m, size))
     moved = np.asarray((share @ together).toarray())
     enough = moved[np.arange(len(unknowns)), unknowns % size] >= LEAST * np.asarray(share.sum(axis=1))
@@ -102,10 +103,10 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
 
 
 def composed(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
-    """Return which unknowns T S changes, and the weights (m + q, n) of what they become; see `followers`."""
+    """Return the unknowns that T S changes, and the weights (m + q, n) of their new values; see `followers`."""
     T, S = elimination.weights, following.weights
     through = csr_array(T[:, following.pivots])
-    kept = np.ones(T.shape[1])
-    kept[following.pivots] = 0.0
+    free = np.ones(T.shape[1])
+    free[following.pivots] = 0.0
     pivots = np.concatenate([elimination.pivots, following.pivots])
-    return pivots, csr_array(vstack([T @ diags_array(kept) + through @ S, S], format="csr"))
+    return pivots, csr_array(vstack([T @ diags_array(free) + through @ S, S], format="csr"))

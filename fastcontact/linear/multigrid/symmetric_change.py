@@ -1,7 +1,7 @@
 """Symmetric low-rank update ``D.T G + G.T D`` of a matrix, and its Galerkin product.
 
-Equations say ``u = u + D u`` at their pivots, with rows D of weights less one. They turn A into ``T.T A T``, which changes
-it by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs along rows R change it by ``R.T S R``,
+Equations set ``u = u + D u`` at their pivots, with rows D of the weights minus one. They transform A into ``T.T A T``, which
+is a change by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs along rows R add ``R.T S R``,
 which has the same form.
 """
 
@@ -37,7 +37,7 @@ class SymmetricChange:
 
     @classmethod
     def of_equations(cls, A: BlockMatrix, pivots: Indices, weights: csr_array) -> SymmetricChange:
-        """Return ``T.T A T - A`` for a symmetric A (n, n), where ``u = T u`` says ``u[pivots] = weights u``."""
+        """Return ``T.T A T - A`` for a symmetric A (n, n), where ``u = T u`` sets ``u[pivots] = weights u``."""
         m = len(pivots)
         D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=weights.shape))
         rows = A.rows_of(pivots)
@@ -75,7 +75,7 @@ class SymmetricChange:
 
 @dataclass(frozen=True, eq=False)
 class _Restricted:
-    """Rows of blocks: coarse nodes and, for each, as many numbers as it has unknowns."""
+    """Rows of blocks: coarse nodes, and a number for each unknown of these."""
 
     indptr: Numbers
     nodes: Numbers
@@ -96,7 +96,7 @@ def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
 
 
 def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
-    """Return ``E.T H + H.T E`` on the nodes that they reach."""
+    """Return ``E.T H + H.T E`` on the nodes of both."""
     nodes = np.unique(np.concatenate([E.nodes, H.nodes]))
     row_of_node = np.empty(nodes[-1] + 1, np.int32)
     row_of_node[nodes] = np.arange(len(nodes))

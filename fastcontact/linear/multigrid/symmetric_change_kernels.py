@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Factors D and G of a symmetric update ``D.T G + G.T D``, restricted and multiplied.
 
-Sparse rows come as ``indptr`` and ``indices``, whose order does not matter, and numbers. Restricted ones have a block of as
-many numbers as the tuple `cols` for each coarse node. Every row of a result is computed by one thread in a fixed order.
+Sparse rows are given by ``indptr`` and ``indices``, in any order, and numbers. Restricted ones have a block of ``len(cols)``
+numbers for each coarse node. Every row of a result is computed by one thread in a fixed order.
 """
 
 import numpy as np
@@ -17,8 +17,8 @@ from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
 def diagonal(indptr, indices, data, low, found, values, slot, size, out):
     """Add the diagonal blocks of ``D.T G + G.T D`` to `out` (n_blocks * size * size,).
 
-    D are `indptr`, `indices`, `data`, G are `low`, `found`, `values`; `slot` (n_nodes,) is where the block of each node
-    begins in `out`, in blocks.
+    D is given by `indptr`, `indices`, `data`, G by `low`, `found`, `values`; `slot` (n_nodes,) is the number of the block of
+    each node in `out`.
     """
     sums = np.zeros(slot.shape[0] * size)
     for p in range(indptr.shape[0] - 1):
@@ -37,7 +37,7 @@ def diagonal(indptr, indices, data, low, found, values, slot, size, out):
 
 @parallel_kernel
 def count_restricted(indptr, indices, start, columns, size, n_coarse, count):
-    """Fill `count` (n_rows,) with the number of coarse nodes that rows reach through the prolongator `start`, `columns`."""
+    """Fill `count` (n_rows,) with the number of coarse nodes of rows restricted by the prolongator `start`, `columns`."""
     n = indptr.shape[0] - 1
     for c in prange((n + CHUNK - 1) // CHUNK):
         seen = np.full(n_coarse, -1, np.int32)
@@ -93,8 +93,8 @@ def count_products(start, origin, low, found, n_coarse, count):
 def products(start, origin, slot, E, low, found, H, n_coarse, into, columns, out, cols):
     """Fill block rows of ``E.T H``: columns, ascending, and blocks.
 
-    E comes by its block columns: `start` (n_rows + 1,), the row `origin` and the block `slot` of each entry; H by rows, as
-    `low`, `found` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` holds zeros.
+    E is given by its block columns: `start` (n_rows + 1,), the row `origin` and the block `slot` of each entry; H by rows, as
+    `low`, `found` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` contains zeros.
     """
     n, width = start.shape[0] - 1, len(cols)
     for c in prange((n + CHUNK - 1) // CHUNK):

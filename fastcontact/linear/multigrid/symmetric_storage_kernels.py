@@ -2,11 +2,11 @@
 """Symmetric matrices of which most blocks are stored once.
 
 Block rows are divided into parts of equal length, the last one shorter. A block whose row and column lie in the same part is
-stored once, in the upper triangle; one that crosses from a part to another is stored in both rows, so that no part writes
-into another. With parts of some planes of a mesh that is 0.55 to 0.65 of all blocks.
+stored once, in the upper triangle; a block between two parts is stored in both rows, so that no part writes into another.
+With parts of some planes of a mesh 0.55 to 0.65 of all blocks are stored.
 
-What is stored comes as a tuple ``storage = (start, upper, columns, length)``: the stored blocks of row i are ``start[i]`` to
-``start[i + 1] - 1``, `columns` their block columns, `length` is that of parts. Those that cross parts come first, then the
+The storage is a tuple ``storage = (start, upper, columns, length)``: the stored blocks of row i are ``start[i]`` to
+``start[i + 1] - 1``, `columns` their block columns, `length` is that of parts. Blocks between parts come first, then the
 diagonal block, then, from ``upper[i]`` on, those of the upper triangle; each group has ascending columns. With ``length =
 0`` every block of the pattern ``indptr``, ``indices`` is stored, in its order. Numbers come as a tuple, see
 `split_matrix_kernels`.
@@ -18,15 +18,15 @@ from numba import prange
 from fastcontact._jit.decorators import innermost_kernel, kernel, parallel_kernel
 from fastcontact.linear.multigrid.block_products import row_times, row_times_both_ways
 
-# Block rows that one thread takes at a time.
+# Number of block rows processed by a thread at a time.
 CHUNK = 256
-# Where a single part begins: of a literal 0, or an unsigned number, Numba compiles another copy of what works on parts.
+# First row of a single part: for a literal 0, or an unsigned number, Numba would compile another copy of functions on parts.
 FIRST = np.int64(0)
 
 
 @innermost_kernel
 def part_of(storage, i):
-    """Return the first row of the part that row i is in, and the row behind the part; (0, 0) if every block is stored."""
+    """Return the first row of the part of row i, and the row after the part; (0, 0) if every block is stored."""
     length = storage[3]
     if length == 0:
         return 0, 0
@@ -36,7 +36,7 @@ def part_of(storage, i):
 
 @innermost_kernel
 def place_of(storage, part, i, j, k):
-    """Return where block (i, j), the `k`-th of the pattern, is stored, and whether its transpose is stored there.
+    """Return the slot of block (i, j), the `k`-th of the pattern, and whether its transpose is stored there.
 
     `part` is ``part_of(storage, i)``; -1 if the block is not stored, since the pattern is not symmetric.
     """
@@ -74,7 +74,7 @@ def entry_of(numbers, slot, a, b, size):
 
 @parallel_kernel
 def count_stored(indptr, indices, length, count):
-    """Fill `count` (n_rows,) with the number of blocks stored for each row; -1 if it is not sorted or has no diagonal."""
+    """Fill `count` (n_rows,) with the number of stored blocks of each row; -1 if it is not sorted or has no diagonal."""
     n = indptr.shape[0] - 1
     for c in prange((n + CHUNK - 1) // CHUNK):
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
@@ -115,8 +115,8 @@ def arrange(indptr, indices, start, upper, columns, length):
 
 
 @parallel_kernel
-def missing(indptr, indices, storage, found):
-    """Fill `found` (n_rows,) with the number of blocks of each row that are stored nowhere."""
+def missing(indptr, indices, storage, counts):
+    """Fill `counts` (n_rows,) with the number of blocks of each row that are not stored."""
     n = indptr.shape[0] - 1
     for c in prange((n + CHUNK - 1) // CHUNK):
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
@@ -124,12 +124,12 @@ def missing(indptr, indices, storage, found):
             for k in range(indptr[i], indptr[i + 1]):
                 if place_of(storage, part, i, indices[k], k)[0] < 0:
                     count += 1
-            found[i] = count
+            counts[i] = count
 
 
 @kernel
 def _store_row(i, indptr, indices, storage, numbers, square, row, out):
-    """Copy a row's numbers first: what is stored may overwrite them."""
+    """Store the blocks of a row; its numbers are copied first, because the stored blocks may overwrite them."""
     part, begin = part_of(storage, i), indptr[i]
     for e in range((indptr[i + 1] - begin) * square):
         row[e] = numbers[begin * square + e]
@@ -143,7 +143,7 @@ def _store_row(i, indptr, indices, storage, numbers, square, row, out):
 
 @parallel_kernel
 def store_rows(first, end, widest, indptr, indices, storage, numbers, square, out):
-    """Fill the stored blocks of rows `first` to ``end - 1`` into `out`, from `numbers`, `square` for each of all blocks.
+    """Fill the stored blocks of rows `first` to ``end - 1`` into `out`, from `numbers`, with `square` numbers per block.
 
     Rows have up to `widest` blocks. `out` may be the beginning of `numbers` where ``start[end] <= indptr[first]``, or where
     there is one chunk.
@@ -170,7 +170,7 @@ def expand(indptr, indices, storage, numbers, size, out):
 
 @parallel_kernel
 def row_sums(indptr, indices, storage, numbers, x, size, out):
-    """Fill `out` (n,) with ``|A| |x|``: the size of the numbers that cancel each other in ``A x``."""
+    """Fill `out` (n,) with ``|A| |x|``, which bounds the round-off of ``A x``."""
     n = indptr.shape[0] - 1
     for c in prange((n + CHUNK - 1) // CHUNK):
         for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
@@ -201,7 +201,7 @@ def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
 def multiply(storage, numbers, x, factor, share, z, y, rows):
     """Fill `y` (n,) with ``share z + factor A x``; z and y may be the same array, x not.
 
-    A thread takes whole parts, so that every number of y is summed by one thread, in a fixed order.
+    Threads process whole parts, so that every number of y is summed by one thread, in a fixed order.
     """
     n, length = y.shape[0] // len(rows), storage[3]
     count = (n + length - 1) // length

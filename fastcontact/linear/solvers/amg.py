@@ -1,9 +1,10 @@
 """Multigrid as a linear solver, and the factorisation that replaces it where it does not converge.
 
 Equations ``B u = c`` are eliminated, see `multigrid.solver`, also those with a diagonal compliance, see `multigrid.loaded`.
-Those with a full one cannot be: they go through columns of K^-1, one solution each, kept for the whole analysis. Where those
-would be many, or the iteration stalls, on thin or nearly incompressible parts, or a load step has taken more work than
-a factorisation, a factorisation replaces it for the rest of the analysis, if the matrix is not too large.
+Those with a full compliance cannot be eliminated: they use columns of K^-1, one solution each, stored for the whole
+analysis. If these are too many, or the iteration stalls on thin or nearly incompressible parts, or a load step has taken
+more work than a factorisation, a factorisation replaces multigrid for the rest of the analysis, unless the matrix is too
+large.
 """
 
 from __future__ import annotations
@@ -25,8 +26,6 @@ from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
 from fastcontact.linear.multigrid.solver import (
-    MAX_ITERATIONS,
-    MAX_NONSYMMETRIC,
     Multigrid,
     StallError,
     TooManyIterationsError,
@@ -37,11 +36,8 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Unknowns up to which a factorisation replaces multigrid.
+# Number of unknowns up to which a factorisation replaces multigrid.
 FACTORS_UP_TO = AFFORDABLE
-# Equations that stiffen a node by more than this leave the softer body too little of multigrid's tolerance; coupled ones,
-# whose weights are nearly right only, take hundreds of iterations from the second on.
-STIFFENED, STIFFENED_COUPLED = 3e4, 6.0
 # Work in one load step, in iterations, from which on factors are cheaper for certain: so much, and so much for each unknown,
 # by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
 # touch, three times as much in stacks with friction (measured, see bench/README.md).
@@ -56,7 +52,7 @@ class Amg(Multigrid, LinearSolver):
     instead : Direct or None
         The factorisation that replaced multigrid.
     gave_up : str
-        Why.
+        Reason for the replacement.
     """
 
     name = "amg"
@@ -64,7 +60,7 @@ class Amg(Multigrid, LinearSolver):
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
         self.instead: Direct | None = None
-        self._factored: Direct | None = None  # kept where an analysis goes back to before that
+        self._factored: Direct | None = None  # kept if an analysis returns to a state before the replacement
         self.gave_up = ""
 
     def __repr__(self) -> str:
@@ -85,23 +81,22 @@ class Amg(Multigrid, LinearSolver):
         """Build the hierarchy of K; see `LinearSolver.prepare`."""
         self.build(K, rigid_modes, release)
         self._involved, self.instead, self._factored, self.gave_up = involved, None, None, ""
-        self.patience = MAX_NONSYMMETRIC if self._may_factorise else MAX_ITERATIONS
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
-        """Return the prepared matrix with right-hand side `f` (n,); work is allowed anew, see `affordable`."""
+        """Return the prepared matrix with right-hand side `f` (n,), with a new limit of work, see `affordable`."""
         self.begin()
         self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
 
     @property
     def affordable(self) -> int:
-        """How many iterations cost more than a factorisation and a load step by it."""
+        """Number of iterations that costs more than a factorisation and a load step with it."""
         n, size = self.K.shape[0], self.K.blocksize[0]
         return COST + int(COST_OF_UNKNOWN[size] * n)
 
     def improve(self, excess: float) -> bool:
-        """See `LinearSolver.improve`: lower the tolerance, or let factors take over where round-off is near."""
+        """See `LinearSolver.improve`: lower the tolerance, or replace multigrid by a factorisation near round-off."""
         if self.instead is not None:
             return self.instead.improve(excess)
         if self._may_factorise and not self.tolerance > ROUND_OFF * excess:
@@ -121,7 +116,7 @@ class Amg(Multigrid, LinearSolver):
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
-        """Return the equations and springs that the hierarchy was changed for, as plain arrays."""
+        """Return the equations and springs of the hierarchy, as plain arrays."""
         equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
         if equations is not None:
             rows = equations.weights
@@ -134,7 +129,7 @@ class Amg(Multigrid, LinearSolver):
             (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
         if self.instead is not None:  # multigrid was given up later
-            self._factored, self.instead, self.gave_up, self.error = self.instead, None, "", 0.0
+            self._factored, self.instead, self.gave_up = self.instead, None, ""
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])
@@ -148,30 +143,13 @@ class Amg(Multigrid, LinearSolver):
             self._change_hierarchy(equations, springs)
         self.hierarchy.bounds = snapshot["bounds"]
 
-    def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """See `Multigrid.constrain`.
-
-        Raises
-        ------
-        StallError
-            If multigrid would need hundreds of iterations and factors can take over.
-        """
-        super().constrain(elimination, springs)
-        coupled = elimination is not None and elimination.coupled
-        stiffening = self._constrained.stiffening
-        if stiffening > (STIFFENED_COUPLED if coupled else STIFFENED) and self._may_factorise:
-            raise StallError(
-                f"contact makes nodes {stiffening:.1e} times as stiff as they are, where the secondary side is much stiffer "
-                "than the primary one: let the softer body be the secondary side"
-            )
-
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
-        """Factorise the matrix, since the iteration stalls or columns of its inverse cost more.
+        """Factorise the matrix, because the iteration stalls or columns of the inverse cost more.
 
         Raises
         ------
         StallError, TooManyColumnsError
-            If the matrix is too large for that.
+            If the matrix is too large.
         """
         if not self._may_factorise:
             raise stalled
@@ -197,31 +175,31 @@ class Amg(Multigrid, LinearSolver):
         else:
             self._factored.put_back({"asked": [], "loads": []})
         self.gave_up, self.instead = why, self._factored
-        # What is asked of later solutions is what factors give.
+        # Later tolerances are those of a factorisation.
         self.asked = self.tolerance if self.asked is None else self.asked
-        self.tolerance, self.error = self.instead.tolerance, self.instead.error
+        self.tolerance = self.instead.tolerance
         return self.instead
 
 
 def _equal(first: Mapping[str, Any] | None, second: Mapping[str, Any] | None) -> bool:
-    """Return whether two sets of arrays, or none, are the same."""
+    """Return whether two sets of arrays, or None, are equal."""
     if first is None or second is None:
         return first is second
     return all(np.array_equal(values, second[name]) for name, values in first.items())
 
 
 def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
-    """Return the elimination of `Amg.snapshot`; its offsets and multipliers are not needed any more."""
+    """Return the elimination of `Amg.snapshot`, without offsets and multipliers, which are not needed."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
     return Elimination(tied["pivots"], rows, np.zeros(m), rows)
 
 
 def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Let the method of a factorisation replace that of multigrid from where the iteration stalls."""
+    """Decorate a method to fall back on a factorisation where the iteration stalls."""
 
     @functools.wraps(method)
-    def found(self: _Loaded, *args: Any, **options: Any) -> Any:
+    def with_fallback(self: _Loaded, *args: Any, **options: Any) -> Any:
         if self._solver.instead is None:
             try:
                 return method(self, *args, **options)
@@ -229,7 +207,7 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
                 self._solver.give_up(stalled)
         return getattr(self._factored, method.__name__)(*args, **options)
 
-    return found
+    return with_fallback
 
 
 class _Loaded(LoadedMultigrid):

@@ -9,49 +9,40 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array, csc_array, csr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.factorisation import fill_reducing, singular
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.linear.factors.factor_solver import FactorSolver
 
-# Systems that CHOLMOD solves: K x = b, and the one whose solution is b in the order of elimination.
-WHOLE, PERMUTE = 0, 7
+# The system whose solution CHOLMOD calls b in the order of elimination.
+PERMUTE = 7
 
 
 class Cholmod(FactorSolver):
-    """CHOLMOD, with its own fill-reducing order where no unknowns must be last; see `FactorSolver`."""
+    """CHOLMOD's factors with the contact unknowns last; see `FactorSolver`."""
 
     name = "cholmod"
 
-    def _factorise(self, K: csc_array) -> None:
-        self._factor = factorised(lower_triangle(K))
-        _solved(self._factor, np.ones(self.n))
-
-    def _solve(self, F: Array) -> Array:
-        return _solved(self._factor, F)
-
-    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors | None:
+    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         from kvxopt import cholmod, matrix
 
-        if not len(last):
-            return None
         factor = factorised(lower_triangle(K.tocsr()), matrix(fill_reducing(K, last)))  # K's rows are its columns
-        # CHOLMOD may reorder independent branches of the elimination, which leaves what depends on what as it is.
+        # CHOLMOD may reorder independent branches of the elimination tree, which does not change dependences.
         position = np.empty(self.n, np.intp)
-        position[_solved(factor, np.arange(self.n, dtype=float), PERMUTE).astype(np.intp)] = np.arange(self.n)
-        start, rows, values = (np.asarray(part).ravel() for part in cholmod.getfactor(factor).CCS)
+        position[_in_order(factor, self.n)] = np.arange(self.n)
+        start, rows, values = (np.asarray(array).ravel() for array in cholmod.getfactor(factor).CCS)
         diagonal = values[start[:-1]]
         values /= np.repeat(diagonal, np.diff(start))
         return SymmetricFactors(by_supernodes(start, rows, values), diagonal**2, position, last)
 
 
 def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Array) -> LowerTriangle:
-    """Return a Cholesky factor given by columns, rows ascending, with the rows of columns of equal structure once.
+    """Return a Cholesky factor, given by columns with ascending rows, with the rows once per supernode.
 
-    A column has the rows of the one before it, without the first, where that first row is its own and the numbers of
-    rows fit: the structure of a column of a Cholesky factor is part of that of its parent.
+    A column has the rows of the previous one without its first, if that row is the column itself and the numbers of rows
+    agree: below the diagonal, the structure of a column of a Cholesky factor is contained in that of its parent.
     """
     entries = np.diff(start)
     continues = np.zeros(len(entries), bool)
@@ -67,7 +58,7 @@ def by_supernodes(start: NDArray[np.int64], rows: NDArray[np.int64], values: Arr
     return LowerTriangle(start, values, first, begin, rows[shared].astype(np.intc))
 
 
-def lower_triangle(K: csc_array | csr_array) -> Any:
+def lower_triangle(K: csr_array) -> Any:
     """Return the lower triangle of the symmetric matrix K (n, n) as CHOLMOD takes it."""
     from kvxopt import matrix, spmatrix
 
@@ -77,15 +68,14 @@ def lower_triangle(K: csc_array | csr_array) -> Any:
     return spmatrix(matrix(K.data[lower]), rows, columns, K.shape)
 
 
-def factorised(A: Any, order: Any = None) -> Any:
-    """Return the numeric factor of a `lower_triangle`, in a given order or CHOLMOD's own."""
+def factorised(A: Any, order: Any) -> Any:
+    """Return the numeric factor of a `lower_triangle` in an order."""
     from kvxopt import cholmod
 
     before = dict(cholmod.options)
-    if order is not None:
-        cholmod.options["nmethods"] = 1  # otherwise it takes an order of its own where that leaves less to do
+    cholmod.options["nmethods"] = 1  # otherwise it takes an order of its own where that leaves less to do
     try:
-        factor = cholmod.symbolic(A) if order is None else cholmod.symbolic(A, order)
+        factor = cholmod.symbolic(A, order)
         cholmod.numeric(A, factor)
     except ArithmeticError as error:
         raise singular() from error
@@ -95,15 +85,16 @@ def factorised(A: Any, order: Any = None) -> Any:
     return factor
 
 
-def _solved(factor: Any, F: Array, system: int = WHOLE) -> Array:
+def _in_order(factor: Any, n: int) -> Indices:
+    """Return the n unknowns in the order of elimination."""
     from kvxopt import cholmod, matrix
 
-    X = matrix(np.asfortranarray(F.reshape(len(F), -1)))
+    numbers = matrix(np.arange(n, dtype=float))
     try:
-        cholmod.solve(factor, X, sys=system)
+        cholmod.solve(factor, numbers, sys=PERMUTE)
     except ArithmeticError as error:  # small matrices are factorised past a zero pivot, which a solution finds
         raise singular() from error
-    return np.array(X, order="C").reshape(F.shape)
+    return np.array(numbers).ravel().astype(np.intp)
 
 
 SOLVER = Cholmod

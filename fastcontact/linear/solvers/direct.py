@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from scipy.sparse import bsr_array, csc_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import bsr_array
 
-from fastcontact.arrays import Array, Indices
-from fastcontact.linear.cholesky.factorisation import SymbolicFactors, singular
+from fastcontact.arrays import Indices
+from fastcontact.linear.cholesky.factorisation import SymbolicFactors
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.factors.factor_solver import FactorSolver
 
 
 class Direct(FactorSolver):
-    """Our Cholesky factors with the contact unknowns last; see `FactorSolver`.
-
-    Where no contact unknowns are named, or too many, SciPy's SuperLU: symmetric mode, minimum degree of A + A.T.
-    """
+    """Our Cholesky factors with the contact unknowns last; see `FactorSolver`."""
 
     name = "direct"
     _symbolic: SymbolicFactors | None = None  # shared by the solvers of all tangents
@@ -23,25 +19,14 @@ class Direct(FactorSolver):
     def __repr__(self) -> str:
         if not self.n:
             return "Direct(not prepared)"
-        kind, entries = ("Cholesky", self._factors.nnz) if self._factors is not None else ("SuperLU", self._lu.nnz)
-        return f"Direct({kind}, {self.n} unknowns, {entries} entries, {self.nbytes / 1e6:.1f} MB)"
+        return f"Direct(Cholesky, {self.n} unknowns, {self._factors.nnz} entries, {self.nbytes / 1e6:.1f} MB)"
 
     @property
     def nbytes(self) -> int:
-        """Memory of the factors [bytes]; SuperLU's own are estimated."""
-        return self._factors.nbytes if self._factors is not None else 12 * int(self._lu.nnz)
+        """Memory of the factors [bytes]."""
+        return self._factors.nbytes
 
-    def _factorise(self, K: csc_array) -> None:
-        options = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-        try:
-            self._lu: SuperLU = splu(K, **options)
-        except RuntimeError as error:
-            raise singular() from error
-
-    def _solve(self, F: Array) -> Array:
-        return self._lu.solve(F)
-
-    def _with_last(self, K: bsr_array, last: Indices) -> SymmetricFactors:
+    def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
         if self._symbolic is None or not self._symbolic.serves(K, last):
             self._symbolic = SymbolicFactors(K, last)
         return self._symbolic.factors(K)

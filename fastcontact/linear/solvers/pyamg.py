@@ -1,8 +1,8 @@
 """Reference solver: pyamg's smoothed aggregation as preconditioner of SciPy's conjugate gradients.
 
-Plain and slow on purpose. It is what our multigrid, "amg", is checked against and compared with: everything here but the
-choice of pivots is pyamg's and SciPy's. Equations are eliminated, ``u = T v + t``, and each set of equations gets a hierarchy
-of its own for the matrix ``T.T K T``.
+Simple and slow on purpose. It serves to check our multigrid, "amg", and to compare with it: everything here except the choice
+of pivots is pyamg's and SciPy's. Equations are eliminated, ``u = T v + t``, and each set of equations gets its own hierarchy
+for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Pyamg(LinearSolver):
     def prepare(
         self, K: bsr_array, rigid_modes: Array, involved: Indices | None = None, release: bool = False
     ) -> bsr_array:
-        """Build the hierarchy of K, and leave K as it is; see `LinearSolver.prepare`."""
+        """Build the hierarchy of K without modifying K; see `LinearSolver.prepare`."""
         self.K, self._modes = K, rigid_modes
         self._constrain(None)
         self.columns = InverseColumns(K.shape[0], self._solve_many)
@@ -70,12 +70,12 @@ class Pyamg(LinearSolver):
         n = self.K.shape[0]
         self._elimination, self._T, A, modes = elimination, eye_array(n, format="csr"), self.K, self._modes
         if elimination is not None:
-            pivots, kept = elimination.pivots, np.ones(n)
-            kept[pivots] = 0.0
+            pivots, free = elimination.pivots, np.ones(n)
+            free[pivots] = 0.0
             spread = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
-            self._T = csr_array(diags_array(kept) + spread @ elimination.full_weights())
-            A = self._T.T @ self.K @ self._T + diags_array((1.0 - kept) * self.K.diagonal())
-            modes = kept[:, None] * modes
+            self._T = csr_array(diags_array(free) + spread @ elimination.full_weights())
+            A = self._T.T @ self.K @ self._T + diags_array((1.0 - free) * self.K.diagonal())
+            modes = free[:, None] * modes
         self._A = bsr_matrix(A.tobsr(self.K.blocksize))
         self._hierarchy = smoothed_aggregation_solver(self._A, B=modes, **OPTIONS)
         self.counters.setups += 1
@@ -129,7 +129,7 @@ class Pyamg(LinearSolver):
         return tighten(self, excess)
 
     def snapshot(self) -> dict[str, Any]:
-        """See `LinearSolver.snapshot`: columns of ``K^-1`` asked for, and the tolerance."""
+        """See `LinearSolver.snapshot`: requested columns of ``K^-1``, and the tolerance."""
         return {"asked": list(self.columns.asked), "tolerance": self.tolerance}
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:

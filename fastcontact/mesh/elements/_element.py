@@ -1,4 +1,4 @@
-"""A reference element: data, two functions and its default quadrature; shape functions that are products.
+"""A reference element: data, two functions and its default quadrature; product shape functions.
 
 Reference coordinates have no dimension.
 """
@@ -11,11 +11,9 @@ from functools import cached_property
 from types import ModuleType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices
 
-Indices = NDArray[np.int64]
 Function = Callable[[Array], Array]
 
 # Names of facets by the dimension of the cell and the number of nodes of the facet.
@@ -101,7 +99,7 @@ class Element:
 
     @cached_property
     def reversed(self) -> tuple[int, ...]:
-        """Node order of the same cell turned inside out: its mirror image with two reference coordinates swapped.
+        """Node order of the inverted cell: its mirror image with two reference coordinates swapped.
 
         Two-dimensional cells keep their first node and run the other way round; lines swap their ends.
         """
@@ -133,14 +131,31 @@ class Element:
         return self.corner_shape(self.nodes) @ np.linalg.pinv(self.corner_shape(points))
 
 
-def product_gradients(factors: Array, slopes: Array) -> Array:
-    """Return the derivatives (m, n_nodes, 3) [-] of products of three factors, one of each coordinate.
+def serendipity(box: ModuleType) -> tuple[Array, Function, Function]:
+    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear square or cube with mid nodes.
 
-    From the `factors` (m, n_nodes, 3) [-] and the derivative of each in its coordinate, `slopes` (m, n_nodes, 3) [-].
+    In each coordinate x of a node at X, the function of a mid node has the factor 1 - x^2 along its edge, where X is 0, and
+    (1 + x X) / 2 across it; that of a corner is its linear one times the sum of x X, less dim - 1 (Zienkiewicz and Taylor).
     """
-    f, g, h = np.moveaxis(factors, 2, 0)
-    df, dg, dh = np.moveaxis(slopes, 2, 0)
-    return np.stack([df * g * h, f * dg * h, f * g * dh], axis=2)
+    corners, dim, (first, second) = box.NODES, box.NODES.shape[1], np.array(box.EDGES).T
+    middles = (corners[first] + corners[second]) / 2
+
+    def factors(xi: Array) -> Array:
+        x = xi[:, None]
+        return np.where(middles == 0, 1 - x * x, (1 + x * middles) / 2)
+
+    def shape(xi: Array) -> Array:
+        corner = box.shape(xi) * (xi @ corners.T - (dim - 1))
+        return np.column_stack([corner, factors(xi).prod(axis=2)])
+
+    def gradient(xi: Array) -> Array:
+        beyond = (xi @ corners.T - (dim - 1))[:, :, None]
+        corner = box.gradient(xi) * beyond + box.shape(xi)[:, :, None] * corners
+        slopes = np.where(middles == 0, -2 * xi[:, None], middles / 2)
+        along = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
+        return np.concatenate([corner, np.stack(along, axis=2)], axis=1)
+
+    return np.vstack([corners, middles]), shape, gradient
 
 
 def product_of_two(first: ModuleType, second: ModuleType, I: Indices, J: Indices) -> tuple[Function, Function]:  # noqa: E741

@@ -1,35 +1,10 @@
 """Twenty-node hexahedron: corners, then mid nodes of the edges below, above, upright; 3 x 3 x 3 integration points."""
 
-import numpy as np
-
 from fastcontact.mesh.elements import hex8
-from fastcontact.mesh.elements._element import Array, Element, product_gradients
+from fastcontact.mesh.elements._element import Element, serendipity
 from fastcontact.mesh.quadrature import gauss_cube
 
-FIRST, SECOND = np.array(hex8.EDGES).T
-MIDDLES = (hex8.NODES[FIRST] + hex8.NODES[SECOND]) / 2
-NODES = np.vstack([hex8.NODES, MIDDLES])
-
-
-def _middle_factors(xi: Array) -> tuple[Array, Array]:
-    """Factors and their slopes (m, 12, 3) of the mid nodes: 1 - x^2 along the edge, (1 + x X) / 2 across it."""
-    x = xi[:, None]
-    factors = np.where(MIDDLES == 0, 1 - x * x, (1 + x * MIDDLES) / 2)
-    return factors, np.where(MIDDLES == 0, -2 * x, MIDDLES / 2)
-
-
-def shape(xi: Array) -> Array:
-    """Shape functions (m, 20) [-] at `xi` (m, 3) [-]."""
-    corner = hex8.shape(xi) * (xi @ hex8.NODES.T - 2)
-    return np.column_stack([corner, _middle_factors(xi)[0].prod(axis=2)])
-
-
-def gradient(xi: Array) -> Array:
-    """Derivatives (m, 20, 3) [-] at `xi` (m, 3) [-]."""
-    factor = (xi @ hex8.NODES.T - 2)[:, :, None]
-    corner = hex8.gradient(xi) * factor + hex8.shape(xi)[:, :, None] * hex8.NODES
-    return np.concatenate([corner, product_gradients(*_middle_factors(xi))], axis=1)
-
+NODES, shape, gradient = serendipity(hex8)
 
 ELEMENT = Element(
     name="hex20", nodes=NODES, edges=hex8.EDGES,

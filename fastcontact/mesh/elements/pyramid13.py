@@ -1,7 +1,7 @@
 """Thirteen-node pyramid: corners, then mid nodes of the base's edges and of the rising ones; 27 integration points.
 
 Rational shape functions (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992). The conical product rule integrates their
-gradients exactly, on curved cells too, so that patch tests hold; code_aster takes 10 points.
+gradients exactly, on curved cells too, so that patch tests are passed; code_aster uses 10 points.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Five-node pyramid: the base [-1, 1]^2 at z = 0, then the apex (0, 0, 1); five integration points.
 
 The shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992): polynomials in z, a = x / (1 - z)
-and b = y / (1 - z). At the apex their gradient depends on the direction; there the one along the axis is taken.
+and b = y / (1 - z). At the apex their gradient depends on the direction; there the limit along the axis is used.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Six-node triangle: corners, then mid nodes of edges 01, 12, 20; six points, since three fail at the axis of a ring."""
+"""Six-node triangle: corners, then mid nodes of edges 01, 12, 20; six points, because three fail at an axis of symmetry."""
 
 from fastcontact.mesh.elements import tri3
 from fastcontact.mesh.elements._element import Element, with_mid_nodes

@@ -1,6 +1,6 @@
 """Six-node wedge: the triangle (0,0) (1,0) (0,1) at z = -1, then at z = 1; six integration points.
 
-The order is that of Gmsh, Abaqus and VTK 9.7; documents of older VTK count the triangles the other way round.
+The order is that of Gmsh, Abaqus and VTK 9.7; older documentation of VTK numbers the triangles in the opposite direction.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Abaqus input files: what meshio reads wrongly is refused, and what it writes wrongly is written here."""
+"""Abaqus input files: refusal of content that meshio misreads, and output that meshio writes incorrectly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NUMBERS_A_LINE = 8
 
 
 def check_readable(path: Path) -> None:
-    """Refuse files of which meshio would silently lose points or members of sets."""
+    """Refuse files of which meshio would silently drop points or members of sets."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:

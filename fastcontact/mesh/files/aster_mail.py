@@ -1,4 +1,4 @@
-"""Mesh files of code_aster in text (``.mail``): blocks of words, each from its keyword to FINSF."""
+"""Mesh files of code_aster in text form (``.mail``): blocks of words, each from its keyword to FINSF."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.meshio_content import mesh_of
 from fastcontact.mesh.mesh import Mesh
 
-# Cells by keyword; nodes of ours by their positions among code_aster's, where the orders differ.
+# Cells by keyword; positions of our nodes among those of code_aster where the orders differ.
 KINDS = {
     "POI1": VERTEX, "SEG2": "line2", "SEG3": "line3", "TRIA3": "tri3", "TRIA6": "tri6", "QUAD4": "quad4", "QUAD8": "quad8",
     "QUAD9": "quad9", "TETRA4": "tet4", "TETRA10": "tet10", "PENTA6": "wedge6", "PENTA15": "wedge15", "PENTA18": "wedge18",
@@ -43,7 +43,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
     Raises
     ------
     FileError
-        With the line, if it is damaged or holds what is no mesh.
+        If it is damaged or contains anything else; the message names the line.
     """
     content = _Content(path)
     words = _words(path)
@@ -58,7 +58,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
 
 
 def _words(path: Path) -> Iterator[Word]:
-    """Yield the words of a file with the numbers of their lines, without comments."""
+    """Yield the words of a file with their line numbers, without comments."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
             for number, line in enumerate(file, 1):
@@ -68,7 +68,7 @@ def _words(path: Path) -> Iterator[Word]:
 
 
 def _block(path: Path, keyword: str, line: int, words: Iterator[Word]) -> Iterator[Word]:
-    """Yield the words of one block; ``NOM = x`` and the like at its head are left out, but for the name of a group."""
+    """Yield the words of one block, without header entries such as ``NOM = x``, except for the name of a group."""
     if keyword.upper() in IGNORED:
         for word, _ in words:
             if word.upper() == "FINSF":
@@ -100,7 +100,7 @@ class _Content:
         self._groups: dict[str, dict[str, list[Word]]] = {"GROUP_NO": {}, "GROUP_MA": {}}
 
     def add(self, keyword: str, line: int, words: list[Word]) -> None:
-        """Take over one block."""
+        """Add one block."""
         if keyword in COORDINATES:
             for name, *coordinates in self._rows(keyword, line, words, 1 + COORDINATES[keyword]):
                 self._points[name[0]] = len(self._places)
@@ -119,7 +119,7 @@ class _Content:
             raise self._refusal(line, f"{keyword[:40]} is not known; a mesh has {known}")
 
     def found(self) -> dict[str, Any]:
-        """Return points, cells and groups as the plain data that `meshio_process.plain_content` tells of."""
+        """Return points, cells and groups in the format of `meshio_process.plain_content`."""
         cells: list[Any] = []
         sets: dict[str, Any] = {}
         start: dict[str, dict[str, int]] = {}
@@ -144,14 +144,14 @@ class _Content:
 
     def _rows(self, keyword: str, line: int, words: list[Word], width: int) -> Iterator[list[Word]]:
         if len(words) % width:
-            raise self._refusal(line, f"{keyword} has {len(words)} words, which are no rows of {width}")
+            raise self._refusal(line, f"{keyword} has {len(words)} words, which do not form rows of {width}")
         yield from (words[i : i + width] for i in range(0, len(words), width))
 
     def _number(self, word: Word) -> float:
         try:
             return float(word[0].upper().replace("D", "E"))
         except ValueError:
-            raise self._refusal(word[1], f"'{word[0][:40]}' is no number") from None
+            raise self._refusal(word[1], f"'{word[0][:40]}' is not a number") from None
 
     def _point(self, word: Word) -> str:
         if word[0] not in self._points:

@@ -1,4 +1,4 @@
-"""One Mesh made of what a mesh file holds: blocks of cells, each with its own groups."""
+"""A Mesh from the blocks of cells of a mesh file, each with its own groups."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 VERTEX = "vertex"
-# How many unknown kinds of cells a message names, and how much of each name.
+# Largest number of unknown kinds of cells in a message, and of characters of each name.
 SHOWN = 12
 
 Groups = dict[str, AnyArray]
@@ -39,7 +39,7 @@ def build_mesh(
     try:
         places = np.asarray(points, np.float64)
     except (TypeError, ValueError):
-        raise MeshError("its coordinates are no numbers: check that the file is complete") from None
+        raise MeshError("its coordinates are not numbers: check that the file is complete") from None
     joined = merged(blocks)
     solid = [block for block in joined if block.kind != VERTEX and len(block.nodes)]
     vertices = [block for block in joined if block.kind == VERTEX]
@@ -55,8 +55,8 @@ def build_mesh(
     return Mesh(_without_flat_z(places, dim), cells, cell_groups, all_point_groups)
 
 
-def check_known(foreign: Mapping[str, int], known: Iterable[str]) -> None:
-    """Raise MeshError if there is any kind of cells in `foreign`, given with their numbers."""
+def check_kinds(foreign: Mapping[str, int], known: Iterable[str]) -> None:
+    """Raise MeshError if there are cells of any unknown kind in `foreign`, numbers of cells by kind."""
     if foreign:
         listed = [f"{count} cells of kind {kind[:SHOWN]}" for kind, count in list(foreign.items())[:SHOWN]]
         more = [f"{len(foreign) - SHOWN} kinds more"] if len(foreign) > SHOWN else []
@@ -76,16 +76,16 @@ def merged(blocks: Iterable[Block]) -> list[Block]:
 
 
 def without_duplicates(block: Block) -> Block:
-    """Return the block with cells on the same nodes united, and their groups, too."""
+    """Return the block with duplicate cells, and their groups, merged."""
     if not len(block.nodes):
         return block
     _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
     if len(first) == len(block.nodes):
         return block
-    kept = np.sort(first)
-    position = np.searchsorted(kept, first)[inverse.reshape(-1)]
+    unique = np.sort(first)
+    position = np.searchsorted(unique, first)[inverse.reshape(-1)]
     groups = {name: np.unique(position[rows]) for name, rows in block.groups.items()}
-    return Block(block.kind, block.nodes[kept], groups)
+    return Block(block.kind, block.nodes[unique], groups)
 
 
 def _numbered(blocks: list[Block]) -> Groups:
@@ -100,7 +100,7 @@ def _numbered(blocks: list[Block]) -> Groups:
 
 
 def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> list[str]:
-    """Turn groups of vertex cells into groups of points; return the names of those that hold nothing else."""
+    """Convert groups of vertex cells to groups of points; return the names of those without other cells."""
     turned = []
     for name, rows in block.groups.items():
         points = block.nodes[rows, 0]
@@ -119,7 +119,7 @@ def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> lis
 
 
 def _without_flat_z(points: AnyArray, dim: int) -> AnyArray:
-    """Drop the third coordinate where it only says that the mesh is flat."""
+    """Drop the third coordinate of a flat mesh."""
     if points.ndim != 2 or points.shape[1] != 3 or dim == 3 or not len(points):
         return points
     size = np.ptp(points[:, :2], axis=0).max()

@@ -1,4 +1,4 @@
-"""Fields of numbers at points or cells, from MED files, VTKHDF files, and what meshio reads."""
+"""Scalar fields at points or cells from MED files, VTKHDF files, and formats of meshio."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
 
 
 class FileField(NamedTuple):
-    """A field of one number at points or cells.
+    """A scalar field at points or cells.
 
     Attributes
     ----------
     times : ndarray (n_instants,) or None
-        Of its instants [-]; None where the file has no times.
+        Times of its instants [-]; None if the file has none.
     values : ndarray (n_instants, n)
-        NaN where there is none [unit of the field].
+        Values, NaN where there is none [unit of the field].
     places : ndarray (n, 2) or (n, 3), or None
-        The points, or the means of the nodes of the cells, where the file has them [length].
+        Coordinates of the points, or means of the nodes of the cells, if the file has them [length].
     """
 
     times: Array | None
@@ -36,9 +36,9 @@ class FileField(NamedTuple):
 
 
 def read_file_field(path: PathLike, name: str, over: str) -> FileField:
-    """Read a field of one number, `over` the ``"points"`` or ``"cells"`` of the file.
+    """Read a scalar field `over` the ``"points"`` or ``"cells"`` of the file.
 
-    FileError if the file cannot be read, or has no such field, or one of several components.
+    Raises FileError if the file cannot be read, has no such field, or the field has several components.
     """
     file, at_points = Path(existing_file(path)), over == "points"
     suffix, times = file.suffix.lower(), None
@@ -60,7 +60,7 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
 
 
 def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:
-    """Read a field of an unstructured grid in the format of VTK in HDF5: at points of all steps, at cells of one."""
+    """Read a field of an unstructured grid in VTKHDF: at the points of all steps, or at the cells of one."""
     needed = {"Points", "NumberOfPoints"} if at_points else {"Points", "Connectivity", "Offsets", "NumberOfCells"}
     with opened(path) as file:
         grid = file.get("VTKHDF", {})
@@ -82,12 +82,12 @@ def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyAr
         check_size(f"field '{name}' of '{path}'", (n_steps, n_points), file)
         if len(first) and (first.min() < 0 or first.max() + n_points > len(field)):
             raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write it anew")
-        parts = np.array([field[start : start + n_points] for start in first])
-        return times, parts.reshape(len(first), n_points, *field.shape[1:]), points
+        steps = np.array([field[start : start + n_points] for start in first])
+        return times, steps.reshape(len(first), n_points, *field.shape[1:]), points
 
 
 def _middles(path: Path, name: str, grid: Any, n_values: int, points: Array) -> Array:
-    """Return the middles (n_cells, 3) of the cells of a grid of one part, of which a field has a value each [length]."""
+    """Return the middles (n_cells, 3) of the cells of a grid of one part, for a field with a value per cell [length]."""
     nodes, starts = (np.asarray(values(grid, key), np.int64) for key in ("Connectivity", "Offsets"))
     counts = np.diff(starts)
     if len(values(grid, "NumberOfCells")) != 1 or n_values != len(counts):

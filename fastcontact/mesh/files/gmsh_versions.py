@@ -1,4 +1,4 @@
-"""Gmsh files of versions that meshio does not read as they are, written again as others that it reads."""
+"""Conversion of Gmsh files of versions that meshio does not read."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from pathlib import Path
 
 from fastcontact.errors import FileError
 
-# Files begin with $MeshFormat, and a line of version, kind and size; those of version 1 with their nodes.
+# Files begin with $MeshFormat, and a line of version, kind and size; those of version 1 begin with their nodes.
 VERSION_1 = b"$NOD"
-# Gmsh writes 4.0 as "4", which meshio 5.3.5 takes for 4.1.
+# Gmsh writes 4.0 as "4", which meshio 5.3.5 mistakes for 4.1.
 VERSION_4, VERSION_4_0 = b"4", b"4.0"
-# In a line of $Entities: the number of physical groups, behind the number of the entity and its box.
+# In a line of $Entities: position of the number of physical groups, after the number of the entity and its box.
 GROUPS_OF_ENTITY = 7
-# Of a cell, more than the largest has.
+# Limit of the number of nodes of a cell, more than the largest has.
 MOST_WORDS = 200
 
 
 def readable(path: Path, folder: Path) -> Path:
-    """Return a file that meshio reads: `path`, or a copy of it in a `folder` for passing things."""
+    """Return a file that meshio reads: `path`, or a converted copy in a temporary `folder`."""
     with open(path, "rb") as file:
         first, second = (file.readline(256).strip() for _ in range(2))
     newer = folder / "newer.msh"
@@ -49,9 +49,9 @@ def _check_groups(path: Path) -> None:
 
 
 def _write_version_2(path: Path, target: Path) -> None:
-    """Write a file of version 1 again as one of version 2.2.
+    """Convert a file of version 1 to version 2.2.
 
-    A cell is there a line of number, kind, physical group, geometric entity, number of nodes, and these.
+    In version 1 a cell is a line of number, kind, physical group, geometric entity, number of nodes, and the nodes.
     """
     lines = path.read_text(encoding="ascii", errors="replace").splitlines()
     with open(target, "w", encoding="ascii", errors="replace") as file:

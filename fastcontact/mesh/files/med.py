@@ -1,6 +1,6 @@
 """MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
 
-With h5py alone. Arrays are stored component by component ("no interlace"), node numbers count from 1. Meshes of MED 2.3 to
+Only h5py is needed. Arrays are stored component by component ("no interlace"), node numbers start at 1. Meshes of MED 2.3 to
 4.x are read. Files are written in version 3.0.0, which all later libraries read, or 4.0.0, the first with wedges of 18 nodes.
 """
 
@@ -17,17 +17,17 @@ from fastcontact._tools.hdf5 import attribute, check_size, opened, values
 from fastcontact._tools.hdf5_driver import new_hdf5
 from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices
-from fastcontact.errors import FileError, MeshError, unknown
+from fastcontact.errors import FileError, MeshError, check_known
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import med_families
-from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_kinds
 from fastcontact.mesh.files.med_families import Families, checked_name, decoded
 from fastcontact.mesh.mesh import Mesh
 
-# Elements whose nodes MED numbers otherwise than we do: our node k is node NODE_ORDER[code][k] of MED. MED sees the
-# base of a solid from outside, where we see it from inside: its cells are ours in the mirror.
+# Elements with different node orders in MED: our node k is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid
+# as seen from outside, we as seen from inside: its cells are mirror images of ours.
 NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
-# The centres of faces follow in MED as bottom, sides round about, top; ours as -x, +x, -y, +y, bottom, top.
+# The order of face centres is bottom, sides all round, top in MED, and -x, +x, -y, +y, bottom, top here.
 _FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
 NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
 
@@ -50,9 +50,9 @@ class MedContent(NamedTuple):
 
 
 def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
-    """Read a mesh with its groups, cells oriented as they are in the file.
+    """Read a mesh with its groups, with the orientation of cells in the file.
 
-    Of several meshes the one called `mesh_name` is read, of several time steps of a mesh the first one.
+    Of several meshes `mesh_name` is read, of several time steps of a mesh the first.
     """
     with opened(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
@@ -70,8 +70,7 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
     if not names:
         raise FileError(f"'{path}' holds no MED mesh (no entry in ENS_MAA): name a MED file that has one")
     if mesh_name is not None:
-        if mesh_name not in names:
-            raise FileError(f"'{path}': {unknown('mesh', mesh_name, names)}")
+        check_known("mesh", mesh_name, names, FileError, f"'{path}': ")
         return mesh_name
     if len(names) > 1:
         listed = ", ".join(f"'{name[:NAME_SIZE]}'" for name in names[:12]) + (", ..." if len(names) > 12 else "")
@@ -103,7 +102,7 @@ def _group_names(families: Families, sign: int) -> list[str]:
 
 
 def _first_step(group: Any) -> Any:
-    """Return the HDF5 group with points and cells: the mesh itself in MED 2, its first time step later."""
+    """Return the HDF5 group with points and cells: the mesh itself in MED 2, its first time step in later versions."""
     if "NOE" in group:
         return group
     steps = [entry for entry in group.values() if "NOE" in entry]
@@ -134,11 +133,11 @@ def _read_points(step: Any, mesh: Any) -> Array:
 
 
 def _read_blocks(step: Any, families: Families) -> Iterator[Block]:
-    # MED 2 keeps faces and edges in folders of their own (FAC, ARE); later versions put all cells under MAI.
+    # MED 2 stores faces and edges in separate folders (FAC, ARE); later versions store all cells under MAI.
     folders = [step[name] for name in ("MAI", "FAC", "ARE") if name in step]
     entries = [entry for folder in folders for entry in folder.items()]
     foreign = {code: _cell_count(entry) for code, entry in entries if code not in elements.BY_MED and code != "PO1"}
-    check_known(foreign, elements.BY_MED)
+    check_kinds(foreign, elements.BY_MED)
     for code, entry in entries:
         if "NOD" not in entry:
             raise MeshError(f"its {code} cells have no nodal connectivity: write the mesh with nodal connectivity")
@@ -167,7 +166,7 @@ def _read_nodes(entry: Any, code: str) -> AnyArray:
     flat = values(entry, "NOD")
     size = 1 if code == "PO1" else elements.BY_MED[code].n_nodes
     if len(flat) % size:
-        raise MeshError(f"its {code} cells have {len(flat)} node numbers, which is no multiple of {size}")
+        raise MeshError(f"its {code} cells have {len(flat)} node numbers, which is not a multiple of {size}")
     nodes = flat.reshape(size, -1).T - 1
     return nodes[:, NODE_ORDER[code]] if code in NODE_ORDER else nodes
 
@@ -175,7 +174,7 @@ def _read_nodes(entry: Any, code: str) -> AnyArray:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    A reader gets the elements in alphabetical order of their MED codes. Names may have 64 bytes, of groups 80.
+    Readers return the elements in alphabetical order of their MED codes. Names may have 64 bytes, those of groups 80.
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)
@@ -183,7 +182,7 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
 
 @contextmanager
 def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
-    """Open a new MED file that takes its place when all is written; `mesh` tells which version it needs."""
+    """Open a new MED file, which appears at `path` when it is complete; `mesh` determines the version."""
     version = 4 if "wedge18" in mesh.cells else 3
     with replacing(path) as temporary, _in_order(version >= 4), new_hdf5(temporary) as file:
         _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
@@ -192,7 +191,7 @@ def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
 
 @contextmanager
 def _in_order(wanted: bool) -> Iterator[None]:
-    """Let new HDF5 groups remember the order of their members, without which libraries refuse a file of version 4."""
+    """Make new HDF5 groups track the order of their members, which libraries require in files of version 4."""
     import h5py
 
     settings = h5py.get_config()
@@ -298,7 +297,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     Returns
     -------
     times : ndarray (n_instants,)
-        In the order of the file's step numbers [-]: the load factor in files of fastcontact.
+        Times in the order of the step numbers of the file [-]; load factors in files of fastcontact.
     values : ndarray (n_instants, n_points, n_components)
         NaN at points without a value; in the unit of the field, e.g. [length] for ``"DEPL"``.
 
@@ -319,7 +318,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
 
 
 def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | None]:
-    """Return what `read_med_field` does, and the points (n_points, dim) [length]; None where they are in another file."""
+    """Return the result of `read_med_field`, and the points (n_points, dim) [length], None if they are in another file."""
     with opened(path) as file:
         group, _, mesh = _field_and_mesh(file, path, field)
         instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
@@ -330,26 +329,25 @@ def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | 
         profiles = [profile for entry in instants for profile in entry["NOE"].values()]
         n_points = max(values(profile, "CO").size // count for profile in profiles) if points is None else len(points)
         check_size(f"field '{field}' of '{path}'", (len(instants), n_points, count), file)
-        parts = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
-        return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(parts), points
+        fields = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
+        return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(fields), points
 
 
 def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
-    """Return the group of a field, the name of its mesh, and the group of this, None where it is in another file."""
+    """Return the group of a field, the name of its mesh, and the group of the mesh, None if it is in another file."""
     names = list(file["CHA"]) if "CHA" in file else []
-    if field not in names:
-        raise FileError(f"'{path}': {unknown('field', field, names)}")
+    check_known("field", field, names, FileError, f"'{path}': ")
     name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
     return file["CHA"][field], name, file.get(f"ENS_MAA/{name}")
 
 
 def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
-    """Return a field of cells of a file of MED 3 or later: times, values and middles of its cells.
+    """Return a field at cells from a file of MED 3 or later: times, values and middles of the cells.
 
     Times are (n_instants,) in the order of the file [-], values (n_instants, n_cells, n_components), NaN where there are
     none [unit of the field], middles (n_cells, dim) [length].
 
-    FileError if the file cannot be read, has no such field, or the field is not given once a cell.
+    Raises FileError if the file cannot be read, has no such field, or the field does not have one value per cell.
     """
     with opened(path) as file:
         group, name, mesh = _field_and_mesh(file, path, field)
@@ -361,7 +359,7 @@ def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
         codes = sorted({code for entry in instants for code in _cell_supports(entry)})
         if not instants:
             raise FileError(f"field '{field}' of '{path}' has no values at cells in the layout of MED 3 or 4")
-        middles, parts, count = [], [], int(attribute(group, "NCO"))
+        middles, values, count = [], [], int(attribute(group, "NCO"))
         for code in codes:
             if code not in elements.BY_MED or code not in step.get("MAI", {}):
                 raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
@@ -370,18 +368,18 @@ def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
                 raise FileError(f"a cell of '{path}' names a point that is not there: write the file anew")
             middles.append(points[nodes].mean(axis=1))
             check_size(f"field '{field}' of '{path}'", (len(instants), len(nodes), count), file)
-            parts.append(np.stack([_of_cells(file, entry, code, len(nodes), count, path) for entry in instants]))
+            values.append(np.stack([_of_cells(file, entry, code, len(nodes), count, path) for entry in instants]))
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        return times, np.concatenate(parts, axis=1), np.concatenate(middles)
+        return times, np.concatenate(values, axis=1), np.concatenate(middles)
 
 
 def _cell_supports(entry: Any) -> list[str]:
-    """Return the codes of the cells that a field has values at."""
+    """Return the codes of the cells with values of a field."""
     return [key[4:] for key in entry if key.startswith("MAI.")]
 
 
 def _of_cells(file: Any, entry: Any, code: str, n_cells: int, n_components: int, path: PathLike) -> Array:
-    """Return a field (n_cells, n_components) at the cells of one kind at an instant, NaN where it is not given."""
+    """Return a field (n_cells, n_components) at the cells of one kind at an instant, NaN where it has no value."""
     support = entry.get(f"MAI.{code}")
     if support is None:
         return np.full((n_cells, n_components), np.nan)

@@ -14,14 +14,14 @@ from fastcontact.errors import FileError, warn
 
 GROUP_NAME_SIZE = 80
 FAMILY_NAME_SIZE = 64
-# Folders between that of a mesh and its families: one, for those of points or of cells.
+# Number of folder levels between a mesh and its families: one, for those of points or of cells.
 LEVELS = 2
 
 Families = dict[int, tuple[str, ...]]
 
 
 def checked_name(kind: str, name: str, size: int) -> bytes:
-    """Return a name as MED stores it, or raise FileError if it is empty, too long, or would not come back the same."""
+    """Return a name encoded for MED; FileError if it is empty, too long, or cannot be read back unchanged."""
     encoded = name.encode("utf-8")
     if not encoded or len(encoded) > size:
         raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, and MED takes 1 to {size}: rename it")
@@ -40,7 +40,7 @@ def decoded(raw: bytes) -> str:
 
 
 def read_families(folder: Any, level: int = 0) -> Families:
-    """Return the group names of each family number, from an HDF5 group and the folders below it that MED has."""
+    """Return the group names of each family number, from an HDF5 group and its subfolders."""
     families: Families = {}
     for entry in folder.values():
         if "NUM" in entry.attrs:
@@ -54,7 +54,7 @@ def _group_names(family: Any) -> tuple[str, ...]:
     if "GRO" not in family:
         return ()
     raw = values(family["GRO"], "NOM").tobytes()
-    # MED 2 stores one string for all names, later versions a row for each: the same bytes, but for a zero.
+    # MED 2 stores one string for all names, later versions a row for each: the same bytes, except for a zero.
     count = -(-len(raw) // GROUP_NAME_SIZE)
     if "NBR" in family["GRO"].attrs:
         count = min(count, int(attribute(family["GRO"], "NBR")))
@@ -82,13 +82,13 @@ def members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
 def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[Numbers, Families]:
     """Return the family number of each of `count` cells or points, and the groups of each family.
 
-    One family is made for each combination of groups that occurs, and one for all groups without members.
+    There is one family for each combination of groups that occurs, and one for all groups without members.
     Numbers run from `sign`, +1 for points and -1 for cells, away from zero; 0 means no group.
     """
     labels = np.zeros(count, np.intp)
     combinations: list[tuple[str, ...]] = [()]
     for name, rows in groups.items():
-        # Only the members change family: the cost is that of the groups, not of the mesh times the groups.
+        # Only members change family: the cost is proportional to the size of the groups, not to that of the mesh.
         before, position = np.unique(labels[rows], return_inverse=True)
         labels[rows] = len(combinations) + position
         combinations += [(*combinations[label], name) for label in before]

@@ -1,4 +1,4 @@
-"""Fields of files as arrays over the points or cells of a mesh, such as constants of materials take."""
+"""Fields of files as arrays over the points or cells of a mesh, for example as material constants."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.neighbours import nearest
 from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.errors import FileError, MeshError, check_known
 from fastcontact.mesh.files.file_fields import FileField, read_file_field
 from fastcontact.mesh.mesh import Mesh
 
-# How far points of a file may lie from those of a mesh, relative to its size, and count as the same.
+# Tolerance of the positions of points in a file and in a mesh, relative to its size.
 SAME_PLACE = 1e-6
 OVER = ("cells", "points")
-# How far a time of a file may lie from the one that is wanted, relative to the latest.
+# Tolerance of the times of a file, relative to the latest.
 SAME_TIME = 1e-9
 
 
@@ -32,8 +33,8 @@ def read_field(
 ) -> Array:
     """Return a field of a file as an array over the cells or points of a mesh.
 
-    It can serve as a constant of a material: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points and
-    cells are matched by position, so that the file may contain others, in any order.
+    The array can be a material constant: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points
+    and cells are matched by position, so that the file may contain further ones, in any order.
 
     Parameters
     ----------
@@ -41,18 +42,19 @@ def read_field(
     file : path-like
         MED, VTKHDF, ``.vtu``, ``.vtk`` or another format of meshio.
     field : str
-        Its name in the file.
+        Name of the field in the file.
     over : {"cells", "points"}
-        Where the values of the field are.
+        Whether the field is given on cells or at points.
     groups : str or sequence of str, optional
-        Groups of solid cells that the file has values for; all by default.
+        Groups of solid cells for which the file has values; by default all.
     instant : float, optional
-        Which time of a file with several [-].
+        The time to read from a file with several [-].
 
     Returns
     -------
     ndarray (n_cells, 1) or (n_points,)
-        Of the solid cells of the groups, or of all points; where the groups have none, the mean [unit of the field].
+        Values [unit of the field] of the solid cells of the groups, or of all points; points outside the groups have
+        the mean.
 
     Raises
     ------
@@ -94,7 +96,7 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
 
 
 def _row(field: FileField, instant: float | None, name: str) -> int:
-    """Return which instant of a field is wanted."""
+    """Return the row of the requested instant of a field."""
     if instant is None:
         if len(field.values) != 1:
             raise FileError(f"{name} has {len(field.values)} instants: say which with instant")
@@ -110,7 +112,7 @@ def _row(field: FileField, instant: float | None, name: str) -> int:
 def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
     """Return the values (n_instants, n_cells) of a field at cells of a mesh, by their `middles` (n_cells, dim) [length].
 
-    MeshError if a cell has no value, or none is at its place; `name` names the field.
+    Raises MeshError, with the `name` of the field, if a cell has no value, or the file has no cell at its position.
     """
     rows, _ = _nearest(field, middles, np.arange(len(middles)), mesh, ("cell", "cells"), name)
     return _known(field.values[:, rows], middles, np.arange(len(middles)), "cell", name)
@@ -119,8 +121,7 @@ def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
 def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Array:
     """Return the values (n_instants, n_points) of a field at the `wanted` (k,) points of a mesh, elsewhere NaN.
 
-    A file with the points of the mesh, in its order, gives the value of each point itself, any other one that of the point
-    at the same place.
+    If the file has the points of the mesh in the same order, values are assigned by number, otherwise by position.
 
     Raises
     ------
@@ -139,12 +140,12 @@ def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Ar
 
 
 def _in_space(places: Array) -> Array:
-    """Return places (n, 2) or (n, 3) with three coordinates."""
+    """Return positions (n, 2) or (n, 3) with three coordinates."""
     return np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
 
 
 def _same_points(places: Array, mesh: Mesh) -> bool:
-    """Return whether the points of a file are those of a mesh, in its order."""
+    """Return whether the points of a file are those of a mesh in the same order."""
     if len(places) != mesh.n_points:
         return False
     off = np.abs(_in_space(places) - _in_space(mesh.points)).max(initial=0.0)
@@ -154,27 +155,25 @@ def _same_points(places: Array, mesh: Mesh) -> bool:
 def _nearest(
     field: FileField, places: Array, numbers: Indices, mesh: Mesh, nouns: tuple[str, str], name: str
 ) -> tuple[Indices, float]:
-    """Return the rows (n,) of a field at places (n, dim) of a mesh, and how far they may be from there [length].
+    """Return the rows (n,) of a field at positions (n, dim) of a mesh, and the tolerance of the distance [length].
 
-    `numbers` (n,) are those of the points or cells at the places; what they are, and what the field is to be written on, say
-    the `nouns`.
+    `numbers` (n,) are those of the points or cells at the positions; `nouns` name them, and the items on which the field
+    is to be written, in messages.
     """
-    from scipy.spatial import cKDTree
-
     assert field.places is not None
     reach = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
-    distance, rows = cKDTree(_in_space(field.places)).query(_in_space(places))
+    distance, rows = nearest(_in_space(field.places), _in_space(places))
     off = np.flatnonzero(~(distance <= reach))
     if len(off):
         raise MeshError(
             f"{name} has no {nouns[0]} where {len(off)} {nouns[0]}s of the mesh are (first: {nouns[0]} {numbers[off[0]]} "
             f"{places[off[0]]}, {distance[off[0]]:.3g} from the next): write it on the {nouns[1]} of this mesh"
         )
-    return np.asarray(rows, np.intp), reach
+    return rows, reach
 
 
 def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str) -> Array:
-    """Return values (n_instants, n) at some places (n, dim); MeshError where one is missing."""
+    """Return values (n_instants, n) at positions (n, dim); MeshError if one is missing."""
     missing = np.flatnonzero(~np.isfinite(values).all(axis=0))
     if len(missing):
         first = f"{noun} {numbers[missing[0]]} {places[missing[0]]}"
@@ -183,7 +182,7 @@ def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str)
 
 
 def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> None:
-    """Raise MeshError where points of the file at one place have different values."""
+    """Raise MeshError if coincident points of the file have different values."""
     from scipy.spatial import cKDTree
 
     assert field.places is not None

@@ -1,4 +1,4 @@
-"""Read and write mesh files: MED by our own reader and writer, all other formats by meshio."""
+"""Reading and writing of mesh files: MED with our own reader and writer, all other formats with meshio."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# code_aster's names for the meshes and results it reads and writes are MED files too.
+# Suffixes of MED files, including code_aster's for meshes and results.
 MED_SUFFIXES = (".med", ".mmed", ".rmed")
-# Its older one in text, which is read only.
+# code_aster's older text format, which can only be read.
 MAIL_SUFFIX = ".mail"
 
 
@@ -47,19 +47,19 @@ class MeshReport:
 def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> Mesh:
     """Read a mesh with its named groups.
 
-    The format follows from the suffix: MED (``.med``, ``.mmed``, ``.rmed``), code_aster's text (``.mail``), Gmsh of any
-    version (``.msh``), Abaqus (``.inp``), VTK (``.vtk``, ``.vtu``), XDMF, Medit (``.mesh``) and all others of meshio. MED
-    groups, Gmsh physical groups, Medit references and Abaqus sets all become groups of cells and points. A flat mesh in 3D
-    coordinates becomes a 2D one; points without cells are kept. How many cells were turned goes to the logger
-    ``fastcontact`` at level INFO, and to `read_mesh_report`.
+    The suffix determines the format: MED (``.med``, ``.mmed``, ``.rmed``), code_aster's text (``.mail``), Gmsh of any
+    version (``.msh``), Abaqus (``.inp``), VTK (``.vtk``, ``.vtu``), XDMF, Medit (``.mesh``) and all others of meshio.
+    MED groups, Gmsh physical groups, Medit references and Abaqus sets all become groups of cells and points. A flat
+    mesh in 3D coordinates becomes a 2D one; points without cells are kept. The number of reoriented cells is logged by
+    the logger ``fastcontact`` at level INFO, and returned by `read_mesh_report`.
 
     Parameters
     ----------
     path : path-like
     mesh_name : str, optional
-        Which mesh to read, of a MED file with several.
+        Name of the mesh in a MED file with several.
     orient : bool
-        Turn solid cells that are inside out (clockwise in 2D); see `fastcontact.topology.oriented`.
+        Reorient inverted solid cells (clockwise in 2D); see `fastcontact.topology.oriented`.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
     FileError
         If the file is missing, of an unknown format, damaged, or holds no mesh or several.
     MeshError
-        If the mesh has no cells or a kind of cells that fastcontact does not know.
+        If the mesh has no cells or an unknown type of cells.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
         mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
         dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
-        raise FileError(f"'{path}' is no MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
+        raise FileError(f"'{path}' is not a MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
     elif file.suffix.lower() == MAIL_SUFFIX:
         mesh, dropped = aster_mail.read(file)
         file_format, name = "code_aster", ""
@@ -103,17 +103,17 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
 
 @typed(FileError)
 def write_mesh(path: PathLike, mesh: Mesh) -> None:
-    """Write a mesh; the format follows from the suffix, and the file appears only when it is complete.
+    """Write a mesh in the format of the suffix; the file appears only when it is complete.
 
-    What each format keeps of the groups:
+    Formats differ in the groups that they can store:
 
     - ``.med``: everything.
     - ``.vtk``, ``.vtu``, ``.xdmf``: everything, as arrays of 0 and 1 named ``cell_group:...`` and
       ``point_group:...``.
-    - ``.inp`` (Abaqus): all groups as sets; element types are the first that meshio finds for a shape.
-    - ``.msh`` (Gmsh 2.2): one group a cell, the smallest; groups of mixed dimension keep the highest; empty
-      groups and groups of points with the name of a group of cells are left out. A warning says how much.
-    - all others: no groups; a warning says how many.
+    - ``.inp`` (Abaqus): all groups as sets; element types are those of meshio for each shape.
+    - ``.msh`` (Gmsh 2.2): one group per cell, the smallest; groups of mixed dimension keep the highest; empty
+      groups and point groups with the name of a cell group are omitted. A warning states their number.
+    - all others: no groups; a warning states their number.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What meshio has read, as plain data, becomes a Mesh: node orders, groups by tags, sets and arrays of 0 and 1."""
+"""Conversion of the plain data read by meshio to a Mesh: node orders, groups from tags, sets and arrays of 0 and 1."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_known, merged, without_duplicates
+from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_kinds, merged, without_duplicates
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS
 from fastcontact.mesh.mesh import Mesh
 
-# What Gmsh calls things of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
+# Gmsh's names for entities of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
 SHAPES = ("point", "curve", "surface", "volume")
-# Cells that meshio gets in another order than ours: our node k is its node NODE_ORDER[format][element][k]. It mirrors
-# the linear wedge of VTK, as old documents of VTK want and VTK 9.7 does not, and leaves Gmsh's wedge of 18 nodes alone.
+# Cells with a different node order in meshio: our node k is its node NODE_ORDER[format][element][k]. meshio mirrors the
+# linear wedge of VTK, as in old documentation of VTK but not in VTK 9.7, and does not reorder Gmsh's wedge of 18 nodes.
 Orders = Mapping[str, tuple[int, ...]]
 NODE_ORDER: dict[str, Orders] = {
     **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
     **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
 }
 
-# meshio takes what stands in a file as it is, arrays of any shape and kind: these come of parts that do not fit together.
+# Errors caused by inconsistent arrays, which meshio reads without checks.
 UNFIT = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 
 
@@ -36,13 +36,12 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
     content : mapping
         See `meshio_process.plain_content`.
     file_format : str
-        meshio's name of the format it comes from.
+        meshio's name of the original format.
 
     Raises
     ------
     MeshError
-        If it has no cells, or of a kind that fastcontact does not know. Arrays that do not fit together end in one of the
-        exceptions `UNFIT`.
+        If it has no cells, or cells of an unknown kind. Inconsistent arrays raise one of the exceptions `UNFIT`.
     """
     blocks = merged(_blocks(content, NODE_ORDER.get(file_format, {})))
     n_duplicates = sum(len(block.nodes) for block in blocks)
@@ -55,7 +54,7 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
 
 
 def _cell_group_names(content: Mapping[str, Any], file_format: str) -> list[str]:
-    """Return the names of all groups of cells, also of those without any."""
+    """Return the names of all groups of cells, including empty ones."""
     names = [name for name in content["cell_sets"] if not name.startswith("gmsh:")]
     names += [unquote(key[len(CELL_PREFIX) :]) for key in content["cell_data"] if key.startswith(CELL_PREFIX)]
     if file_format == "gmsh":
@@ -68,7 +67,7 @@ def _blocks(content: Mapping[str, Any], order: Orders) -> list[Block]:
     for kind, count, _ in content["cells"]:
         if kind not in elements.BY_MESHIO and kind != VERTEX:
             foreign[kind] = foreign.get(kind, 0) + count
-    check_known(foreign, elements.BY_MESHIO)
+    check_kinds(foreign, elements.BY_MESHIO)
     return [_block(content, index, kind, nodes, order) for index, (kind, _, nodes) in enumerate(content["cells"])]
 
 
@@ -94,7 +93,7 @@ def _add(groups: dict[str, AnyArray], more: Mapping[str, AnyArray]) -> None:
 
 
 def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str, AnyArray]:
-    """Return the members of each tag, by its name for this dimension or else by a name made of the tag."""
+    """Return the members of each tag, by its name for this dimension or a name derived from the tag."""
     if tags.ndim != 1 or tags.dtype.kind not in "iu":
         return {}
     names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}

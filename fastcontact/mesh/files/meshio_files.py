@@ -1,4 +1,4 @@
-"""Mesh files in the formats of meshio, in and out: their groups, node orders and losses."""
+"""Reading and writing of mesh files in the formats of meshio: groups, node orders and losses."""
 
 from __future__ import annotations
 
@@ -29,19 +29,19 @@ from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# meshio's writers print through the standard streams; only one thread at a time may divert them.
+# meshio's writers print to the standard streams; only one thread at a time may redirect them.
 _STREAMS = threading.Lock()
 
-# Formats with named arrays: every group is one.
+# Formats with named arrays, in which every group is an array.
 ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
-# Formats whose writers are known to keep all our cells; of the others, the result is read back.
+# Formats whose writers are known to keep all our cells; for the others the result is read back.
 COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
-# Formats that know points of two coordinates; the others get a zero, and reading drops it again.
+# Formats that support points of two coordinates; the others get a zero, which reading drops.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 # Formats that are HDF5 files.
 HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
 
-# How much of what meshio says goes into a message.
+# Largest length of meshio's output in a message.
 LONGEST = 300
 KEEPS_ALL = "write a .med file to keep them"
 USUAL = (".med", ".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".mesh")
@@ -62,7 +62,7 @@ def _log(action: str, path: Path, said: str) -> None:
 
 @contextlib.contextmanager
 def _contained(action: str, path: Path) -> Iterator[None]:
-    """Keep meshio from printing and from ending the process; what it says goes to the log or the error."""
+    """Prevent meshio from printing and from ending the process; its output goes to the log or the error."""
     said = io.StringIO()
     try:
         with _STREAMS, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -86,15 +86,15 @@ def _format(path: Path, writing: bool) -> str:
         return str(names[0])
     if writing:
         return "gmsh22"
-    # Ansys has the same suffix, and meshio's reader of its files never ends on a damaged one.
+    # Ansys uses the same suffix, and meshio's reader of its files does not terminate on a damaged one.
     with open(path, "rb") as file:
         if file.read(1) != b"$":
-            raise FileError(f"'{path}' is no Gmsh file, which starts with $MeshFormat: convert it to .med")
+            raise FileError(f"'{path}' is not a Gmsh file, which starts with $MeshFormat: convert it to .med")
     return "gmsh"
 
 
 def _read_with_field(path: Path, field: str, where: str, kind: str) -> dict[str, Any]:
-    """Return what `meshio_process.read_in_process` finds of a mesh and a field, which it lists `where` there."""
+    """Return the result of `meshio_process.read_in_process` for a mesh and a field, checked against the names in `where`."""
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
@@ -105,7 +105,7 @@ def _read_with_field(path: Path, field: str, where: str, kind: str) -> dict[str,
 
 
 def _content(path: Path, readable: Path, file_format: str, field: str = "") -> dict[str, Any]:
-    """Return what is found in a file, or in a `readable` copy of it; FileError if meshio cannot read it."""
+    """Return the content of a file, or of a `readable` copy of it; FileError if meshio cannot read it."""
     _check_before(path, file_format)
     content = read_in_process(readable, file_format, field)
     if "error" in content:
@@ -159,7 +159,7 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
 
 
 def _check_before(path: Path, file_format: str) -> None:
-    """Refuse files that lead meshio to other files, or of which it would lose something."""
+    """Refuse files that make meshio read other files, or of which it would drop something."""
     import h5py
 
     if file_format == "abaqus":
@@ -175,16 +175,16 @@ def files_of(path: Path) -> list[Path]:
     """Return a mesh file and all files that are read with it; FileError if one of XDMF cannot be read."""
     if path.suffix.lower() in (".xdmf", ".xmf"):
         return [path, *(reference for reference, _ in _references(path))]
-    other = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # the two files of TetGen
+    other = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # TetGen's pair of files
     return [path, path.with_suffix(other)] if other else [path]
 
 
 def _references(path: Path) -> Iterator[tuple[Path, str]]:
-    """Yield the files that an XDMF file names, and their formats."""
+    """Yield the files referenced by an XDMF file, and their formats."""
     try:
         items = [item for item in ElementTree.parse(path).iter() if item.get("Format") in ("HDF", "Binary")]
     except (ElementTree.ParseError, ValueError, LookupError) as error:
-        raise _refusal("read", path, f"it is no XML: {error}") from error
+        raise _refusal("read", path, f"it is not XML: {error}") from error
     except OSError as error:
         raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
     for item in items:
@@ -209,12 +209,12 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
     meshio = library()
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):
-        raise FileError(f"'{path}': {file_format} is no mesh format of one file; {OTHER_FORMATS}")
-    parts = _parts(mesh, file_format)
-    # By default XDMF puts the numbers into a second file, which cannot be replaced together with the first.
+        raise FileError(f"'{path}': {file_format} is not a single-file mesh format; {OTHER_FORMATS}")
+    content = _parts(mesh, file_format)
+    # By default XDMF writes the numbers to a second file, which cannot be replaced together with the first.
     options = {"data_format": "XML"} if file_format == "xdmf" else {}
     with _contained("write", path):
-        meshio.write(temporary, meshio.Mesh(**parts), file_format=file_format, **options)
+        meshio.write(temporary, meshio.Mesh(**content), file_format=file_format, **options)
     if file_format == "abaqus":
         abaqus.append_cell_sets(temporary, mesh)
     if file_format not in COMPLETE_FORMATS:
@@ -222,20 +222,20 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
 
 
 def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
-    """Return the arguments of meshio's Mesh, groups as the format can take them."""
+    """Return the arguments of meshio's Mesh, with groups in the form that the format supports."""
     width = mesh.dim if file_format in FLAT_FORMATS else 3
     points = np.pad(mesh.points, [(0, 0), (0, width - mesh.dim)])
-    parts: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
+    content: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
     if file_format in ARRAY_FORMATS:
-        return _with_arrays(parts, mesh)
+        return _with_arrays(content, mesh)
     if file_format == "gmsh22":
-        return _with_tags(parts, mesh)
+        return _with_tags(content, mesh)
     if file_format == "abaqus":
-        return {**parts, "point_sets": dict(mesh.point_groups)}
+        return {**content, "point_sets": dict(mesh.point_groups)}
     lost = len(mesh.cell_groups) + len(mesh.point_groups)
     if lost:
         warn(f"{file_format} files have no named groups: {lost} groups are left out; {KEEPS_ALL}")
-    return parts
+    return content
 
 
 def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
@@ -245,14 +245,14 @@ def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
     ]
 
 
-def _with_arrays(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+def _with_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with an array of 0 and 1 for each group."""
     cell_data = {}
     for name, members in mesh.cell_groups.items():
         flags = _flags(members, mesh.n_cells)
         cell_data[CELL_PREFIX + quote(name)] = np.split(flags, list(mesh.offsets.values())[1:])
     point_data = {POINT_PREFIX + quote(name): _flags(m, mesh.n_points) for name, m in mesh.point_groups.items()}
-    return {**parts, "cell_data": cell_data, "point_data": point_data}
+    return {**content, "cell_data": cell_data, "point_data": point_data}
 
 
 def _flags(members: AnyArray, count: int) -> Numbers:
@@ -261,28 +261,28 @@ def _flags(members: AnyArray, count: int) -> Numbers:
     return flags
 
 
-def _with_tags(parts: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
+def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
     tags = np.zeros(mesh.n_cells, np.int32)
     field_data: dict[str, AnyArray] = {}
-    # Small groups overwrite large ones, so that a group of everything does not hide all others.
+    # Small groups overwrite large ones, so that a group of all cells does not hide the others.
     for name, members in sorted(mesh.cell_groups.items(), key=lambda item: -len(item[1])):
         if len(members):
             dim, tag = int(dims[members].max()), len(field_data) + 1
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
-    kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
-    cut = {name: len(rows) - kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > kept.get(name, 0)}
+    n_kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
+    cut = {name: len(rows) - n_kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > n_kept.get(name, 0)}
     if cut:
         warn(
             f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
             f"{', '.join(cut)} are left out; {KEEPS_ALL}"
         )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
-    cells, blocks = _with_vertices(parts["cells"], blocks, mesh.point_groups, field_data)
+    cells, blocks = _with_vertices(content["cells"], blocks, mesh.point_groups, field_data)
     data = {"gmsh:physical": blocks, "gmsh:geometrical": [np.maximum(block, 1) for block in blocks]}
-    return {**parts, "cells": cells, "cell_data": data, "field_data": field_data}
+    return {**content, "cells": cells, "cell_data": data, "field_data": field_data}
 
 
 def _with_vertices(
@@ -305,7 +305,7 @@ def _with_vertices(
 
 
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
-    """Read back what was written: several of meshio's writers leave out or change cells without an error."""
+    """Read back the written file: several of meshio's writers drop or change cells without an error."""
     with _contained("read back", path):
         content = library().read(temporary, file_format=file_format)
     wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(content.get_cells_type(kind), block)]

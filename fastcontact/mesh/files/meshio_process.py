@@ -1,8 +1,8 @@
-"""Mesh files read by meshio in a process of its own, under limits of memory and computing time.
+"""Reading of mesh files by meshio in a child process, with limits of memory and computing time.
 
-meshio makes room for whatever a file announces, and several of its readers never end on a file that is cut off. Here this
-ends the child process only, and the file is refused with the reason. Windows has no such limits: there only the time that
-passes is limited. A frozen application, and a program that has Python inside, start no interpreter: they read without limit.
+meshio allocates whatever a file announces, and several of its readers do not terminate on a truncated file. Here only
+the child process is ended, and the file is refused with the reason. Windows has no such limits: there only the elapsed
+time is limited. Frozen applications and programs with embedded Python cannot start an interpreter: they read without limits.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ import numpy as np
 from fastcontact._tools.packing import packed, unpacked
 from fastcontact.arrays import AnyArray
 
-# Limits of the child, each a constant and a part for every byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB for a
+# Limits of the child process, each a constant plus a term per byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB per
 # megabyte (permas, vtu); the process itself takes 130 MB.
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
 MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
-# Limit of what the child returns [bytes]: a packed file of a few kilobytes can hold any number of equal points.
+# Limit of the child's answer [bytes]: a compressed file of a few kilobytes can contain any number of equal points.
 RETURNED, RETURNED_PER_BYTE = 1 << 28, 32
-# Limit of the time that passes, in computing times: a busy machine may need as long.
+# Limit of the elapsed time over the limit of computing time, for busy machines.
 WAITING = 10
 
-# Integer cell data that mean groups, in the formats of Gmsh, Medit and others; 0 means no group.
+# Integer cell data that define groups, in the formats of Gmsh, Medit and others; 0 means no group.
 TAGS = ("gmsh:physical", "medit:ref", "tetgen:ref", "netgen:index", "avsucd:material", "cell_tags")
-# In formats with named arrays a group is an array of 0 and 1, under a prefix and its quoted name.
+# In formats with named arrays a group is an array of 0 and 1, named by a prefix and its quoted name.
 CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
 
 
 def library() -> Any:
-    """Return the package meshio, with the two elements that its table of dimensions lacks and without which it fails."""
+    """Return the package meshio, with two elements added that its table of dimensions lacks."""
     import meshio
     from meshio._mesh import topological_dimension  # listed as public by meshio 5.3.5, but only to be found there
 
@@ -48,7 +48,7 @@ def library() -> Any:
 
 
 def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, Any]:
-    """Return what `plain_content` returns in a child process, or ``{"error": reason}`` if one of its limits stopped it."""
+    """Return the result of `plain_content` in a child process, or ``{"error": reason}`` if a limit stopped it."""
     interpreter = Path(sys.executable or "").name.lower()
     if getattr(sys, "frozen", False) or not ("python" in interpreter or "pypy" in interpreter):
         return plain_content(path, file_format, field)
@@ -71,7 +71,7 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
 
 
 def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[str, Any]:
-    """Return what the child said, or the reason why it said nothing."""
+    """Return the answer of the child, or the reason why it gave none."""
     if done.returncode == -getattr(signal, "SIGXCPU", 0):
         return {"error": f"it was not read within {seconds:.0f} s of computing"}
     if done.returncode < 0:
@@ -84,13 +84,13 @@ def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[st
 
 
 def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, Any]:
-    """Read a file in a format, by meshio's name, as plain data; meshio neither prints nor ends the process.
+    """Read a file in a format, given by meshio's name, as plain data; meshio neither prints nor ends the process.
 
-    Found are ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
-    (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that mean groups; ``cell_sets``, ``point_sets``,
-    ``field_data``; ``said``, what meshio would have printed. Arrays that hold no numbers are None. If meshio cannot read
-    the file, only ``error``, the reason. With the name of a `field` also ``fields``, the names of all fields at points, and
-    ``field``, its numbers, None without any; ``cell_fields`` and ``cell_field``, a list of arrays, likewise for cells.
+    The keys are ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
+    (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that define groups; ``cell_sets``, ``point_sets``,
+    ``field_data``; ``said``, the output of meshio. Non-numeric arrays are None. If meshio cannot read the file, there is only
+    ``error``, the reason. With the name of a `field` there are also ``fields``, the names of all fields at points, and
+    ``field``, its values, None without any; ``cell_fields`` and ``cell_field``, a list of arrays, are the same for cells.
     """
     said = io.StringIO()
     try:
@@ -104,33 +104,33 @@ def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, An
 
 
 def _fields(content: Any, field: str) -> dict[str, Any]:
-    """Return the fields of a ``meshio.Mesh`` as `plain_content` tells."""
-    parts = content.cell_data.get(field)
+    """Return the fields of a ``meshio.Mesh`` in the format of `plain_content`."""
+    blocks = content.cell_data.get(field)
     return {
         "fields": list(content.point_data),
         "field": _numbers(content.point_data.get(field)),
         "cell_fields": list(content.cell_data),
-        "cell_field": None if parts is None else [_numbers(part) for part in parts],
+        "cell_field": None if blocks is None else [_numbers(values) for values in blocks],
     }
 
 
 def plain_parts(content: Any) -> dict[str, Any]:
-    """Return a ``meshio.Mesh`` as the plain data that `plain_content` tells of."""
+    """Return a ``meshio.Mesh`` as plain data in the format of `plain_content`."""
     cell_data = {key: data for key, data in content.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
     point_data = {key: data for key, data in content.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
     return {
         "points": _numbers(content.points),
         "cells": [[block.type, len(block.data), _numbers(block.data)] for block in content.cells],
-        "cell_data": {key: [_numbers(part) for part in parts] for key, parts in cell_data.items()},
+        "cell_data": {key: [_numbers(values) for values in parts] for key, parts in cell_data.items()},
         "point_data": {key: _numbers(data) for key, data in point_data.items()},
-        "cell_sets": {name: [_numbers(part) for part in parts] for name, parts in content.cell_sets.items()},
-        "point_sets": {name: _numbers(part) for name, part in content.point_sets.items()},
+        "cell_sets": {name: [_numbers(values) for values in parts] for name, parts in content.cell_sets.items()},
+        "point_sets": {name: _numbers(values) for name, values in content.point_sets.items()},
         "field_data": {name: _numbers(entry) for name, entry in content.field_data.items()},
     }
 
 
 def _numbers(values: Any) -> AnyArray | None:
-    """Return an array of numbers, or None where there is none, as for cells with different numbers of nodes."""
+    """Return an array of numbers; None if there is none, as for cells with different numbers of nodes."""
     try:
         array = np.asarray(values)
     except ValueError:
@@ -143,7 +143,7 @@ def _limit(kind: int, value: int) -> None:
     import resource
 
     hard = resource.getrlimit(kind)[1]
-    with contextlib.suppress(ValueError, OSError):  # macOS reserves more memory than it lets one limit
+    with contextlib.suppress(ValueError, OSError):  # macOS does not allow such a limit of memory
         resource.setrlimit(kind, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
 
 

@@ -1,7 +1,7 @@
-"""Mesh makers with named groups, and operations on meshes.
+"""Mesh generators with named groups, and operations on meshes.
 
-A maker is a function of plain numbers, strings and tuples that returns a `Mesh`; one listed in ``GENERATORS`` can be
-named in case files and on the command line. An argument out of range raises MeshError.
+A generator is a function of plain numbers, strings and tuples that returns a `Mesh`; those listed in ``GENERATORS`` are
+available in case files and on the command line. An argument out of range raises MeshError.
 """
 
 from __future__ import annotations
@@ -47,5 +47,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # to whom all names are known
+if not TYPE_CHECKING:  # type checkers know all names
     __getattr__, __dir__ = names_of("fastcontact.generate", __all__)

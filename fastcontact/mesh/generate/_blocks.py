@@ -39,9 +39,9 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
 def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
     """Return the linear mesh of a grid, its cells in the group `solid`.
 
-    The nodes of the `grid` (n + 1, m + 1, 2) [length] stand counter-clockwise: the first index to the right, the second up.
-    `sides` names the groups of lines of those of BOTTOM, RIGHT, TOP, LEFT that get one; with `triangles`, each quadrangle is
-    cut in two, along diagonals that alternate.
+    The `grid` (n + 1, m + 1, 2) [length] is counter-clockwise: the first index runs to the right, the second up. `sides` maps
+    BOTTOM, RIGHT, TOP, LEFT to names of groups of lines; with `triangles`, each quadrangle is divided in two along
+    alternating diagonals.
     """
     n, m = grid.shape[0] - 1, grid.shape[1] - 1
     numbers = np.arange((n + 1) * (m + 1)).reshape(n + 1, m + 1)
@@ -58,7 +58,7 @@ def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: boo
 
 
 def _cut(quads: Indices) -> Indices:
-    """Triangles (2 n m, 3) of quadrangles (n, m, 4), their diagonals alternating like a chessboard's."""
+    """Return triangles (2 n m, 3) of quadrangles (n, m, 4), with diagonals alternating in a chessboard pattern."""
     i, j = np.indices(quads.shape[:2])
     rising = quads[..., [[0, 1, 2], [0, 2, 3]]]
     falling = quads[..., [[0, 1, 3], [1, 2, 3]]]

@@ -1,4 +1,4 @@
-"""Checks of the makers' arguments: each names the argument and the allowed range."""
+"""Checks of the generators' arguments: each message names the argument and the admissible range."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fastcontact.errors import MeshError, check_known
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
-# Largest size of a number, whose cubes can still be represented. Largest numbers of segments and of cells: more are probably
+# Largest admissible number, whose cube can still be represented. Largest numbers of segments and of cells: more are probably
 # mistakes in units or decimal points, and would not fit into memory.
 LARGEST = 1e100
 MOST_ALONG = 1_000_000
@@ -69,7 +69,7 @@ def count(name: str, value: Any) -> int:
 
 
 def segments(wanted: float) -> int:
-    """Return the whole number next above `wanted`, at least 1; MeshError if it is more than MOST_ALONG."""
+    """Return `wanted` rounded up, at least 1; MeshError if it is more than MOST_ALONG."""
     if not wanted <= MOST_ALONG:
         raise MeshError(
             f"a line of the mesh would be divided into {wanted:.3g} segments, more than {MOST_ALONG}: check the units of "
@@ -93,13 +93,13 @@ def each(check: Callable[[str, Any], Number], name: str, value: Sequence[Any]) -
 
 
 def one_of(name: str, value: str, known: Sequence[str]) -> str:
-    """Return `value`; MeshError that offers the near names unless it is one of `known`."""
+    """Return `value`; MeshError with similar names unless it is one of `known`."""
     check_known(name, value, known, MeshError)
     return value
 
 
 def unused(element: str, *instead: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument that has no effect with `element` was given (is not None); offer those that have one."""
+    """Raise MeshError if an argument without effect on `element` is given (not None); suggest those that have one."""
     remedy = f"use {', '.join(instead)}" if instead else "leave it out"
     for name, value in arguments.items():
         if value is not None:

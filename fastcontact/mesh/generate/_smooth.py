@@ -1,4 +1,4 @@
-"""Improve a Delaunay triangulation: points are spread evenly, then moved one by one off the worst triangles."""
+"""Improvement of a Delaunay triangulation: relaxation of the points, then optimisation of the worst triangles."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ Size = Callable[[Array], Array]
 
 _KEPT = 4  # steps with one triangulation
 _STEP = 0.2  # pseudo-time of one step of `relax`
-_STRETCH = 1.2  # bars push until they are this much longer than they can be, so that the points spread
+_STRETCH = 1.2  # rest length of bars over their scaled length, so that the points spread
 _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])
-_GOOD = np.sin(np.radians(50.0))  # a star whose smallest angle is larger is left as it is
-_TOO_LONG = 0.5, 2.0  # penalty of an edge too long, and per relative excess, in sines of an angle
+_GOOD = np.sin(np.radians(50.0))  # stars with a larger smallest angle are not changed
+_TOO_LONG = 0.5, 2.0  # penalty of a too long edge, and per relative excess, in sines of an angle
 
 
 def delaunay(points: Array) -> Indices:
     """Return counter-clockwise triangles (n_triangles, 3) of the convex hull of `points` (n, 2) [length], without flat ones.
 
-    Nodes in line on the hull give triangles of zero area by rounding; they are dropped.
+    Collinear nodes on the hull cause triangles of zero area by round-off, which are dropped.
     """
     from scipy.spatial import Delaunay
 
@@ -60,11 +60,11 @@ def stars_of(triangles: Indices, n_points: int) -> Indices:
 
 
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
-    """Return points (n, 2) [length], the movable ones spread by repulsive bars along the edges.
+    """Return points (n, 2) [length], the movable ones relaxed by repulsive bars along the edges.
 
     The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
     G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the `points` (n, 2) [length] those
-    `movable` (n,) of bool move, in so many `steps`; ``size(points)``, `size` (n,) [length], is the wanted length of edges.
+    `movable` (n,) of bool move, in `steps` steps; the function `size` (n,) [length] of points is the desired length of edges.
     """
     points = points.copy()
     if not movable.any():
@@ -80,10 +80,10 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
 
 
 def _push(points: Array, edges: Indices, wanted: Array) -> Array:
-    """Sum (n, 2) of the bar forces at the points; a bar longer than its rest length does not pull."""
+    """Return the sums (n, 2) of the bar forces at the points; a bar longer than its rest length does not pull."""
     bars = points[edges[:, 0]] - points[edges[:, 1]]
     length = np.sqrt((bars * bars).sum(axis=1))
-    # The rest lengths are scaled to the lengths there are, so that the pressure is the same everywhere.
+    # The rest lengths are scaled to the actual lengths, so that the pressure is the same everywhere.
     rest = _STRETCH * wanted * np.sqrt((length**2).sum() / (wanted**2).sum())
     force = (np.maximum(rest - length, 0.0) / length)[:, None] * bars
     push = np.empty_like(points)
@@ -96,10 +96,10 @@ def _push(points: Array, edges: Indices, wanted: Array) -> Array:
 def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
     """Return points (n, 2) [length], moved one by one so that the worst triangle around each becomes better.
 
-    A trial move is kept when it raises the smallest angle of the star, edges longer than `limit` counting against
-    it (smart smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved
-    at the same time share no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most so many
-    `sweeps`; ``limit(points)``, `limit` (n,) [length], is the longest edge allowed there.
+    A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges that are too long (smart
+    smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved simultaneously share
+    no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most `sweeps` sweeps;
+    the function `limit` (n,) [length] of points is the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True
@@ -144,7 +144,7 @@ def _try_moves(points: Array, chosen: Indices, stars: Indices, limit: Array, rad
 
 
 def _star_quality(places: Array, points: Array, stars: Indices, limit: Array) -> Array:
-    """Quality (m, n_places) of the worst triangle around each point, were it at `places` (m, n_places, 2)."""
+    """Return the quality (m, n_places) of the worst triangle around each point for positions `places` (m, n_places, 2)."""
     a, b = points[stars[:, None, :, 0]], points[stars[:, None, :, 1]]
     u, v, w = a - places[:, :, None], b - places[:, :, None], b - a
     twice_area = u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]

@@ -1,4 +1,4 @@
-"""Places of the nodes of a line: equal or geometric segments, or segments after a size function; straight lines and arcs."""
+"""Positions of the nodes of a line: equal or geometric segments, or segments by a size function; straight lines and arcs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Curve = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Spacing:
-    """Wanted edge length as a function of the distance from a pole.
+    """Desired edge length as a function of the distance from a pole.
 
     The length is `near` within `plateau` of the pole, then grows linearly to `far` at `reach`, and stays there.
 
@@ -43,29 +43,29 @@ class Spacing:
         return self.near + (self.far - self.near) * ramp
 
     def __call__(self, points: Array) -> Array:
-        """Return the edge length (n,) [length] wanted at `points` (n, 2) [length]."""
+        """Return the desired edge length (n,) [length] at `points` (n, 2) [length]."""
         return self.at_distance(np.hypot(points[:, 0] - self.pole[0], points[:, 1] - self.pole[1]))
 
 
 def segments_for(length: float, size: float) -> int:
-    """Smallest number of equal segments not longer than `size`."""
+    """Return the smallest number of equal segments not longer than `size`."""
     return segments(length / size)
 
 
 def geometric(length: float, first: float, last: float) -> Array:
     """Return relative abscissae (n + 1,) [-] from 0 to 1 of segments in geometric progression.
 
-    The ratio of the last segment to the first is exactly ``last / first``; n is the smallest number for which no
-    segment is longer than wanted, so all are shorter than asked by one common factor. From the sum of a geometric
-    series, S = (last q - first) / (q - 1), the ratio of neighbours is q = (S - first) / (S - last).
+    The ratio of the last segment to the first is exactly ``last / first``; n is the smallest number for which no segment is
+    longer than desired, so all are shorter by one common factor. From the sum of a geometric series,
+    S = (last q - first) / (q - 1), the ratio of neighbours is q = (S - first) / (S - last).
     """
     if first == last:
         return np.linspace(0.0, 1.0, segments_for(length, first) + 1)
     if length <= min(first, last):
         return np.array([0.0, 1.0])
     n = 2
-    if length * (1 - 1e-12) > max(first, last):  # otherwise a segment and a rest of rounding: two do
-        # log(last / first) / log(q), without cancellation where the sizes are nearly the same.
+    if length * (1 - 1e-12) > max(first, last):  # otherwise two segments suffice, up to round-off
+        # log(last / first) / log(q), without cancellation if the sizes are nearly equal.
         ratios = math.log1p((last - first) / first) / math.log1p((last - first) / (length - last))
         n = 1 + segments(ratios)
     abscissa = np.concatenate([[0.0], np.cumsum(np.geomspace(first, last, n))])
@@ -90,19 +90,19 @@ def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
 
 
 def graded(length: float, spacing: Spacing) -> Array:
-    """Return places (n + 1,) [length] from 0 to `length`, their distances after a spacing about 0."""
+    """Return positions (n + 1,) [length] from 0 to `length`, at distances given by a spacing about 0."""
     return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
 
 
 def growing(length: float, first: float, growth: float) -> Array:
-    """Return places (n + 1,) [length] from 0 to `length`: about `first` apart, then each time `growth` times as far."""
+    """Return positions (n + 1,) [length] from 0 to `length`, with distances from about `first`, growing by `growth`."""
     n = segments(np.log1p(length * (growth - 1.0) / first) / np.log(growth))
     places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(n))])
     return np.asarray(length * places / places[-1])
 
 
 def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
-    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-], its ends exact."""
+    """Return points (n, 2) [length] of a straight side at the abscissae `relative` (n,) [-], with exact ends."""
     a, b, s = np.asarray(start, float), np.asarray(end, float), relative[:, None]
     return np.where(s < 1.0, a + s * (b - a), b)
 

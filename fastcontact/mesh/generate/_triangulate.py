@@ -1,6 +1,6 @@
-"""Bodies bounded by named sides that make a convex outline, filled with triangles, without random numbers.
+"""Triangulation of bodies with a convex outline of named sides, without random numbers.
 
-Edges are no longer than a size function. A lattice, or rings about the pole, are a first guess of the inner points.
+Edges are not longer than a size function. A lattice, or rings about the pole, are the first guess of the inner points.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import affordable
@@ -16,20 +17,20 @@ from fastcontact.mesh.generate._smooth import delaunay, edges_of, polish, relax
 from fastcontact.mesh.generate._spacing import Spacing
 from fastcontact.mesh.mesh import Mesh
 
-# Inner points stand closer than the longest edge allowed, since no triangulation has all its edges equal: fractions of it to
-# try one after the other, and the smallest angle [degrees] with which an attempt, or a better one before, is accepted.
+# Inner points are closer than the longest admissible edge, since no triangulation has equal edges: fractions to be tried in
+# turn, and the smallest angle [degrees] at which an attempt, or an earlier better one, is accepted.
 _ATTEMPTS = ((0.84, 35.0), (0.82, 35.0), (0.80, 33.0), (0.78, 31.0), (0.75, 29.0), (0.70, 20.0))
-_ROUNDS = 8  # of adding points where edges are too long
-_AROUND = 3.0  # edge lengths from an added point within which points move
+_ROUNDS = 8  # number of passes that add points where edges are too long
+_AROUND = 3.0  # distance from an added point, in edge lengths, within which points move
 _ROW = np.sqrt(3.0) / 2  # height of an equilateral triangle
-_CLEAR = 0.6  # seeds stay this many edge lengths off the outline
+_CLEAR = 0.6  # smallest distance of seeds from the outline, in edge lengths
 
 
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    The names and the nodes of its `sides` (n, 2) [length] run counter-clockwise, each from the end of the one before.
-    `spacing` gives the longest inner edges.
+    The names and the nodes of its `sides` (n, 2) [length] run counter-clockwise, each from the end of the previous one.
+    `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)
@@ -45,9 +46,9 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
     """Return points (n_points, 2) [length] and triangles (n_triangles, 3), counter-clockwise, that fill a convex polygon.
 
-    The corners of the `outline` (n, 2) [length], counter-clockwise, become the first n points, and no other point lies
-    on it. `spacing` gives the longest edge allowed, at the middle of each inner edge. MeshError if no well-shaped
-    triangulation with edges that short is found.
+    The corners of the `outline` (n, 2) [length], counter-clockwise, are the first n points, and no other point lies on it.
+    `spacing` defines the longest admissible edge, at the middle of each inner edge. Raises MeshError if no well-shaped
+    triangulation with such edges is found.
     """
     best, best_angle = None, 0.0
     for density, good_angle in _ATTEMPTS:
@@ -72,9 +73,7 @@ def smallest_angle(points: Array, triangles: Indices) -> float:
 
 
 def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
-    """Points of a triangulation whose edges are short enough, or None."""
-    from scipy.spatial import cKDTree
-
+    """Return the points of a triangulation whose edges are short enough, or None."""
     n_fixed = len(outline)
     points = np.vstack([outline, inner_seeds(outline, spacing, density)])
     movable = np.arange(len(points)) >= n_fixed
@@ -86,16 +85,16 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
             return points
         points = np.vstack([points, added])
         movable = np.arange(len(points)) >= n_fixed
-        # Only around the new points: elsewhere a good place was found already.
-        near = cKDTree(added).query(points)[0] < _AROUND * spacing(points)
+        # Only around the new points: elsewhere the positions are already good.
+        near = nearest(added, points)[0] < _AROUND * spacing(points)
         points = relax(points, movable & near, spacing, 16)
     return None
 
 
 def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
-    """Middle points (m, 2) of the edges that are too long, the longest only at each point."""
+    """Return the middle points (m, 2) of too long edges, only of the longest at each point."""
     edges = edges_of(delaunay(points))
-    # Sides of the outline are as long as they are, but a chord that cuts a corner off counts.
+    # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
     edges = edges[~side]
     middles = points[edges].mean(axis=1)
@@ -108,7 +107,7 @@ def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Arr
 
 
 def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
-    """Return the triangles if they fill the polygon: Euler's formula counts 2 n_points - 2 - n_outline of them."""
+    """Return the triangles if they fill the polygon: by Euler's formula there are 2 n_points - 2 - n_outline."""
     expected = 2 * n_points - 2 - n_outline
     if len(triangles) != expected:
         raise MeshError(f"the triangulation has {len(triangles)} triangles where {expected} fill the outline")
@@ -117,30 +116,28 @@ def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
 
 def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     """Return points (m, 2) [length] inside a convex `outline` (n, 2) [length], about ``density * spacing`` apart."""
-    from scipy.spatial import cKDTree
-
     low, high = outline.min(axis=0), outline.max(axis=0)
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
-    corners = _apart(_corner_seeds(outline, spacing, density), outline, spacing, density)
+    corners = _spaced(_corner_seeds(outline, spacing, density), outline, spacing, density)
     size = density * spacing(field)
     inside = field[_depth(outline, field) > _CLEAR * size]
     if not len(corners):
         return inside
-    free = cKDTree(corners).query(inside)[0] > 0.7 * density * spacing(inside)
+    free = nearest(corners, inside)[0] > 0.7 * density * spacing(inside)
     return np.vstack([corners, inside[free]])
 
 
-def _apart(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
-    """Return the seeds (m, 2) far enough from the outline and from the seeds before them, where a body is narrow."""
-    kept: list[Array] = []
+def _spaced(seeds: Array, outline: Array, spacing: Spacing, density: float) -> Array:
+    """Return the seeds (m, 2) far enough from the outline and from earlier seeds, where a body is narrow."""
+    accepted: list[Array] = []
     for seed, depth, size in zip(seeds, _depth(outline, seeds), density * spacing(seeds), strict=True):
-        if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in kept):
-            kept.append(seed)
-    return np.array(kept).reshape(-1, 2)
+        if depth > 0.4 * size and all(np.hypot(*(seed - other)) > 0.7 * size for other in accepted):
+            accepted.append(seed)
+    return np.array(accepted).reshape(-1, 2)
 
 
 def _depth(outline: Array, points: Array) -> Array:
-    """Distance (m,) of the points to the nearest side of the convex polygon, negative outside [length]."""
+    """Return the distances (m,) of the points to the nearest side of the convex polygon, negative outside [length]."""
     sides = np.roll(outline, -1, axis=0) - outline
     normals = np.column_stack([-sides[:, 1], sides[:, 0]]) / np.hypot(sides[:, 0], sides[:, 1])[:, None]
     offsets = (normals * outline).sum(axis=1)
@@ -151,7 +148,7 @@ def _depth(outline: Array, points: Array) -> Array:
 
 
 def _corner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
-    """One point on the bisector of each corner of about 90 degrees, so that its angle is halved, not cut off."""
+    """Return a point on the bisector of each corner of about 90 degrees, so that its angle is halved, not cut off."""
     ahead = np.roll(outline, -1, axis=0) - outline
     behind = np.roll(outline, 1, axis=0) - outline
     ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
@@ -164,7 +161,7 @@ def _corner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
 
 
 def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
-    """Equilateral lattice over the box, one row through the pole."""
+    """Return an equilateral lattice over the box, with one row through the pole."""
     size = density * spacing.far
     pole = np.asarray(spacing.pole)
     rows = np.arange(np.floor((low[1] - pole[1]) / (_ROW * size)), np.ceil((high[1] - pole[1]) / (_ROW * size)) + 1)
@@ -176,10 +173,10 @@ def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array
 
 
 def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
-    """Circles around the pole, their distance and the distance of points on them after the spacing.
+    """Return points on circles around the pole, with radial and circumferential distances by the spacing.
 
-    Where the spacing grows in proportion to the distance from the pole this is an equilateral lattice under the
-    conformal map exp, so the triangles stay equilateral.
+    If the spacing is proportional to the distance from the pole this is an equilateral lattice under the conformal map exp,
+    so that the triangles stay equilateral.
     """
     pole = np.asarray(spacing.pole)
     corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]) - pole

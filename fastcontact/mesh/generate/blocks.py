@@ -30,7 +30,7 @@ def block(
     name: str = "BLOCK",
     distortion: float = 0.0,
 ) -> Mesh:
-    """Rectangle in equal cells; in space see `box`.
+    """Rectangle of equal cells; for three dimensions see `box`.
 
     Groups of cells: `name` (all of it), BOTTOM, RIGHT, TOP, LEFT. Groups of points: BOTTOM_LEFT, BOTTOM_RIGHT,
     TOP_RIGHT, TOP_LEFT.
@@ -40,7 +40,7 @@ def block(
     size : (float, float)
         Width and height [length].
     divisions : (int, int)
-        Cells along the width and the height; triangles are halves of them.
+        Cells along the width and the height; triangles are halves of these.
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
         Element of the solid.
     origin : (float, float)
@@ -67,7 +67,7 @@ def block(
 
 
 def _finished(grid: Array, element: str, name: str) -> Mesh:
-    """Mesh of a grid in the wanted element, its sides and corners named."""
+    """Return the mesh of a grid in an element, with named sides and corners."""
     sides = {side: side for side in SIDES}
     mesh = in_element(structured(grid, name, sides, triangles=element in TRIANGLES), element)
     places = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
@@ -75,7 +75,7 @@ def _finished(grid: Array, element: str, name: str) -> Mesh:
 
 
 def _pattern(n: int, m: int) -> Array:
-    """Shifts (n + 1, m + 1, 2) between -1 and 1, without order but the same every time, zero on the sides."""
+    """Return irregular but reproducible shifts (n + 1, m + 1, 2) between -1 and 1, zero on the sides."""
     i, j = np.indices((n + 1, m + 1))
     shift = np.stack([np.sin(5.1 * i + 2.3 * j + 0.7), np.cos(3.7 * i - 4.3 * j)], axis=2)
     shift[0] = shift[-1] = shift[:, 0] = shift[:, -1] = 0.0
@@ -108,7 +108,7 @@ def block_on_block(
     divisions_lower, divisions_upper : (int, int)
         Cells along the widths and the heights.
     shift : float
-        x of the upper block's left side; the lower one's stands at 0. The blocks must face each other [length].
+        x of the left side of the upper block; that of the lower block is 0. The blocks must overlap in x [length].
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
 
@@ -134,7 +134,7 @@ def block_on_block(
 
 
 def _side_name(name: str, body: str, contact: str) -> str:
-    """Name of a block's group once the block is one of two."""
+    """Return the name of a block's group if the block is one of two."""
     if name == contact:
         return f"CONT_{body}"
     return name if name == body else f"{body}_{name}"
@@ -189,7 +189,7 @@ def cylinder_on_block(
 
 
 def _cylinder(element: str, R: float, near: float, far: float) -> Mesh:
-    """Quarter disc above the block, under the cylinder's names."""
+    """Return the quarter disc above the block, with the cylinder's names."""
     if element in TRIANGLES:
         disc = quarter_disc(element, body="upper", R=R, size=far, contact_size=near)
     else:
@@ -207,14 +207,14 @@ _BLOCK_NAMES = {
 
 
 def _graded_block(element: str, width: float, height: float, near: float, far: float) -> Mesh:
-    """Quadrangles whose sides grow geometrically from the pole."""
+    """Return a block of quadrangles whose sides grow geometrically from the pole."""
     x = width * geometric(width, near, far)
     y = -height * geometric(height, near, far)[::-1]
     return renamed(_finished(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
 
 
 def _free_block(element: str, width: float, height: float, spacing: Spacing) -> Mesh:
-    """Triangles whose sides grow with the distance from the pole, as in the cylinder."""
+    """Return a block of triangles whose sides grow with the distance from the pole, as in the cylinder."""
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
     sides = [

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
@@ -16,15 +15,13 @@ from fastcontact.mesh.generate._check import affordable, count, each, number, on
 from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
 
-Indices = NDArray[np.int64]
-
 AXES = "xyz"
-# All nodes of all elements stand on a lattice of four steps a hexahedron: mid nodes of the inner edges of pyramids too.
+# All nodes of all elements are on a lattice of four steps per hexahedron, including mid nodes of the inner edges of pyramids.
 STEPS = 4
 _HEX = elements.get("hex8")
 _CORNERS = ((_HEX.nodes + 1) / 2 * STEPS).astype(np.int64)
-# Corners of the cells that make up a hexahedron, 8 being its centre. Neighbours match: the cuts of opposite faces are
-# the same, shifted.
+# Corners of the cells that make up a hexahedron, 8 being its centre. Neighbours match, because opposite faces are
+# divided in the same way.
 _CUTS = {
     "hex8": [list(range(8))],
     "tet4": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
@@ -85,7 +82,7 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     affordable(float(np.prod(shape, dtype=float)) * len(_CUTS[solid.linear]))
     corners = np.vstack([_CORNERS, _CORNERS.mean(axis=0, keepdims=True).astype(np.int64)])
     local = solid.corner_shape(solid.nodes) @ corners[_CUTS[solid.linear]]
-    # One number for each place of the lattice; they add up.
+    # One number for each lattice point, by summation over the axes.
     n_y, n_z = STEPS * shape[1:] + 1
     weights = np.array([n_y * n_z, n_z, 1])
     first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights

@@ -1,4 +1,4 @@
-"""Cut a mesh open along a group of facets inside of it, as the pretension section of a bolt needs."""
+"""Cutting of a mesh along a group of internal facets, as for the pretension section of a bolt."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Facet = frozenset[int]
 
 @typed(MeshError)
 def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
-    """Return the mesh cut open along a group of facets: both sides get nodes of their own, at the same places.
+    """Return the mesh cut along a group of facets: both sides get separate nodes at the same positions.
 
     Parameters
     ----------
@@ -28,19 +28,19 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     group : str
         Facets between solids, through a whole body: the cut ends at its surface.
     normal : sequence of float (dim,), optional
-        The side it points to gets the new nodes [-]. By default across the plane that fits the facets best, with its largest
-        component positive.
+        Direction to the side that gets the new nodes [-]. By default the normal of the plane fitted to the facets,
+        with its largest component positive.
 
     Returns
     -------
     Mesh
-        `group` are the facets of the old side, ``"<group> opposite"`` those of the new one, in the same order. New nodes
-        belong to the groups of points of the old ones; facets on the new side follow their solids.
+        `group` holds the facets of the old side, ``"<group> opposite"`` those of the new one, in the same order. New
+        nodes belong to the point groups of the old ones; facets on the new side follow their solids.
 
     Raises
     ------
     MeshError
-        If there is no such group of facets, if some do not lie between two solids, or if the cut ends inside of a body.
+        If there is no such group of facets, if some do not lie between two solids, or if the cut ends inside a body.
 
     Examples
     --------
@@ -87,7 +87,7 @@ def _sides(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
 def _cells_beyond(
     mesh: Mesh, group: str, section: set[Facet], points: Numbers, direction: Array
 ) -> dict[str, list[int]]:
-    """Return by element the solids at a section that lie beyond it, where `direction` points."""
+    """Return the solids at a section on the side to which `direction` points, by element."""
     touched = np.zeros(mesh.n_points, bool)
     touched[points] = True
     number: dict[tuple[str, int], int] = {}
@@ -109,7 +109,7 @@ def _cells_beyond(
     cells: dict[str, list[int]] = {}
     for (name, row), body, centre in zip(number, component, middle, strict=True):
         nodes = mesh.cells[name][row]
-        at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # of a cell that touches the section in an edge or a node
+        at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # for a cell that touches the section in an edge or a node
         if side.get(int(body), bool((centre - at) @ direction > 0)):
             cells.setdefault(name, []).append(row)
     return cells
@@ -118,7 +118,7 @@ def _cells_beyond(
 def _sides_of_parts(
     mesh: Mesh, group: str, between: dict[Facet, list[int]], component: Numbers, middle: Array, direction: Array
 ) -> dict[int, bool]:
-    """Return by part of the cells at a section whether it lies beyond it; MeshError if one lies on both sides."""
+    """Return whether each part of the cells at a section lies beyond it; MeshError if one lies on both sides."""
     side: dict[int, bool] = {}
     for facet, pair in between.items():
         here, there = sorted(pair, key=lambda cell: float(middle[cell] @ direction))
@@ -135,7 +135,7 @@ def _sides_of_parts(
 def _opened(
     mesh: Mesh, group: str, section: set[Facet], facets: dict[str, Numbers], beyond: dict[str, list[int]], new: Numbers
 ) -> Mesh:
-    """Return the mesh with the `new` nodes (n_points,), -1 where there are none, in the cells beyond."""
+    """Return the mesh with the `new` nodes (n_points,), -1 where there are none, in the cells beyond the section."""
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
     moved = [_with_nodes(cells, name, np.array(rows), new) for name, rows in beyond.items()]
     outer = {facet for sides in moved for facet in sides} - section
@@ -161,7 +161,7 @@ def _opened(
 
 
 def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new: Numbers) -> list[Facet]:
-    """Give some cells of an element the new nodes, in place; return their facets as they were, none of facets themselves."""
+    """Replace the nodes of some cells of an element by the new ones, in place; return the old facets of solid cells."""
     if not len(rows):
         return []
     block = cells[name][rows]

@@ -1,8 +1,8 @@
-"""Local refinement of 2D meshes: triangles and quadrangles are divided in four where wanted, and their neighbours adapted.
+"""Local red-green refinement of 2D meshes of triangles and quadrangles.
 
-A forest holds every cell of a first mesh and its descendants; the cells without descendants are its leaves. Marked leaves are
-divided in four ("red"). Neighbours of smaller leaves are divided in the mesh, but not in the forest ("green": Bank, Sherman
-and Weiser, 1983), so that angles do not deteriorate however often one refines.
+A forest contains every cell of an initial mesh and its descendants; cells without descendants are its leaves. Marked
+leaves are divided in four ("red"). Neighbours of smaller leaves are divided in the mesh, but not in the forest ("green":
+Bank, Sherman and Weiser, 1983), so that angles do not deteriorate with repeated refinement.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RED = {
     "tri3": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]],
     "quad4": [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]],
 }
-# Cells for the mesh where edge 0 (or edges 0 and 2) of a cell, turned so, are divided.
+# Cells of the mesh if edge 0 (or edges 0 and 2) of a cell, rotated accordingly, are divided.
 GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
     ("tri3", 1): {"tri3": [[0, 3, 2], [3, 1, 2]]},
     ("quad4", 1): {"tri3": [[0, 4, 3], [4, 1, 2], [4, 2, 3]]},
@@ -37,7 +37,7 @@ GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
 
 @dataclass(eq=False)
 class _Leaves:
-    """Leaves of one kind: corners (n, k), and the cell of the first mesh that each descends from."""
+    """Leaves of one kind: corners (n, k), and the cell of the initial mesh from which each descends."""
 
     corners: AnyArray
     root: AnyArray
@@ -45,16 +45,16 @@ class _Leaves:
 
 @typed(MeshError)
 class Forest:
-    """A mesh that can be refined locally, as often as wanted.
+    """A mesh that can be refined locally any number of times.
 
-    MeshError if a cell is of another kind, or a curve's group has no facet on the curve.
+        MeshError if a cell is of another type, or the group of a curve has no facet on the curve.
 
     Parameters
     ----------
     mesh : Mesh
         Two-dimensional: line2, tri3, quad4.
     curves : iterable of Curve
-        True shapes of the boundary: new points on facets that lie on a curve are put on it.
+        Exact shapes of the boundary: new points of facets on a curve are moved onto it.
 
     Examples
     --------
@@ -78,14 +78,14 @@ class Forest:
             name: _Leaves(block.astype(np.int64), mesh.offsets[name] + np.arange(len(block)))
             for name, block in mesh.cells.items()
         }
-        # Ends of divided edges as one number each, sorted, and the points in their middle.
+        # Keys of divided edges, sorted, and their middle points.
         self._divided, self._middle = np.empty(0, np.int64), np.empty(0, np.int64)
         self._groups = {group: np.asarray(members) for group, members in mesh.point_groups.items()}
         self._on_curve = [edges_on(mesh, curve) for curve in self.curves]
 
     @property
     def solids(self) -> list[str]:
-        """Kinds of solid leaves, in the order in which `refine` takes their marks."""
+        """Element types of the solid leaves, in the order of the marks of `refine`."""
         return [name for name in self._leaves if name != "line2"]
 
     @property
@@ -94,12 +94,12 @@ class Forest:
         return sum(len(self._leaves[name].corners) for name in self.solids)
 
     def refine(self, marked: Mask) -> None:
-        """Divide the marked solid leaves in four, and others so that no edge is divided more than once on one side.
+        """Divide the marked solid leaves in four, and others so that neighbours differ by at most one level.
 
         Parameters
         ----------
         marked : ndarray of bool (n_leaves,)
-            By kind as in `solids`, leaves of one kind in the order of `mesh()`'s origins.
+            By element type as in `solids`; leaves of one type in the order of the origins of `mesh()`.
         """
         starts = np.cumsum([0, *(len(self._leaves[name].corners) for name in self.solids)])
         marks = {name: marked[a:b] for name, a, b in zip(self.solids, starts[:-1], starts[1:], strict=True)}
@@ -110,14 +110,14 @@ class Forest:
         self._halve_lines()
 
     def _middles(self, keys: AnyArray) -> AnyArray:
-        """Points in the middle of edges, -1 where an edge is not divided."""
+        """Return the middle points of edges, -1 where an edge is not divided."""
         if not len(self._divided):
             return np.full(keys.shape, -1)
         index = np.minimum(np.searchsorted(self._divided, keys), len(self._divided) - 1)
         return np.where(self._divided[index] == keys, self._middle[index], -1)
 
     def _divide(self, keys: AnyArray) -> None:
-        """Put a point in the middle of edges that have none yet."""
+        """Add a point in the middle of edges without one."""
         new = np.setdiff1d(keys, self._divided)
         if not len(new):
             return
@@ -155,7 +155,7 @@ class Forest:
         )
 
     def _too_coarse(self, name: str) -> Mask:
-        """Return the leaves (n,) that green division cannot adapt: an edge is divided twice, or too many edges are."""
+        """Return the leaves (n,) that green division cannot adapt: with an edge divided twice, or too many divided edges."""
         corners = self._leaves[name].corners
         keys = edges_of(name, corners)
         middles = self._middles(keys)
@@ -182,7 +182,8 @@ class Forest:
     def mesh(self) -> tuple[Mesh, AnyArray]:
         """Return the mesh of all leaves, and the leaf (n,) of each of its solid cells, in the order of `Mesh.solids`.
 
-        Groups of cells hold the descendants of their cells; a new point joins the groups that hold both ends of its edge.
+        Cell groups contain the descendants of their cells; a new point belongs to the point groups of both ends of its
+        edge.
         """
         blocks: dict[str, list[AnyArray]] = {}
         roots: dict[str, list[AnyArray]] = {}
@@ -202,7 +203,7 @@ class Forest:
         return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
 
     def _fitted(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
-        """Return kinds, cells and their leaves: whole, or divided (green) where their edges are."""
+        """Return kinds, cells and their leaves: undivided, or divided (green) if their edges are."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]
         middles = self._middles(edges_of(name, corners))

@@ -1,4 +1,4 @@
-"""Blocks that stand for half planes and half spaces: under an indenter, under a flat punch, crowned against each other."""
+"""Blocks that represent half planes and half spaces: under an indenter, under a flat punch, crowned against each other."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ def graded_block(
 ) -> Mesh:
     """Block under an indenter: x >= 0, and y >= 0 in three dimensions, its top at height 0, finest at the origin.
 
-    It stands for a half plane or half space in contact with a rigid obstacle: with 8 contact radii of width and depth the
-    pressure is wrong by a few thousandths. The height is the last coordinate, as for obstacles. Groups of cells: BLOCK, TOP,
-    CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three dimensions, SYMMETRY_Y
-    (y = 0). Group of points: POLE (the origin).
+    It represents a half plane or half space in contact with a rigid obstacle: with a width and depth of 8 contact
+    radii the error of the pressure is a few thousandths. The height is the last coordinate, as for obstacles. Groups
+    of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three
+    dimensions, SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def graded_block(
 def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
-    # Grid lines rarely stand at the radius itself: up to the first one not short of it.
+    # Up to the first grid line at or beyond the radius.
     edges = np.array(
         [places[places >= min(radius, places[-1]) * (1 - 1e-9)][0] for places, radius in zip(lines, radii)]
     )
@@ -108,9 +108,9 @@ def punched_block(
 ) -> Mesh:
     """Block under a flat punch, the half x >= 0, its top at y = 0, finest at the punch's edge.
 
-    A grid line stands at the edge. The body stands for a half plane or half space: its far sides change the results by about
-    `punch_radius` over `extent`, in plane problems by twice as much. Groups of cells: BLOCK, TOP, PUNCHED (the top under the
-    punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points: POLE (the origin) and EDGE.
+    A grid line passes through the edge. The body represents a half plane or half space: its finite size changes the
+    results by about `punch_radius` over `extent`, in plane problems by twice as much. Groups of cells: BLOCK, TOP,
+    PUNCHED (the top under the punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points: POLE (the origin) and EDGE.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def punched_block(
     edge_size : float, optional
         Edges at the punch's edge and below the whole top, punch_radius/200 by default [length].
     growth : float
-        Length of an edge over that of its neighbour nearer to the punch's edge, more than 1.
+        Ratio of the lengths of adjacent edges away from the punch's edge, more than 1.
 
     Examples
     --------
@@ -133,14 +133,14 @@ def punched_block(
     """
     one_of("element", element, QUADRANGLES)
     radius = positive("punch_radius", punch_radius)
-    whole, rate = positive("extent", extent), growth_of("growth", growth)
-    if whole < 2 * radius:
-        raise MeshError(f"extent = {whole:g} is out of range: it must be at least 2 punch_radius = {2 * radius:g}")
+    width, rate = positive("extent", extent), growth_of("growth", growth)
+    if width < 2 * radius:
+        raise MeshError(f"extent = {width:g} is out of range: it must be at least 2 punch_radius = {2 * radius:g}")
     size = radius / 200 if edge_size is None else positive("edge_size", edge_size, radius, "punch_radius")
-    inward, outward = growing(radius, size, rate), growing(whole - radius, size, rate)
+    inward, outward = growing(radius, size, rate), growing(width - radius, size, rate)
     x = np.concatenate([radius - inward[::-1], radius + outward[1:]])
-    x[0], x[-1] = 0.0, whole
-    mesh = on_lines(element, [x, -growing(whole, size, rate)[::-1]])
+    x[0], x[-1] = 0.0, width
+    mesh = on_lines(element, [x, -growing(width, size, rate)[::-1]])
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | _NAMES_2D)
     mesh = with_cells_inside(mesh, "PUNCHED", "TOP", lambda points: points[:, 0] <= radius)
     return with_points_at(mesh, {"POLE": (0.0, 0.0), "EDGE": (radius, 0.0)})
@@ -158,10 +158,10 @@ def crowned_blocks(
 ) -> Mesh:
     """Two blocks above each other whose facing sides are parabolas of radius R that touch at the origin.
 
-    Both represent half planes. They are whole, x < 0 as well, for tangential loads, and mirror each other, so that nodes
-    match and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER,
-    CONT_UPPER (their facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of
-    points: POLE_LOWER, POLE_UPPER (two points at the origin).
+    Both represent half planes. They include x < 0, for tangential loads, and mirror each other, so that nodes match
+    and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER, CONT_UPPER (their
+    facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of points: POLE_LOWER,
+    POLE_UPPER (two points at the origin).
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def crowned_blocks(
     contact_size : float
         That length [length].
     growth : float
-        Length of an edge beyond over that of its neighbour nearer to the origin, more than 1.
+        Ratio of the lengths of adjacent edges beyond, more than 1.
 
     Examples
     --------
@@ -186,15 +186,15 @@ def crowned_blocks(
     False
     """
     one_of("element", element, QUADRANGLES)
-    R, whole, rate = positive("R", R), positive("extent", extent), growth_of("growth", growth)
-    if whole > R:
-        raise MeshError(f"extent = {whole:g} is out of range: it must be at most R = {R:g}")
-    fine = positive("contact_radius", contact_radius, whole / 2, "extent/2")
+    R, width, rate = positive("R", R), positive("extent", extent), growth_of("growth", growth)
+    if width > R:
+        raise MeshError(f"extent = {width:g} is out of range: it must be at most R = {R:g}")
+    fine = positive("contact_radius", contact_radius, width / 2, "extent/2")
     size = positive("contact_size", contact_size, fine, "contact_radius")
-    right, down = _lines(size, fine, whole, rate), _lines(size, size, whole, rate)
+    right, down = _lines(size, fine, width, rate), _lines(size, size, width, rate)
     lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     across, up = lattice.points.T
-    crown = across**2 / (2 * R) * (1 + up / whole)  # fades away downward
+    crown = across**2 / (2 * R) * (1 + up / width)  # decays downward
     lower = renamed(lattice.replace(points=np.column_stack([across, up - crown])), _NAMES_CROWNED.get)
     lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
     lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})
@@ -203,6 +203,6 @@ def crowned_blocks(
 
 
 def _lines(size: float, fine: float, length: float, growth: float) -> Array:
-    """Return places (n + 1,) [length] from 0 to `length`: about `size` apart up to `fine`, then growing."""
+    """Return positions (n + 1,) [length] from 0 to `length`: about `size` apart up to `fine`, then growing."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
     return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])

@@ -38,8 +38,8 @@ def half_spheres(
     """Two half-spheres that touch at the origin, each a quarter disc in the (r, y) plane.
 
     The lower body has its centre at A1 = (0, -R), the end of its flat edge at B1 = (R, -R), its pole at C1 = (0, 0)
-    and D1 half-way along the arc; the upper body is its mirror image in y = 0. The poles C1 and C2 are two points
-    at one place. Nothing is random: equal arguments give equal meshes.
+    and D1 half-way along the arc; the upper body is its mirror image in y = 0. The poles C1 and C2 are two points at
+    the same position. Equal arguments give equal meshes.
 
     Groups of cells: SPHBAS, SPHHAU (lower, upper body), A1A2 (axis of both), A1B1, A2B2 (flat edges), CONT1, CONT2
     (arcs C1-D1, C2-D2), D1B1, D2B2 (the rest of the arcs). Groups of points: A1 B1 C1 D1 A2 B2 C2 D2; with
@@ -48,8 +48,8 @@ def half_spheres(
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Triangles fill the discs freely; quadrangles stand in three blocks per body. The middle nodes of quadratic
-        elements lie on the circle.
+        Triangles form an unstructured mesh, quadrangles three structured blocks per body. The mid-side nodes of
+        quadratic elements lie on the circle.
     R : float
         Radius [length].
     size, contact_size : float, optional
@@ -59,7 +59,7 @@ def half_spheres(
         Triangles only: distance from the pole up to which `contact_size` holds, 0 by default [length].
     arc_sizes : (float, float), optional
         Quadrangles only: segments of the arc at its pole and at D, in geometric progression between; R/250 and R/25 by
-        default. The number of segments is whole, so both are shorter in the end by one common factor [length].
+        default. Both are reduced by a common factor so that the number of segments is an integer [length].
     segments : int, optional
         Quadrangles only: segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and P-B;
         15 by default.
@@ -100,7 +100,7 @@ def quarter_disc(
     element, R, size, contact_size, contact_radius, arc_sizes, segments, radial_sizes
         As for `half_spheres`.
     body : {"lower", "upper"}
-        Which one.
+        The body to generate.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def quarter_disc(
 
 
 def _corners(R: float) -> dict[str, tuple[float, float]]:
-    """Corners of the lower body; D by the same formula as the nodes of the arc."""
+    """Return the corners of the lower body; D by the same formula as the nodes of the arc."""
     x, y = arc((0.0, -R), R, np.array([0.25 * math.pi]))[0]
     return {"A1": (0.0, -R), "B1": (R, -R), "C1": (0.0, 0.0), "D1": (float(x), float(y))}
 
@@ -140,7 +140,7 @@ def _spacing(R: float, size: float | None, contact_size: float | None, contact_r
 
 
 def _of_triangles(R: float, spacing: Spacing) -> Mesh:
-    """Lower body in tri3."""
+    """Return the lower body in tri3."""
     corners, right, half = _corners(R), 0.5 * math.pi, 0.25 * math.pi
     sides = [
         ("A1B1", divided(lambda s: straight(corners["A1"], corners["B1"], s), R, spacing)),
@@ -154,7 +154,7 @@ def _of_triangles(R: float, spacing: Spacing) -> Mesh:
 def _of_quadrangles(
     R: float, arc_sizes: tuple[float, float] | None, segments: int | None, radial_sizes: tuple[float, float] | None
 ) -> Mesh:
-    """Lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
+    """Return the lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
     n = 15 if segments is None else count("segments", segments)
     length = 0.25 * math.pi * R
     near, far = (
@@ -172,7 +172,7 @@ def _of_quadrangles(
 
 
 def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
-    """Lower body from the relative abscissae along C-D, along M-C and along the equally divided sides."""
+    """Return the lower body for relative abscissae along C-D, along M-C and along the equally divided sides."""
     places = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
     def line(start: str, end: str, relative: Array) -> Array:

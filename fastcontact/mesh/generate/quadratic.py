@@ -1,4 +1,4 @@
-"""Linear meshes made quadratic, mid nodes on the true curves."""
+"""Conversion of linear to quadratic meshes, with mid nodes on the true curves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import outer_facets
 
-# Nodes this near to a curve, relative to their edge, lie on it.
+# Nodes at a smaller distance from a curve than this, relative to their edge, lie on it.
 ON_CURVE = 1e-6
 _WITH_CENTRE = {"quad8": "quad9"}
 
@@ -43,11 +43,9 @@ class Circle:
     Parameters
     ----------
     centre : (float, float)
-        [length].
-    radius : float
-        Greater than 0 [length].
+        Centre [length]. radius : float Greater than 0 [length].
     group : str, optional
-        Group of facets that lie on it; by default all outer facets whose ends do.
+        Group of facets that lie on it; by default all outer facets whose ends lie on it.
 
     Examples
     --------
@@ -72,7 +70,7 @@ class Circle:
         """Return the points (n, 2) [length] of the circle nearest to `points` (n, 2) [length]."""
         arms = points - np.asarray(self.centre)
         length = np.hypot(arms[:, 0], arms[:, 1])
-        # The centre itself has no nearest point: it stays, far from the circle.
+        # The centre itself has no nearest point: it is not moved.
         return np.asarray(self.centre) + arms * (self.radius / np.where(length > 0.0, length, 1.0))[:, None]
 
 
@@ -80,17 +78,17 @@ class Circle:
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
     """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 
-    A mid node stands half-way between its ends, but on the curve where the edge belongs to a facet of the curve's group
-    and both its ends lie on the curve. Points keep their numbers, mid nodes follow, then centre nodes. MeshError if a
-    cell is quadratic already, `centre_nodes` is given for a 3D mesh, a curve's group has no edge on the curve, or a cell
-    is folded by its curved side (its Jacobian is not positive at a quadrature point).
+    A mid node lies half-way between the ends of its edge, or on the curve if the edge belongs to a facet of the
+    curve's group and both ends lie on the curve. Points keep their numbers; mid nodes follow, then centre nodes.
+    MeshError if a cell is quadratic already, `centre_nodes` is given for a 3D mesh, the group of a curve has no edge
+    on the curve, or a curved side makes the Jacobian of a cell nonpositive at a quadrature point.
 
     Parameters
     ----------
     mesh : Mesh
         Cells of linear elements.
     curves : iterable of Curve
-        True shapes of the boundary, for example `Circle`.
+        Exact shapes of the boundary, for example `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
 
@@ -133,7 +131,7 @@ def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
 
 
 def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
-    """Quadratic element of each element of the mesh."""
+    """Return the quadratic element of each element of the mesh."""
     if centre_nodes and mesh.dim != 2:
         raise MeshError("centre_nodes is for 2D meshes: leave it out, and cells get mid nodes on their edges only")
     names = {}
@@ -146,7 +144,7 @@ def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
 
 
 def edge_keys(ends: AnyArray) -> AnyArray:
-    """Return one number for each edge (...), the same from either end, by its `ends` (..., 2) of int."""
+    """Return a key for each edge (...), independent of its direction, from its `ends` (..., 2) of int."""
     return (ends.min(axis=-1).astype(np.int64) << 32) | ends.max(axis=-1)
 
 
@@ -161,7 +159,7 @@ def edges_of(name: str, cells: AnyArray) -> AnyArray:
 
 
 def _edges(cells: Mapping[str, AnyArray]) -> AnyArray:
-    """Sorted keys of the edges of all cells, each once."""
+    """Return the sorted keys of the edges of all cells, each once."""
     keys = [edges_of(name, block).ravel() for name, block in cells.items()]
     return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
 
@@ -193,6 +191,6 @@ def all_on(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
 def centres(corners: Array, middles: Array) -> Array:
     """Return the centres (n, dim) [length] of curved quadrangles, by the eight-node shape functions.
 
-    From their `corners` (n, 4, dim) [length] and `middles` (n, 4, dim) [length] of their sides.
+    `corners` (n, 4, dim) [length] are their corners, `middles` (n, 4, dim) [length] the middles of their sides.
     """
     return 0.5 * middles.sum(axis=1) - 0.25 * corners.sum(axis=1)

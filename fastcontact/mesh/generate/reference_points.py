@@ -1,4 +1,4 @@
-"""Reference points: points of a mesh without cells, each with another one for its rotation."""
+"""Reference points: points of a mesh without cells, each with a second one for its rotation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
     ----------
     mesh : Mesh
     places : mapping of str to array_like (dim,)
-        Where each stands, by name [length].
+        Position of each reference point by name [length].
 
     Returns
     -------
@@ -32,7 +32,7 @@ def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
     Raises
     ------
     MeshError
-        If a name is taken, or a place is no place of the space.
+        If a name exists already, or a position has the wrong dimension or is not finite.
 
     Examples
     --------

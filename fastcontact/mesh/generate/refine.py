@@ -1,4 +1,4 @@
-"""Uniform refinement of a 2D mesh: every cell into two or four of its own kind, boundaries kept on their curves."""
+"""Uniform refinement of a 2D mesh: every cell into two or four of the same kind, boundaries kept on their curves."""
 
 from __future__ import annotations
 
@@ -8,42 +8,28 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.generate.forest import RED
 from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on, facets_of
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-# Corners of the children in the reference cell, each child turned like its parent.
-_CHILDREN = {
-    "line2": [[[-1.0], [0.0]], [[0.0], [1.0]]],
-    "tri3": [
-        [[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]],
-        [[0.5, 0.0], [1.0, 0.0], [0.5, 0.5]],
-        [[0.0, 0.5], [0.5, 0.5], [0.0, 1.0]],
-        [[0.5, 0.5], [0.0, 0.5], [0.5, 0.0]],
-    ],
-    "quad4": [
-        [[-1.0, -1.0], [0.0, -1.0], [0.0, 0.0], [-1.0, 0.0]],
-        [[0.0, -1.0], [1.0, -1.0], [1.0, 0.0], [0.0, 0.0]],
-        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]],
-        [[-1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [-1.0, 1.0]],
-    ],
-}
+# Quadratic elements whose nodes are the corners of the children that `RED` names, each child turned like its parent.
+_LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
 # A line that turns by more than this from one node to the next does not count as a circle.
 _TURN = np.pi / 5
 
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """How cells of one element are divided: the points of the children, the parent's own nodes first.
+    """Division of the cells of one element: the points of the children, the parent's nodes first.
 
-    `shape` (m, n_nodes) has the shape functions of the parent at these points, `children` (n_children, n_nodes) their
-    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its begin.
+    `shape` (m, n_nodes) are the shape functions of the parent at these points, `children` (n_children, n_nodes) their
+    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its start.
     """
 
     shape: Array
@@ -55,12 +41,12 @@ class _Pattern:
 @cache
 def _pattern(name: str) -> _Pattern:
     element = elements.get(name)
-    if element.linear not in _CHILDREN:
+    if element.linear not in _LATTICE:
         raise MeshError(f"cells of {name} cannot be refined: only lines, triangles and quadrangles are divided here")
     points = [tuple(node) for node in element.nodes.tolist()]
     children = []
-    for corners in _CHILDREN[element.linear]:
-        places = element.corner_shape(element.nodes) @ np.array(corners)
+    for corners in elements.get(_LATTICE[element.linear]).nodes[RED[element.linear]]:
+        places = element.corner_shape(element.nodes) @ corners
         child = []
         for fraction_of_edge in np.round(places * 8.0).tolist():  # eighths are exact
             node = tuple(x / 8.0 for x in fraction_of_edge)
@@ -83,17 +69,18 @@ def _pattern(name: str) -> _Pattern:
 def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     """Return the mesh with every line divided in two and every triangle and quadrangle in four.
 
-    New points stand where the parent's shape functions put them; on a curve if they belong to a facet of the curve's
-    group all of whose nodes lie on it. Points keep their numbers. Cell groups hold the children of their cells; a new
-    point joins every point group that holds all nodes of its edge (or, inside a cell, of the cell). MeshError if a cell
-    is of another kind, a curve's group has no facet on the curve, or a child is folded by its curved side.
+    New points are interpolated by the shape functions of the parent cell, or lie on a curve if they belong to a facet
+    of the curve's group with all nodes on the curve. Points keep their numbers. Cell groups contain the children of
+    their cells; a new point belongs to every point group that holds all nodes of its edge (or, inside a cell, of the
+    cell). MeshError if a cell is of another type, the group of a curve has no facet on the curve, or a curved side
+    makes a child invalid.
 
     Parameters
     ----------
     mesh : Mesh
         Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
     curves : iterable of Curve
-        True shapes of the boundary, for example `Circle`; see also `circles`.
+        Exact shapes of the boundary, for example `Circle`; see also `circles`.
 
     Examples
     --------
@@ -116,11 +103,11 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
 
 
 class _NewPoints(NamedTuple):
-    """The points of a refined mesh that its parent has not, in the order of their keys: those on edges before others.
+    """The new points of a refined mesh, in the order of their keys: those on edges before others.
 
-    `keys` (n,) are the same for all cells that share a point; `sources` are name of an element, number of a point of its
-    lattice, rows of cells, and the numbers of the points that they have there; `lattices` (n_cells, n_lattice) hold the
-    points of every cell by element.
+    `keys` (n,) are equal for all cells that share a point; `sources` are the name of an element, the number of a point of its
+    lattice, rows of cells, and the numbers of their points there; `lattices` (n_cells, n_lattice) are the points of
+    every cell by element.
     """
 
     keys: AnyArray
@@ -139,7 +126,7 @@ def _new_points(mesh: Mesh) -> _NewPoints:
             edge = pattern.on_edge[point]
             if edge >= 0:
                 codes.append(_keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.along[point]), mesh.n_points))
-            else:  # each cell has its own
+            else:  # one for each cell
                 codes.append(inside + np.arange(len(block)))
                 inside += len(block)
             places.append((name, point))
@@ -155,20 +142,20 @@ def _new_points(mesh: Mesh) -> _NewPoints:
 
 
 def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
-    """One number for a point on the edge from a to b, the same from either end."""
+    """Return a key for a point on the edge from a to b, independent of its direction."""
     from_least = np.where(a < b, quarters, 4 - quarters)
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
 
 
 def _edge_nodes(name: str) -> list[list[int]]:
-    """Local nodes of each edge, corners first."""
+    """Return the local nodes of each edge, corners first."""
     element = elements.get(name)
     middle = [[element.n_corners + k] if element.order == 2 else [] for k in range(len(element.edges))]
     return [[*edge, *middle[k]] for k, edge in enumerate(element.edges)]
 
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
-    """Facets of the curve's group, block by block, all of whose nodes lie on the curve."""
+    """Return the facets of the curve's group, block by block, whose nodes all lie on the curve."""
     facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, facets)):
         where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
@@ -177,14 +164,14 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
 
 
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
-    """Numbers of the new points on the facets that lie on the curve."""
+    """Return the numbers of the new points on the facets that lie on the curve."""
     ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
     wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
     return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
 
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
-    """Children of each group's cells: those of one cell follow one another."""
+    """Return the children of each group's cells, which are consecutive for each cell."""
     pieces, start = {}, 0
     for name, first in mesh.offsets.items():
         pieces[name] = (first, start, len(_pattern(name).children))
@@ -192,8 +179,8 @@ def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     groups: dict[str, AnyArray] = {}
     for group, members in mesh.cell_groups.items():
         rows = mesh.split(members)
-        parts = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
-        groups[group] = np.concatenate(parts) if parts else np.empty(0, np.int64)
+        cells = [pieces[n][1] + (r[:, None] * pieces[n][2] + np.arange(pieces[n][2])).ravel() for n, r in rows.items()]
+        groups[group] = np.concatenate(cells) if cells else np.empty(0, np.int64)
     return groups
 
 
@@ -213,9 +200,9 @@ def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
 
 @typed(MeshError)
 def linearised(mesh: Mesh) -> Mesh:
-    """Return the mesh on its corners alone: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
+    """Return the linear mesh on the corners: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
 
-    Points that no cell uses any more are dropped; the others keep their order.
+    Points that no cell uses any more are removed; the others keep their order.
 
     Examples
     --------
@@ -231,11 +218,11 @@ def linearised(mesh: Mesh) -> Mesh:
         used[block] = True
     number = np.cumsum(used) - 1
     merged: dict[str, AnyArray] = {}
-    order: list[NDArray[np.int64]] = []
+    order: list[Indices] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
-        parts = [name for name in cells if elements.get(name).linear == linear]
-        merged[linear] = number[np.concatenate([cells[name] for name in parts])]
-        order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in parts]
+        names = [name for name in cells if elements.get(name).linear == linear]
+        merged[linear] = number[np.concatenate([cells[name] for name in names])]
+        order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in names]
     order_of_cells = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
     return Mesh(
         mesh.points[used],
@@ -247,10 +234,10 @@ def linearised(mesh: Mesh) -> Mesh:
 
 @typed(MeshError)
 def circles(mesh: Mesh) -> list[Circle]:
-    """Return the circles on which groups of outer facets lie, one a group, so that `refined` can keep to them.
+    """Return the circles on which groups of outer facets lie, one per group, for use in `refined`.
 
-    A circle through the nodes is found by least squares. It counts if all nodes lie on it to rounding, there are more than
-    three, and the line turns gently: four corners of a square lie on a circle, too.
+    A circle is fitted to the nodes by least squares. It is accepted if more than three nodes lie on it up to round-off
+    and the line has no sharp corners, since the corners of a square lie on a circle, too.
 
     Examples
     --------

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.errors import MeshError
@@ -14,8 +13,6 @@ from fastcontact.mesh.generate._check import FACES, TRIANGLES, affordable, count
 from fastcontact.mesh.generate.quadratic import Circle, in_element
 from fastcontact.mesh.generate.transform import union
 from fastcontact.mesh.mesh import Mesh
-
-Array = NDArray[np.float64]
 
 
 @typed(MeshError)
@@ -30,14 +27,14 @@ def rings(
 ) -> Mesh:
     """Quarter of two rings that touch at the interface radius, centred at the origin, x >= 0 and y >= 0.
 
-    The rings fit without play: give their contact a ``clearance`` below 0 for an interference. Groups of cells: INNER,
-    OUTER, CONT_INNER, CONT_OUTER (both sides of the interface), BORE, RIM, SYMMETRY_X (x = 0 of both), SYMMETRY_Y
-    (y = 0 of both).
+    The rings fit without clearance: for an interference, give their contact a negative ``clearance``. Groups of cells:
+    INNER, OUTER, CONT_INNER, CONT_OUTER (both sides of the interface), BORE, RIM, SYMMETRY_X (x = 0 of both),
+    SYMMETRY_Y (y = 0 of both).
 
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Element of both solids; mid nodes of curved sides stand on their circles.
+        Element of both solids; mid nodes of curved sides lie on their circles.
     inner_radius, interface_radius, outer_radius : float
         Increasing [length].
     divisions_inner, divisions_outer : (int, int)

@@ -1,4 +1,4 @@
-"""A sphere on a block in three dimensions, a quarter of both: boxes mapped on their shapes."""
+"""A sphere on a block in three dimensions, a quarter of both: mapped boxes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from fastcontact.mesh.quality import check_cells
 
 Map = Callable[[Array, Array, Array], Array]
 
-# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would stand outside it.
+# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would lie outside it.
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 
-# Middle of the faces of the inner block over the radius, and how far its faces bulge from a cube to a ball.
+# Position of the middle of the inner block's faces over the radius, and their bulge between cube (0) and ball (1).
 INNER, BULGE = 0.45, 0.5
 
 
@@ -39,9 +39,9 @@ def sphere_on_block(
 ) -> Mesh:
     """Lower half of a sphere on a block, the quarter x >= 0, z >= 0 of both.
 
-    The sphere touches the block at the origin, its centre stands at (0, R, 0). The meshes do not match; both are
-    finest at the contact. Groups of cells: SPHERE, BLOCK, SYMMETRY_X, SYMMETRY_Z (x = 0 and z = 0 of both), SPHERE_TOP
-    (y = R), CONT_SPHERE (around the pole, up to 45 degrees along x and along z), SPHERE_SIDE (the rest of the sphere),
+    The sphere touches the block at the origin; its centre is (0, R, 0). The meshes do not match; both are finest at
+    the contact. Groups of cells: SPHERE, BLOCK, SYMMETRY_X, SYMMETRY_Z (x = 0 and z = 0 of both), SPHERE_TOP (y = R),
+    CONT_SPHERE (around the pole, up to 45 degrees along x and along z), SPHERE_SIDE (the rest of the sphere),
     CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points: POLE_SPHERE, POLE_BLOCK (two points at
     the origin), CENTRE (of the sphere).
 
@@ -61,8 +61,8 @@ def sphere_on_block(
         Distance from the pole up to which `contact_size` holds, R/10 by default; half as deep below the surfaces
         [length].
     growth : float
-        Increase of the edges over the distance beyond, until they reach `size`. It bounds the accuracy that a smaller
-        `contact_size` brings.
+        Increase of the edge length per distance beyond, until it reaches `size`. It limits the accuracy that a smaller
+        `contact_size` can reach.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def sphere_octant(
 ) -> Mesh:
     """Lower half of a sphere, the quarter x >= 0, z >= 0: the upper body of `sphere_on_block`, with its groups.
 
-    An inner block stands at the centre, a rounded cube, and three between it and the surface.
+    The mesh has a rounded cube at the centre, and three blocks between it and the surface.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def sphere_octant(
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def ball(outside: int) -> Map:
-        """Return the map of the inner block (outside = -1), or of that beyond its face in one of the directions."""
+        """Return the map of the inner block (outside = -1), or of the block beyond its face in one of the directions."""
 
         def place(*parameters: Array) -> Array:
             coordinates = np.column_stack(parameters)
@@ -138,21 +138,21 @@ def sphere_octant(
 
     names = {"SPHERE": "SPHERE", "XMIN": "SYMMETRY_X", "YMIN": "SYMMETRY_Z", "ZMIN": "SPHERE_TOP"}
     grids = {-1: {}, 0: {"XMAX": "SPHERE_SIDE"}, 1: {"YMAX": "SPHERE_SIDE"}, 2: {"ZMAX": "CONT_SPHERE"}}
-    parts = []
+    cubes = []
     for outside, outer in grids.items():
         grid = [around, around, upward]
         kept = dict(names)
         if outside >= 0:
             grid[outside] = outward
             del kept[("XMIN", "YMIN", "ZMIN")[outside]]
-        parts.append(_mapped(element, (grid[0], grid[1], grid[2]), ball(outside), "SPHERE", kept | outer))
-    whole = merge_points(union(*parts), 1e-6 * R * float(np.diff(around).min()))
-    check_cells(whole)
-    return with_points_at(whole, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
+        cubes.append(_mapped(element, (grid[0], grid[1], grid[2]), ball(outside), "SPHERE", kept | outer))
+    mesh = merge_points(union(*cubes), 1e-6 * R * float(np.diff(around).min()))
+    check_cells(mesh)
+    return with_points_at(mesh, {"POLE_SPHERE": (0.0, 0.0, 0.0), "CENTRE": (0.0, R, 0.0)})
 
 
 def _ball(cube: Array) -> Array:
-    """Map the cube [-1, 1]^3 (n, 3) smoothly on the unit ball, faces on the sphere (Nowell, 2005)."""
+    """Map the cube [-1, 1]^3 (n, 3) smoothly to the unit ball, faces to the sphere (Nowell, 2005)."""
     square = cube * cube
     next_, last = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
     return cube * np.sqrt(1.0 - next_ / 2 - last / 2 + next_ * last / 3)
@@ -168,13 +168,13 @@ def _spacing(
 
 
 def _shallow(spacing: Spacing) -> Spacing:
-    """Return the spacing below the surface: as at the contact, but fine only half as far."""
+    """Return the spacing below the surface: that at the contact, with half the extent of the fine part."""
     shift = 0.5 * spacing.plateau
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
 def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
-    """Return a box with the given grid lines, mapped; of its groups and outer facets those that `names` lists."""
+    """Return a mapped box with the given grid lines; its groups and outer facets are those in `names`."""
     lattice = on_lines(element, grid, solid)
     lattice = lattice.replace(points=place(*lattice.points.T))
     return renamed(_without_unnamed_facets(lattice, names), dict(names))
@@ -183,9 +183,9 @@ def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: 
 def _without_unnamed_facets(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
     """Return the mesh with the groups in `names` only, and without facets that belong to none of them."""
     groups = {name: mesh.cell_groups[name] for name in names}
-    kept = np.unique(np.concatenate(list(groups.values())))
-    rows = mesh.split(kept)
+    named = np.unique(np.concatenate(list(groups.values())))
+    rows = mesh.split(named)
     cells = {name: mesh.cells[name][rows[name]] for name in mesh.cells if name in rows}
     number = np.full(mesh.n_cells, -1)
-    number[kept] = np.arange(len(kept))
+    number[named] = np.arange(len(named))
     return mesh.replace(cells=cells, cell_groups={name: number[members] for name, members in groups.items()})

@@ -1,4 +1,4 @@
-"""Mirror, move, unite, weld and rename meshes, and name groups by their places."""
+"""Operations on meshes: mirror, move, unite, merge points, rename groups, and define groups by position."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
@@ -30,7 +31,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     ----------
     mesh : Mesh
     names : mapping or callable
-        New name by old name. A name that a mapping lacks stays; None drops the group. Groups that get the same
+        New name by old name. Names that a mapping lacks are kept; None removes the group. Groups that get the same
         name are united.
 
     Examples
@@ -53,7 +54,7 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 
 @typed(MeshError)
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
-    """Return the mirror image; cells and facets are turned so that they stay oriented as they were.
+    """Return the mirror image; cells and facets keep their orientation.
 
     MeshError if the mesh has no such axis.
 
@@ -63,7 +64,7 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
     axis : {"x", "y", "z"}
         Coordinate that is reflected.
     at : float
-        Where the mirror stands on that axis [length].
+        Position of the mirror plane on that axis [length].
     rename : mapping or callable, optional
         New names of groups, as in `renamed`.
 
@@ -122,7 +123,7 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 
 @typed(MeshError)
 def union(*meshes: Mesh) -> Mesh:
-    """Return one mesh of several: points one after the other, none merged, groups of the same name united.
+    """Return the union of several meshes: no points are merged, and groups of the same name are united.
 
     MeshError if there is no mesh or the dimensions differ.
 
@@ -153,17 +154,17 @@ def union(*meshes: Mesh) -> Mesh:
     )
 
 
-def _joined(parts: Iterable[Groups]) -> Groups:
-    """Return the arrays of the same name, one after the other."""
+def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
+    """Return the concatenated arrays of the same name."""
     groups_of_all: dict[str, list[AnyArray]] = {}
-    for groups_of_mesh in parts:
+    for groups_of_mesh in groups_of_meshes:
         for name, values in groups_of_mesh.items():
             groups_of_all.setdefault(name, []).append(values)
     return {name: np.concatenate(arrays) for name, arrays in groups_of_all.items()}
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
-    """New number of each cell of `mesh`; moves `starts` on, past its cells."""
+    """Return the new number of each cell of `mesh`; advances `starts` past its cells."""
     numbers = np.empty(mesh.n_cells, np.int64)
     for name, start in mesh.offsets.items():
         n = len(mesh.cells[name])
@@ -174,16 +175,16 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
 
 @typed(MeshError)
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
-    """Return the mesh with points closer than `tolerance` welded into one, the first of them.
+    """Return the mesh with points closer than `tolerance` merged into the first of them.
 
-    Points are welded wherever they lie, also where two bodies only touch. Chains of close points become one. MeshError
-    if two nodes of one cell fall together: the tolerance is larger than an edge.
+    All close points are merged, also where two bodies only touch; chains of close points become one. MeshError if two
+    nodes of one cell would coincide, since the tolerance exceeds the length of an edge.
 
     Parameters
     ----------
     mesh : Mesh
     tolerance : float
-        Largest distance of points that are the same, at least 0 [length].
+        Largest distance of points to merge, at least 0 [length].
 
     Examples
     --------
@@ -193,18 +194,16 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     >>> generate.merge_points(generate.union(first, second), 1e-9).n_points
     45
     """
-    from scipy.spatial import cKDTree
-
     if not number("tolerance", tolerance) >= 0.0:
         raise MeshError(f"tolerance = {tolerance:g} is out of range: it must be at least 0")
-    pairs = cKDTree(mesh.points).query_pairs(tolerance, output_type="ndarray")
+    pairs = close_pairs(mesh.points, tolerance)
     if not len(pairs):
         return mesh
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(mesh.n_points,) * 2)
     _, cluster = connected_components(links, directed=False)
     _, first = np.unique(cluster, return_index=True)
-    kept = np.sort(first)
-    target = np.searchsorted(kept, first)[cluster]
+    unique = np.sort(first)
+    target = np.searchsorted(unique, first)[cluster]
     cells = {name: target[block] for name, block in mesh.cells.items()}
     for name, block in cells.items():
         in_order = np.sort(block, axis=1)
@@ -215,7 +214,7 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
                 "it must be smaller than the shortest edge"
             )
     point_groups = {name: target[members] for name, members in mesh.point_groups.items()}
-    return mesh.replace(points=mesh.points[kept], cells=cells, point_groups=point_groups)
+    return mesh.replace(points=mesh.points[unique], cells=cells, point_groups=point_groups)
 
 
 def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
@@ -231,5 +230,5 @@ def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array
     """
     near = inside(mesh.points)
     rows = mesh.split(mesh.cell_groups[group])
-    parts = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
-    return mesh.with_groups(cells={name: np.concatenate(parts)})
+    members = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
+    return mesh.with_groups(cells={name: np.concatenate(members)})

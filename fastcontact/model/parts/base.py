@@ -20,7 +20,7 @@ from fastcontact.elasticity.nonlinear_materials import STRAINS
 from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -36,8 +36,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 class Support:
     """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
 
-    `value` is a number or a function of position, `ramp` a history of its own or None. What a rotation about an axis does is
-    added, with the history of its angle.
+    `value` is a number or a function of position, `ramp` its history or None. A `rotation` about an axis is added, with the
+    history of its angle.
     """
 
     group: str
@@ -49,22 +49,22 @@ class Support:
 
     @property
     def name(self) -> str:
-        """What it is and where it acts, for messages."""
+        """Component and group, for messages."""
         return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
-        """Return by history its displacements (n,) of `points` (n, dim) at multiplier 1 [length]."""
-        parts: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
+        """Return the displacements (n,) of `points` (n, dim) at multiplier 1, by history [length]."""
+        values: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
         if self.rotation is not None:
             arms, angle = points - np.array(self.rotation.centre), self.rotation.angle
             ramp = self.ramp if self.rotation_ramp is None else self.rotation_ramp
             for versine, generator in enumerate(self.rotation.generators):
-                parts[Harmonic(ramp, angle, bool(versine))] = arms @ generator[self.component]
-        return parts
+                values[Harmonic(ramp, angle, bool(versine))] = arms @ generator[self.component]
+        return values
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
-    """Return the names of groups as users give them, one or several; None for all."""
+    """Return names of groups, given as one or several, as a tuple; None for all."""
     if groups is None:
         return None
     names = (groups,) if isinstance(groups, str) else tuple(groups)
@@ -75,7 +75,7 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
 
 @typed(ModelError)
 class ModelBase:
-    """Mesh, kinematics, and what was added to them."""
+    """Mesh, kinematics, and lists of the added items."""
 
     def __init__(
         self,
@@ -87,10 +87,8 @@ class ModelBase:
         reference_temperature: float = 0.0,
         units: str | Mapping[str, str] = "",
     ) -> None:
-        if kinematics not in KINEMATICS:
-            raise ModelError(unknown("kinematics", kinematics, KINEMATICS))
-        if strain not in STRAINS:
-            raise ModelError(unknown("strain", strain, STRAINS))
+        check_known("kinematics", kinematics, KINEMATICS, ModelError)
+        check_known("strain", strain, STRAINS, ModelError)
         if (kinematics == "3d") != (mesh.dim == 3):
             fitting = ", ".join(f"'{name}'" for name in KINEMATICS if (name == "3d") == (mesh.dim == 3))
             raise ModelError(f"kinematics '{kinematics}' do not fit a mesh in {mesh.dim} dimensions: use {fitting}")
@@ -119,13 +117,11 @@ class ModelBase:
         self.heat_loads: list[FixedTemperature | Heating | Film] = []
         self.initial_states: list[InitialState] = []
         self.relations: list[MultiPointConstraint] = []
-        self.related_supports: list[
-            tuple[str, MultiPointConstraint]
-        ] = []  # those of the relations that support a group
+        self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # supports by group, as constraints
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
         self.interpolated: list[str] = []  # cyclic symmetries whose nodes follow facets
-        self.periodic_interfaces: list[PeriodicInterface] = []  # nodes that are one place of a part that repeats itself
+        self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 
     @property
@@ -134,7 +130,7 @@ class ModelBase:
         return self.mesh.n_points * self.mesh.dim
 
     def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
-        """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one holds none."""
+        """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one is empty."""
         names = group_names(groups)
         check_solids(self.mesh, names, otherwise)
         return names
@@ -171,12 +167,12 @@ class ModelBase:
         return np.asarray(vector / np.linalg.norm(vector))
 
     def _related(self) -> Mask:
-        """Return which points (n_points,) relations and springs hold."""
+        """Return which points (n_points,) have constraints or springs."""
         related = np.zeros(self.mesh.n_points, bool)
         related[self.holding_rows().indices // self.mesh.dim] = True
         return related
 
     def holding_rows(self) -> csr_array:
-        """Return the rows (m, n_dofs) [unit of the caller] of relations and springs; their product with free motions is 0."""
+        """Return rows (m, n_dofs) [unit of the caller] of constraints and springs, zero on free rigid-body modes."""
         relations = stacked_rows(self.relations, self.n_dofs)
         return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))

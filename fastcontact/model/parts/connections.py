@@ -162,10 +162,10 @@ class ModelConnections(ModelInitialStates):
         if component != NORMAL:
             axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
-        for (nodes, ours), (opposite, theirs) in zip(*sides, strict=True):
+        for (nodes, directions), (opposite, directions_opposite) in zip(*sides, strict=True):
             match = matched(self.mesh, (first, nodes), (second, opposite), translation)
-            rows = coefficients[0] * along(nodes, ours, self.n_dofs)
-            rows = csr_array(rows + coefficients[1] * along(opposite[match], theirs[match], self.n_dofs))
+            rows = coefficients[0] * along(nodes, directions, self.n_dofs)
+            rows = csr_array(rows + coefficients[1] * along(opposite[match], directions_opposite[match], self.n_dofs))
             rows.eliminate_zeros()
             self.relations.append(
                 MultiPointConstraint(
@@ -217,10 +217,10 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_periodicity("LEFT", "RIGHT", x=0.001)
         """
         name = f"the periodicity of '{first}' and '{second}'"
-        given = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
-        for key, value in given.items():
+        components = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
+        for key, value in components.items():
             check_number(f"{key} of {name}", value)
-        jump: Any = axes_of(name, given, self.mesh.dim) if given else {}
+        jump: Any = axes_of(name, components, self.mesh.dim) if components else {}
         loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
         if any(axis in jump for axis in loose):
             raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
@@ -424,11 +424,11 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_spring("TOP_LEFT", "BOTTOM_RIGHT", axial=50.0)
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
-        given = {"x": x, "y": y, "z": z}
+        components = {"x": x, "y": y, "z": z}
         stiffness = {"axial": axial, "transverse": transverse}
         along = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along, to is not None, direction)
-        axes = {} if along and set(given.values()) == {None} else axes_of(name, given, self.mesh.dim)
+        axes = {} if along and set(components.values()) == {None} else axes_of(name, components, self.mesh.dim)
         for value in [*axes.values(), *along.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:

@@ -25,7 +25,7 @@ from fastcontact.contact.pair_options import PairOptions
 from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
-from fastcontact.errors import ContactError, ModelError, unknown
+from fastcontact.errors import ContactError, ModelError, check_known
 from fastcontact.model.contact_options import SHARED_OPTIONS, ContactOptions
 from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
@@ -70,10 +70,11 @@ class ModelContact(ModelConnections):
             - ``friction``: coefficient of Coulomb friction.
             - ``kind``: ``"unilateral"`` (default): contact opens and closes. ``"bilateral"``: all gaps that have an opposite
               side are closed from the beginning and stay so (no separation), with frictionless sliding.
-              ``"bilateral_once_closed"``: no separation of what is closed at the end of a load step. ``"tied"``: neither
-              separation nor sliding; the sides are paired once, in the reference configuration, and their relative
-              displacement is zero, also across initial gaps, which are kept (a rotation then strains by its angle times the
-              gap). ``"gap_only"``: gaps are evaluated, negative where the sides penetrate, without forces.
+              ``"bilateral_once_closed"``: no separation of nodes that are closed at the end of a load step.
+              ``"tied"``: neither separation nor sliding; the sides are paired once, in the reference configuration,
+              and their relative displacement is zero, also across initial gaps, which are kept (a rotation then
+              strains by its angle times the gap). ``"gap_only"``: gaps are evaluated, negative where the sides
+              penetrate, without forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,): positive for a clearance, negative for an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the opposite positions. ``clearance_ramp``: their
@@ -86,8 +87,10 @@ class ModelContact(ModelConnections):
               may share such nodes. ``frictionless``: groups whose nodes carry no friction, likewise.
               ``frictionless_along``: a vector (dim,) along which these nodes, or without ``frictionless`` all, have neither
               friction nor slip; across it they keep both [-].
-            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of pairs
-              (overclosure, pressure), ascending from zero pressure [length, pressure]. It does not regularise friction;
+            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of
+              pairs (overclosure, pressure), ascending from zero pressure [length, pressure]; or ``{"clearance": c,
+              "pressure": p}``, an exponential law with the pressure p at zero gap and p / 100 at the gap c. It does
+              not regularise friction;
               ``tangential_penalty`` does: shear per tangential displacement of sticking nodes, a number or a function of
               the secondary position [pressure / length].
             - ``cohesion``: bilinear cohesive zone, a mapping of ``strength`` [pressure] and fracture ``energy`` per
@@ -120,11 +123,11 @@ class ModelContact(ModelConnections):
         >>> model.contact[0].formulation
         'mortar'
         """
-        given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
+        chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
-            formulation, given, reason = default_formulation(self.mesh.dim, given)
-            log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
-        self._add_pair(ContactPair(name, secondary, primary, formulation, given))
+            formulation, chosen, reason = default_formulation(self.mesh.dim, chosen)
+            log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
+        self._add_pair(ContactPair(name, secondary, primary, formulation, chosen))
 
     def add_contacts(
         self,
@@ -184,7 +187,7 @@ class ModelContact(ModelConnections):
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
             self.contact[-1] = dataclasses.replace(self.contact[-1], found_gap=pair.gap[0])
             added.append(pair)
-        if not added and options:  # they are wrong or right all the same
+        if not added and options:  # check the options anyway
             checked = copy.copy(self)
             checked.contact = []
             checked.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
@@ -220,8 +223,7 @@ class ModelContact(ModelConnections):
         if pressure < 0.0:
             raise ModelError(f"the fluid pressure {pressure} in contact '{contact}' must not be negative")
         names = [pair.name for pair in self.contact]
-        if contact not in names:
-            raise ModelError(unknown("contact", contact, names))
+        check_known("contact", contact, names, ModelError)
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
         index = names.index(contact)
         changed = dataclasses.replace(self.contact[index], fluid=fluid)
@@ -288,15 +290,15 @@ class ModelContact(ModelConnections):
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
         if isinstance(obstacle, MeshedSurface):
             obstacle.check_apart(self.mesh)
-        obstacle.distance(self.mesh.points[:1])  # what does not fit this dimension shows at once
+        obstacle.distance(self.mesh.points[:1])  # raises an error for a wrong dimension
         history = table_of(ramp, f"the ramp of the motion of obstacle '{name}'")
-        given: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
+        chosen: dict[str, Any] = {option: value for option, value in options.items() if value is not None}
         if formulation is None:
             kinds = self._facet_kinds(secondary)
-            formulation, given, reason = against_obstacle(self.mesh.dim, *kinds, given)
-            log.info("contact '%s': %s, since %s", name, method(formulation, given), reason)
+            formulation, chosen, reason = against_obstacle(self.mesh.dim, *kinds, chosen)
+            log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
-            given.setdefault("multipliers", "dual")
+            chosen.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
         turned = (
             (None, None)
@@ -304,11 +306,11 @@ class ModelContact(ModelConnections):
             else rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         )
         self._add_pair(
-            ContactPair(name, secondary, "", formulation, given, obstacle, displacement, history, driving, *turned)
+            ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
-        """Return the nodes (n_points,) that the fluid in a pair comes from, None where there is none."""
+        """Return the source nodes (n_points,) of the fluid in a pair, None without a fluid."""
         if pair.fluid is None:
             return None
         mask = np.zeros(self.mesh.n_points, bool)
@@ -326,13 +328,13 @@ class ModelContact(ModelConnections):
         return mask
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
-        """Return the kinds of facets of a group, and whether linear triangles or tetrahedra alone have them."""
+        """Return the kinds of facets of a group, and whether all belong to linear triangles or tetrahedra."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
-        if not facets:  # which `check` tells
+        if not facets:  # reported by `check`
             return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
-        theirs = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
-        return list(facets), theirs
+        of_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
+        return list(facets), of_simplices
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
@@ -354,7 +356,7 @@ class ModelContact(ModelConnections):
 
     @property
     def force_driven(self) -> ForceDrivenObstacles:
-        """The rigid obstacles that forces drive."""
+        """The force-driven rigid obstacles."""
         return ForceDrivenObstacles([pair for pair in self.contact if pair.force], (self.mesh.n_points, self.mesh.dim))
 
     def _add_pair(self, pair: ContactPair) -> None:
@@ -370,17 +372,15 @@ class ModelContact(ModelConnections):
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
         """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
 
-        `held` are the motions of nodes that supports and relations prescribe, where they are known; `sectors_alike` tells
-        whether pressures are the same at both ends of a sector.
+        `held` are the nodal motions that supports and multi-point constraints prescribe, if known; `sectors_alike`
+        states whether pressures are equal at both ends of a sector.
         """
-        if pair.formulation not in FORMULATIONS:
-            raise ContactError(unknown("contact formulation", pair.formulation, FORMULATIONS))
+        check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        given = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in given)]
+        set_here = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in set_here)]
         for option in pair.options:
-            if option not in known:
-                raise ContactError(unknown(f"option of {pair.formulation}", option, known))
+            check_known(f"option of {pair.formulation}", option, known, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
         ends = [

@@ -1,4 +1,4 @@
-"""Conduction of heat in a model: prescribed temperatures, fluxes, films, sources, and what its checks ask.
+"""Heat conduction in a model: prescribed temperatures, fluxes, films, sources, and checks.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -29,7 +29,7 @@ HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 @typed(ModelError)
 class ModelHeat(ModelMaterials):
-    """A model that may conduct heat; steps then tell temperatures and fluxes, and materials with an expansion expand."""
+    """A model with optional heat conduction; steps then contain temperatures and fluxes, and materials expand."""
 
     def fix_temperature(
         self, group: str, value: Value, *, ramp: History = None, begins: float | None = None, ends: float | None = None
@@ -44,8 +44,8 @@ class ModelHeat(ModelMaterials):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise above `Model.reference_temperature`.
         begins, ends : float, optional
-            Ends of load steps between which it is prescribed, by default always. One that begins later goes from the
-            temperatures that it finds to the next point of its `ramp` [-].
+            Load factors of ends of load steps between which it is prescribed, by default always [-]. A temperature
+            that begins later changes from the current values to the next point of its `ramp`.
 
         Examples
         --------
@@ -130,7 +130,7 @@ class ModelHeat(ModelMaterials):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise of the ambient temperature above `Model.reference_temperature`.
         begins, ends : float, optional
-            Ends of load steps between which it acts, by default always [-].
+            Load factors of ends of load steps between which it acts, by default always [-].
 
         Examples
         --------
@@ -147,12 +147,12 @@ class ModelHeat(ModelMaterials):
 
     @property
     def conducts(self) -> bool:
-        """Whether heat is conducted: by a load of heat, a prescribed temperature, or a contact with a conductance."""
+        """Whether heat conduction is solved: with a heat load, a prescribed temperature, or a contact with a conductance."""
         return bool(self.heat_loads) or any("conductance" in pair.options for pair in self.contact)
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` that steps of this model have: of nonlinear bodies, and of heat."""
+        """Names of the `StepResult.cell_fields` of this model, for nonlinear bodies and heat conduction."""
         return (*super().cell_fields, *(HEAT_FLUX[: self.mesh.dim] if self.conducts else ()))
 
     @property
@@ -161,21 +161,22 @@ class ModelHeat(ModelMaterials):
         return any(material.expansion is not None for material, _ in self.materials)
 
     def conduction(self) -> Conduction:
-        """Return the solid cells as conductors of heat."""
+        """Return the conduction of the solid cells."""
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
     def same_temperature(self) -> Indices:
-        """Return for each node (n_points,) the first one of the same temperature: ends of periods, sides of sections."""
+        """Return for each node (n_points,) the first node of equal temperature, at ends of periods and sides of sections."""
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
         representative = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if representative is None else representative
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
-        """Return which nodes (n_points,) have a prescribed temperature, and by history their rises at multiplier 1.
+        """Return which nodes (n_points,) have a prescribed temperature, and their rises at multiplier 1 by history.
 
-        Of nodes that have the same temperature the first one of `same_temperature`. ModelError if two differ at a node.
+        Nodes with the same temperature are represented by the first one, see `same_temperature`. ModelError if two
+        prescribed temperatures differ at a node.
         """
-        fixed, given = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
+        fixed, values = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
         owner = np.full(self.mesh.n_points, -1)
         supports = [load for load in self.heat_loads if isinstance(load, FixedTemperature)]
@@ -185,7 +186,7 @@ class ModelHeat(ModelMaterials):
             rise = evaluated(support.value, self.mesh.points[nodes], support.name) - self.reference_temperature
             nodes = same[nodes]
             again = np.flatnonzero(fixed[nodes])
-            for row in again[(given[nodes[again]] != rise[again])][:1]:
+            for row in again[(values[nodes[again]] != rise[again])][:1]:
                 other = supports[owner[nodes[row]]]
                 raise ModelError(
                     f"'{support.group}' and '{other.group}' prescribe different temperatures at point {nodes[row]}"
@@ -194,11 +195,11 @@ class ModelHeat(ModelMaterials):
             by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
             if support.reached is not None and leaving:
                 by_ramp.setdefault(leaving, np.zeros(self.mesh.n_points))[new] = support.reached[new]
-            fixed[nodes], given[nodes], owner[new] = True, rise, number
+            fixed[nodes], values[nodes], owner[new] = True, rise, number
         return fixed, by_ramp
 
     def check_heat(self) -> None:
-        """Raise ModelError if the conduction of heat is not determined, or what it needs is not there."""
+        """Raise ModelError if the heat problem is not uniquely solvable or lacks data."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
                 raise ModelError(
@@ -233,19 +234,19 @@ class ModelHeat(ModelMaterials):
             elif pair.options.get("conductance") is not None:
                 ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
                 joined.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
-        alone = not_reached(body, held, np.concatenate(joined))
-        if len(alone):
+        unreached = not_reached(body, held, np.concatenate(joined))
+        if len(unreached):
             raise ModelError(
-                f"nothing determines the temperature of body {body_name(self.mesh, body, alone[0])}: fix a temperature, "
+                f"nothing determines the temperature of body {body_name(self.mesh, body, unreached[0])}: fix a temperature, "
                 "add a film, or give a contact with another body a conductance"
             )
 
     def conductances(self) -> dict[str, Conductance]:
-        """Return the laws of conductance by contact pair."""
-        given = {pair.name: pair.options.get("conductance") for pair in self.contact}
-        return {name: Conductance(name, value) for name, value in given.items() if value is not None}
+        """Return the conductances by contact pair."""
+        by_pair = {pair.name: pair.options.get("conductance") for pair in self.contact}
+        return {name: Conductance(name, value) for name, value in by_pair.items() if value is not None}
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
-    """Return the instants between which a load acts, always where they are not given."""
+    """Return the instants between which a load acts, always if they are not given."""
     return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

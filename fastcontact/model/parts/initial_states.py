@@ -92,8 +92,8 @@ class ModelInitialStates(ModelLoads):
     ) -> None:
         """Prescribe the temperature of groups of solid cells by a nodal field of one or several files.
 
-        Formats are MED, VTKHDF (such as result files) and those of meshio (such as .vtu). If the file has the points of the
-        mesh in the same order, its values are taken as they stand; otherwise points are matched by position.
+        Formats are MED, VTKHDF (such as result files) and those of meshio (such as .vtu). If the file has the points
+        of the mesh in the same order, its values are used directly; otherwise points are matched by position.
 
         Parameters
         ----------
@@ -174,8 +174,8 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_stress(xx=lambda points: 100.0 * (1.0 - 2.0 * points[:, 1]))
         """
-        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
-        self._add_initial("stress", groups, given, axes, ramp)
+        components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("stress", groups, components, axes, ramp)
 
     def add_initial_strain(
         self,
@@ -208,22 +208,22 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_strain("BLOCK", xx=-0.002, yy=-0.002, zz=-0.002)  # shrinkage
         """
-        given = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
-        self._add_initial("strain", groups, given, axes, ramp)
+        components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
+        self._add_initial("strain", groups, components, axes, ramp)
 
     def _add_initial(
-        self, kind: str, groups: Sequence[str] | str | None, given: Mapping[str, Any], axes: Axes, ramp: History
+        self, kind: str, groups: Sequence[str] | str | None, components: Mapping[str, Any], axes: Axes, ramp: History
     ) -> None:
         names = self._solid_groups(groups, f": it has no initial {kind}")
         table = table_of(ramp, f"the ramp of the initial {kind}")
         self.initial_states.append(
-            initial_state(kind, names, self._cells_of(names), given, axes, self.kinematics, table)
+            initial_state(kind, names, self._cells_of(names), components, axes, self.kinematics, table)
         )
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
-        """Return the rise of the temperature (n_points,) [temperature], None without temperatures.
+        """Return the temperature rise (n_points,) [temperature]; None without temperatures.
 
-        `factors` has a multiplier for each that was added, as ``step.iterations["temperature_factors"]`` of a step result.
+        `factors` holds a multiplier for each temperature, like ``step.iterations["temperature_factors"]`` of a step result.
         """
         if not self.temperatures or not len(factors):
             return None
@@ -233,7 +233,7 @@ class ModelInitialStates(ModelLoads):
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
-        """Return the rise of the temperature (n_points,) by which cells expand [temperature]; None where none does.
+        """Return the temperature rise (n_points,) of thermal expansion [temperature]; None without it.
 
         `temperature_factors` and `temperature` (n_points,) [temperature] are those of `stress_offset`.
         """
@@ -245,10 +245,10 @@ class ModelInitialStates(ModelLoads):
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
     ) -> StressOffset | None:  # fmt: skip
-        """Return what stresses have beside those of the displacements, by temperatures and initial states; None without any.
+        """Return the stresses of temperatures and initial states, to add to those of displacements; None without any.
 
-        The factors are those of a step result, `StepResult.iterations`; `field` is the `material_field`, where it is known;
-        `temperature` (n_points,) [temperature] that of the step result, where heat is conducted.
+        With heat conduction `temperature` (n_points,) [temperature] is that of the step result. The factors are those
+        of `StepResult.iterations`; `field` is the `material_field`, if known.
         """
         rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
@@ -258,9 +258,9 @@ class ModelInitialStates(ModelLoads):
         return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
 
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) at multiplier 1 by which temperatures load the cells [force].
+        """Return by history the nodal forces (n_points, dim) of thermal strains at multiplier 1 [force].
 
-        ModelError if a material that is heated has no expansion.
+        ModelError if a heated material has no coefficient of expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
         if not self.temperatures:
@@ -279,14 +279,14 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
-        """Return the nodal forces (n_points, dim) [force] by which a rise of the temperature expands the cells.
+        """Return the nodal forces (n_points, dim) [force] of the thermal strains of a temperature rise.
 
-        `rise` (n_points,) [temperature] is over the reference.
+        `rise` (n_points,) [temperature] is relative to the reference.
         """
         return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1 [force]."""
+        """Return the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1, by history [force]."""
         by_ramp: dict[Table | None, Array] = {}
         field = self.material_field() if self.initial_states else None
         for state in self.initial_states:
@@ -296,7 +296,7 @@ class ModelInitialStates(ModelLoads):
         return by_ramp
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
-        """Return the nodal forces (n_points, dim) [force] of what stresses have beside those of the displacements."""
+        """Return the nodal forces (n_points, dim) [force] of a stress offset."""
         held = stress_at_points(
             self.mesh,
             self.kinematics,

@@ -321,10 +321,10 @@ class ModelLoads(ModelHeat):
         >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
-        given = {"x": x, "y": y, "z": z}
+        components = {"x": x, "y": y, "z": z}
         if self.mesh.dim == 2 and (x is not None or y is not None):
             raise ModelError(f"{name}: in the plane moments are about z")
-        axes = axes_of(name, given, 3)
+        axes = axes_of(name, components, 3)
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
 
     def _add(self, load: Load) -> None:
@@ -332,7 +332,7 @@ class ModelLoads(ModelHeat):
         self.loads.append(load)
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of all loads at multiplier 1 [force]."""
+        """Return the nodal forces (n_points, dim) of all loads at multiplier 1, by history [force]."""
         related = self._related()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
@@ -342,7 +342,7 @@ class ModelLoads(ModelHeat):
         return by_ramp
 
     def following_pressures(self) -> list[tuple[FollowingPressure, Table | None]]:
-        """Return the pressures of finite strain, which follow the deformed surface, with their histories."""
+        """Return the follower pressures of finite strain with their histories."""
         if self.strain == "small":
             return []
         pressures = [load for load in self.loads if isinstance(load, Pressure)]

@@ -45,7 +45,7 @@ class ModelMaterials(ModelBase):
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` that steps of this model have: none for linear elasticity."""
+        """Names of the `StepResult.cell_fields` in steps of this model: none for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
 
     @property
@@ -54,32 +54,32 @@ class ModelMaterials(ModelBase):
         return self.strain != "small" or any(isinstance(law, NonlinearElastic) for law, _ in self.materials)
 
     def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
-        """Return the solid cells as nonlinear bodies; None where they are linear."""
+        """Return the solid cells as nonlinear bodies; None if they are linear."""
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
-        """Raise ModelError if bodies are nonlinear, for `feature` is there for linear elasticity alone."""
+        """Raise ModelError if bodies are nonlinear, since `feature` is limited to linear elasticity."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
             raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
-        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element every solid cell's number there.
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element the row of each solid cell.
 
-        The first are those of the materials; materials that vary have further ones, for the middle of each cell.
+        The first rows are those of the materials; materials that vary have further rows for the centre of each cell.
         """
         field = self.material_field()
         return field.moduli, field.rows
 
     def material_field(self) -> MaterialField:
-        """Return the materials of all solid cells; ModelError if a cell has none, or two."""
+        """Return the materials of all solid cells; ModelError if a cell has none or two."""
         return material_field(
             self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
 
     def material_of_cells(self) -> dict[str, Numbers]:
-        """Return by element every solid cell's material (n_cells,)."""
+        """Return the material of every solid cell (n_cells,), by element."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -96,17 +96,17 @@ class ModelMaterials(ModelBase):
         return numbers
 
     def averaged_materials(self) -> Mask:
-        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, where none locks."""
+        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, which does not lock."""
         return self.material_field().averaged
 
-    def _check_material(self, index: int, group: str | None, given: Numbers) -> None:
-        """Refuse a material for cells that have another one already, which was not given to all cells."""
+    def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
+        """Refuse a material for cells that already have another one, unless that was assigned to all cells."""
         new = self.materials[index][0]
-        for number in np.unique(given[given >= 0]):
+        for number in np.unique(numbers[numbers >= 0]):
             old, groups = self.materials[number]
             if old != new and (groups is not None or group is None):
                 raise ModelError(
-                    f"{int((given == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
+                    f"{int((numbers == number).sum())} cells of {'the mesh' if group is None else repr(group)} have two "
                     f"materials, {old.described} and {new.described}: give each group one; "
                     "one for all other cells comes first, without groups"
                 )

@@ -27,7 +27,7 @@ from fastcontact.model.relation_rows import NORMAL, along, normals_of
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Vectors or a function as those of materials; in the plane the first vector alone will do.
+# Vectors or a function, as for materials; in the plane the first vector suffices.
 SupportAxes = Axes | Sequence[float]
 
 
@@ -129,7 +129,7 @@ class ModelSupports(ModelContact):
             self._support(group, components, ramp)
 
     def _along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
-        """Prescribe displacements along axes of the user's, by relations."""
+        """Prescribe displacements along the user's axes, by multi-point constraints."""
         dim, name = self.mesh.dim, f"the support of '{group}'"
         check_points(self.mesh, group, "no displacement can be prescribed on it")
         nodes = self.mesh.points_of(group).astype(np.intp)
@@ -170,15 +170,15 @@ class ModelSupports(ModelContact):
         return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
 
     def prescribed_by_ramp(self) -> tuple[Mask, dict[PartHistory, Array]]:
-        """Return supported components (n_points, dim), and by history their displacement at multiplier 1 [length]."""
+        """Return supported components (n_points, dim), and their displacement at multiplier 1, by history [length]."""
         fixed = np.zeros(self.mesh.points.shape, bool)
         by_ramp: dict[PartHistory, Array] = {}
         for number, support in enumerate(self.supports):
             nodes, k = self.mesh.points_of(support.group), support.component
-            parts, new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
-            for history in {**by_ramp, **parts}:
+            histories, new = support.by_history(self.mesh.points[nodes]), ~fixed[nodes, k]
+            for history in {**by_ramp, **histories}:
                 total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
-                values = parts.get(history, np.zeros(len(nodes)))
+                values = histories.get(history, np.zeros(len(nodes)))
                 other = np.flatnonzero((total[nodes, k] != values) & ~new)
                 if len(other):
                     self._refuse(number, int(nodes[other[0]]))
@@ -188,7 +188,7 @@ class ModelSupports(ModelContact):
         return fixed, by_ramp
 
     def _refuse(self, number: int, node: int) -> None:
-        """Raise ModelError since a support prescribes a component of a node in another way than one before it."""
+        """Raise ModelError, because a support contradicts an earlier one at a component of a node."""
         support = self.supports[number]
         for before in self.supports[:number]:
             if before.component == support.component and node in self.mesh.points_of(before.group):
@@ -200,7 +200,7 @@ class ModelSupports(ModelContact):
         )
 
     def _hold_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
-        """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse those that contradict it."""
+        """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse contradicting ones."""
         axis = self.axis_nodes
         for values in by_ramp.values():
             off = axis[np.abs(values[axis, 0]) > SINGLE_PRECISION * np.abs(values).max()]
@@ -214,11 +214,11 @@ class ModelSupports(ModelContact):
 
     @property
     def axis_nodes(self) -> Indices:
-        """Nodes (k,) on the axis of an axisymmetric model, where x is held at zero without any support; none in others."""
+        """Nodes (k,) on the axis of an axisymmetric model, where x is fixed without a support; otherwise empty."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
-    def _tell_axis(self) -> None:
-        """Log what is held on the axis although no support names it."""
+    def _log_axis(self) -> None:
+        """Log the nodes held on the axis by symmetry rather than by a support."""
         named = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         held = np.setdiff1d(self.axis_nodes, np.concatenate(named)) if named else self.axis_nodes
         if len(held):

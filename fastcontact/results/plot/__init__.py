@@ -1,4 +1,4 @@
-"""Pictures: pressure against theory, maps of it, the deformed shape and sections with their stresses, history over the load.
+"""Pictures: pressure profiles with theory, contact maps, deformed shapes, sections and histories over the load.
 
 Every function takes an optional ``ax`` and returns the axes it drew on; save with ``ax.figure.savefig``.
 """
@@ -25,5 +25,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # to whom all names are known
+if not TYPE_CHECKING:  # type checkers know all names
     __getattr__, __dir__ = names_of("fastcontact.plot", __all__)

@@ -16,6 +16,8 @@ from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+else:  # matplotlib is imported only when a picture is drawn
+    Axes = Any
 
 Units = Mapping[str, str]
 UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
@@ -23,13 +25,13 @@ UNKNOWN: Units = {}
 
 
 def placed(points: Array, size: float) -> str:
-    """Return a place (dim,) as text; coordinates below a millionth of the `size` of the body are zero [length]."""
+    """Return a position (dim,) as text; coordinates below a millionth of the `size` of the body are zero [length]."""
     kept = np.where(np.abs(points) <= 1e-6 * size, 0.0, points)
     return f"({', '.join(f'{x:.4g}' for x in kept)})"
 
 
 def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
-    """Return the corners of a square around its middle (2,), of a half width, without what lies beyond places (n, 2)."""
+    """Return the corners of a square around its middle (2,), of a half width, clipped to the bounds of `points` (n, 2)."""
     low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
     return np.maximum(middle - half, low), np.minimum(middle + half, high)
 
@@ -44,7 +46,7 @@ def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
 
 
 def mark(axes: Any, at: Array, label: str) -> None:
-    """Mark a place (dim,) of a picture."""
+    """Mark a position (dim,) in a picture."""
     axes.plot(*([x] for x in at), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
 
 
@@ -56,7 +58,7 @@ def png(figure: Any) -> bytes:
 
 
 def displayed(figure: Any) -> None:
-    """Let a figure, and each of its axes, show itself where it ends a cell of a notebook."""
+    """Give a figure and its axes a representation for notebooks."""
     for artist in (figure, *figure.axes):
         artist._repr_png_ = partial(png, figure)
 
@@ -71,7 +73,7 @@ class Panels(tuple[Any, ...]):
 
 
 def drawable(ax: Any) -> Any:
-    """Return axes that were given; FastcontactError if they are not axes."""
+    """Return the given axes; FastcontactError if they are not axes."""
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
             f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
@@ -85,7 +87,7 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
 
 
 def without_matplotlib(error: Exception) -> FastcontactError:
-    """Return what to say where matplotlib cannot be imported: it is missing, or does not know the backend."""
+    """Return the error for a failed import of matplotlib: it is missing, or does not know the backend."""
     if isinstance(error, ImportError):
         return FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'")
     backend = os.environ.get("MPLBACKEND")
@@ -109,24 +111,24 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
 
 
 def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
-    """Return width and height of a picture that the body fills, beside colours, labels and title [inches]."""
+    """Return width and height of a picture filled by the body, including colours, labels and title [inches]."""
     width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
 
 
 def legend_below(points: Array) -> float:
-    """Return where the legend begins, in heights of such axes: half an inch leaves room for the label of the axis."""
+    """Return the position of the legend, in heights of such axes: half an inch below for the label of the axis."""
     width, height = np.ptp(points, axis=0)
     return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
 
 
 def bar_beside(points: Array) -> float:
-    """Return the length of the colour bar by that of the room: as high as slender bodies are, but for its label."""
+    """Return the length of the colour bar over the available length: the height of slender bodies, except for its label."""
     width, height = np.ptp(points, axis=0)
     return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
 
 
 def settled(axes: Any) -> Any:
-    """Return axes in space whose figure has room for their labels, which it knows only once they were drawn."""
+    """Return axes in space with space for their labels, whose size is known only after drawing."""
     axes.figure.draw_without_rendering()
     return axes

@@ -24,9 +24,9 @@ from fastcontact.results.plot.shape import deformed_shape, scaled
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.step import StepResult
 
-# Suffixes of moving pictures; all but the first are written by the program ffmpeg.
+# Suffixes of animations; all except the first are written by the program ffmpeg.
 SUFFIXES = (".gif", ".mp4", ".mkv", ".webm")
-# Dots an inch: a moving picture holds many pictures.
+# Dots per inch: an animation contains many pictures.
 RESOLUTION = 90
 
 
@@ -42,7 +42,7 @@ class MovingPicture:
     path: Path
 
     def _repr_html_(self) -> str:
-        """Return the picture in a page that needs no file."""
+        """Return the animation embedded in HTML."""
         inside = base64.b64encode(self.path.read_bytes()).decode()
         kind = self.path.suffix[1:].lower()
         if kind == "gif":
@@ -64,30 +64,30 @@ def animate(
     units: Units = UNKNOWN,
     view: tuple[float, float] = (25.0, -60.0),
 ) -> MovingPicture:
-    """Write the deformed shape at all load steps as a moving picture; its colours and axes stand still.
+    """Write an animation of the deformed shape over all load steps, with fixed axes and colour scale.
 
     Parameters
     ----------
     mesh : Mesh
     steps : sequence of StepResult
     path : str or path
-        File to write: ``.gif``, or where the program ffmpeg is installed ``.mp4``, ``.mkv``, ``.webm``.
+        File to write: ``.gif``, or ``.mp4``, ``.mkv``, ``.webm`` if the program ffmpeg is installed.
     field, scale, mirrored, units, view
         As in `deformed_shape`.
     pictures_per_second : int
-        How fast it goes [1/s].
+        Frame rate [1/s].
     title : str
-        Title of every picture, below which the load factor stands.
+        Title of every frame, followed by the load factor.
 
     Returns
     -------
     MovingPicture
-        Which shows itself where it ends a cell of a notebook.
+        The animation, displayed at the end of a notebook cell.
 
     Raises
     ------
     FastcontactError
-        If there are no steps, the suffix is another one, ffmpeg is missing or fails.
+        If there are no steps, the suffix is unknown, or ffmpeg is missing or fails.
     FileError
         If the file cannot be written.
 
@@ -118,7 +118,7 @@ def animate(
         for step in steps:
             figure.clear()
             axes = figure.add_subplot(projection=projection)
-            heading = f"{title}\nload factor {step.load_factor:.3g}, displacements x {scale:g}".strip()
+            heading = f"{title}\n{step.instant}, displacements x {scale:g}".strip()
             deformed_shape(
                 mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
                 view=view, ax=axes,
@@ -129,7 +129,7 @@ def animate(
 
 
 def _show(axes: Any, box: tuple[Array, Array], view: tuple[float, float]) -> None:
-    """Let axes show the part of space that all pictures show."""
+    """Set the limits of axes to those of all pictures."""
     if len(box[0]) == 3:
         show_box(axes, *box, view)
         settled(axes)
@@ -138,7 +138,7 @@ def _show(axes: Any, box: tuple[Array, Array], view: tuple[float, float]) -> Non
 
 
 def writer_of(path: Path, pictures_per_second: int) -> Any:
-    """Return what writes a moving picture; raises FastcontactError if the suffix is unknown or ffmpeg is missing."""
+    """Return the writer of an animation; FastcontactError if the suffix is unknown or ffmpeg is missing."""
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     suffix = path.suffix.lower()
@@ -148,7 +148,7 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
         return PillowWriter(fps=pictures_per_second)
     if not FFMpegWriter.isAvailable():
         raise FastcontactError(f"'{path}' needs the program ffmpeg, which is not installed: write a .gif instead")
-    # An even number of dots on both sides, which most codecs ask for.
+    # An even number of dots in both directions, as most codecs require.
     return FFMpegWriter(
         fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
     )
@@ -156,7 +156,7 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
 
 @contextlib.contextmanager
 def _failure_of_writer(path: Path) -> Iterator[None]:
-    """Tell in one line what ffmpeg said last; what ends a picture before its first frame is raised, as it is later on."""
+    """Convert failures of ffmpeg to one line with its last message; errors before the first frame are raised unchanged."""
     try:
         yield
     except subprocess.CalledProcessError as error:
@@ -172,7 +172,7 @@ def _failure_of_writer(path: Path) -> Iterator[None]:
 def _over_all(
     mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
 ) -> tuple[tuple[float, float], tuple[Array, Array]]:
-    """Return the ends of the colours, and the corners of the box that the bodies stay in, over all steps."""
+    """Return the limits of the colours, and the corners of the box around the bodies, over all steps."""
     low, high = np.full(mesh.dim, np.inf), np.full(mesh.dim, -np.inf)
     colours = (np.inf, -np.inf)
     for step in steps:

@@ -1,29 +1,25 @@
-"""Stresses along the axis under a contact, against a sub-surface formula."""
+"""Stresses along the axis below a contact, compared with an analytic solution."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 # How deep the picture goes, in contact radii.
 DEEP = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
-# Of these, and of von Mises.
+# Colours of these, and of von Mises.
 COLOURS = ("C0", "C1", "C2")
 
 
@@ -38,7 +34,7 @@ def axis_stress(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the stresses at the nodes on the axis of a contact over the depth under its surface.
+    """Plot the stresses at the nodes on the axis of a contact over the depth below its surface.
 
     The axis passes through the middle of the contact, along the normal there; in axisymmetry it is that of the bodies.
 
@@ -84,7 +80,7 @@ def axis_stress(
     for number, name in enumerate(bodies):
         here = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if here.any():  # the second body is hollow, so that it hides nothing of the first
+            if here.any():  # the symbols of the second body are hollow, so that those of the first stay visible
                 face, label = ("none" if number else colour), f"{caption}, {name}"
                 axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     fine = np.linspace(0.0, reach, 400)
@@ -94,7 +90,7 @@ def axis_stress(
         for colour, curve in zip(COLOURS, curves, strict=True):
             axes.plot(fine, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
-    title = title or f"Stresses on the axis, load factor {step.load_factor:g}"
+    title = title or f"Stresses on the axis, {step.instant}"
     axes.set(xlabel=labelled("depth under the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
@@ -102,10 +98,10 @@ def axis_stress(
     return axes
 
 
-def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, NDArray[np.int64], Array]:
+def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, Indices, Array]:
     """Return depth (n,) [length], side (n,) and stress (n, 4) of the nodes on the axis.
 
-    The side is 1 above the surface and -1 below (right and left of it where the axis is level). Components are turned: xx
+    The side is 1 above the surface and -1 below (right and left of it for a horizontal axis). Components are rotated: xx
     across the axis, yy along it, xy between the two.
     """
     if mesh.dim != 2:
@@ -115,7 +111,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, ND
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     height = (mesh.points[used] - pole) @ direction
     offset = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
-    # The normal of a deformed facet is that of the surface but for a few thousandths.
+    # The normal of a deformed facet is that of the surface up to a few thousandths.
     leaning = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
     on_axis = np.abs(offset) <= tolerance + leaning * np.abs(height)
     nodes, height = used[on_axis], height[on_axis]
@@ -123,7 +119,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, ND
         raise FastcontactError(
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
-    # Two nodes stand at the pole, one of each body; where the cells of a node lie tells which is which.
+    # There are two nodes at the pole, one of each body, which are distinguished by the positions of their cells.
     behind = _sides(mesh, nodes, pole, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), behind).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
@@ -131,7 +127,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, ND
 
 
 def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
-    """Return where the axis of a contact leaves the surface (2,) [length], and its direction upward (2,) [-]."""
+    """Return the point at which the axis of a contact meets the surface (2,) [length], and its upward direction (2,) [-]."""
     contact = contacts_of([step], pair)[0]
     nearest = int(np.argmin(np.abs(contact.place)))
     normal = contact.normal[nearest]

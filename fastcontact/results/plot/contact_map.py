@@ -1,9 +1,9 @@
-"""The pressure over a contact surface in three dimensions, and shear or slip beside it."""
+"""Maps of the pressure over a contact surface in three dimensions, and of shear or slip."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,20 +13,17 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, new_panels
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels
 from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 # The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
 MARGIN = 0.15
-# Least length of the mean of the facets' normals for a surface to be drawn as it is seen along it.
+# Smallest length of the mean of the facets' normals for which a surface is drawn in projection along it.
 LEAST_MEAN = 0.3
-# What may stand beside the pressure: its name in words, and what its unit belongs to.
+# Fields next to the pressure: caption, and quantity of the unit.
 BESIDE = {
     "shear": ("shear traction", "pressure"),
     "slip": ("slip of the step", "length"),
@@ -45,10 +42,10 @@ def contact_map(
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot the pressure over the secondary surface of a contact, and shear or slip beside it where there is any.
+    """Plot the pressure on the secondary surface of a contact and, with friction, the shear or slip beside it.
 
-    The undeformed surface is seen along its mean normal. Closed nodes are dots, open ones are not marked; where there is
-    shear or slip, the nodes that slide are orange and arrows show its direction.
+    The undeformed surface is projected along its mean normal. Dots mark closed nodes; in the map of shear or slip,
+    sliding nodes are orange and arrows show the direction.
 
     Parameters
     ----------
@@ -58,13 +55,13 @@ def contact_map(
     everything : bool
         Draw the whole surface; by default the closed part and its surroundings.
     beside : {"shear", "slip", "slip_total"}
-        What is drawn beside the pressure; see `ContactResult`.
+        Quantity drawn beside the pressure; see `ContactResult`.
     title, units
         As in `pressure_profile`.
-    axes : matplotlib Axes, two where there is shear, optional
+    axes : matplotlib Axes, two with friction, optional
 
-    Returns a tuple of Axes: of the pressure, and where there is any of the shear or slip. Raises FastcontactError if the
-    mesh is not three-dimensional, its surface is not that of the contact, or what is closed of it goes around a body.
+    Returns a tuple of Axes, of the pressure and, with friction, of the shear or slip. FastcontactError if the mesh is
+    not three-dimensional, does not contain the contact surface, or if the closed part of it goes around a body.
 
     Examples
     --------
@@ -118,12 +115,12 @@ def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
             raise FastcontactError(f"this contact has shear: it takes two axes, and {len(given)} are given")
         return given[: 1 + both]
     panels = list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
-    panels[0].figure.set_layout_engine("compressed")  # a narrow map stands in the middle, beside its colours
+    panels[0].figure.set_layout_engine("compressed")  # centres a narrow map, next to its colours
     return panels
 
 
 def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
-    """Return by element the facets (n, m) of the secondary surface, as places in the arrays of the contact."""
+    """Return the facets (n, m) of the secondary surface by element, as positions in the arrays of the contact."""
     inside = contact.points.max(initial=-1) < mesh.n_points
     row = np.full(max(mesh.n_points, int(contact.points.max(initial=-1)) + 1), -1)
     row[contact.points] = np.arange(len(contact.points))
@@ -137,7 +134,7 @@ def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
 def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Array, tuple[str, str] | None]:
     """Return axes (2, 3) across the mean normal, and their names where they are coordinates.
 
-    Facets count by what they carry; all alike where nothing is carried.
+    Facets are weighted by their pressure, or equally without any pressure.
     """
     total, whole = np.zeros(3), 0.0
     for facets in blocks.values():
@@ -154,7 +151,7 @@ def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
 
 
 def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
-    """Mark closed nodes, and those that slide where there is shear."""
+    """Mark closed nodes, and sliding ones if there is shear."""
     sliding = contact.active & ~contact.sticking if both else np.zeros(len(flat), bool)
     for name, here, colour in (
         ("sticking" if both else "closed", contact.active & ~sliding, "white"),
@@ -165,7 +162,7 @@ def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
 
 
 def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
-    """Draw the direction of shear or slip at the nodes that have a tenth of the largest."""
+    """Draw the direction of shear or slip at nodes with at least a tenth of the largest value."""
     here = size > 0.1 * size.max()
     ax.quiver(*flat[here].T, *vectors[here].T, color="white", width=0.004, pivot="tail")
 
@@ -181,7 +178,7 @@ def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:
     """Show the closed part with a margin around it, or everything if nothing is closed.
 
-    Return how high the picture is beside that of a square, 0.55 to 1 [-].
+    Return the height of the picture relative to that of a square, 0.55 to 1 [-].
     """
     kept = flat[closed] if closed.any() else flat
     low, high = kept.min(axis=0), kept.max(axis=0)

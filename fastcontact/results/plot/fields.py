@@ -20,20 +20,20 @@ from fastcontact.results.units import valued
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A field at the points of a mesh, which is cut along borders of materials for stresses.
+    """A field at the points of a mesh, which is cut along material interfaces for stresses.
 
     Attributes
     ----------
     mesh : Mesh
-        On whose points the values stand.
+        Mesh with the points of the values.
     node : ndarray of int (m,)
         Node of the whole mesh at each of these points.
     values : ndarray (m,)
-        In the unit of `quantity`.
+        Values in the unit of `quantity`.
     caption : str
-        Name in words.
+        Name for labels.
     quantity : str
-        ``"pressure"`` or ``"length"``: what the unit belongs to.
+        Quantity of the unit, ``"pressure"`` or ``"length"``.
     """
 
     mesh: Mesh
@@ -44,12 +44,12 @@ class Field:
 
     @property
     def extreme(self) -> int:
-        """Number of the point with the largest value, or with the smallest where that is larger without its sign."""
+        """Number of the point with the largest value, or with the smallest if that has the larger magnitude."""
         return int(np.argmax(np.abs(self.values)))
 
     @property
     def range(self) -> tuple[float, float]:
-        """Smallest and largest value of its colours: as far on both sides of zero where the values have both signs."""
+        """Limits of the colours: symmetric about zero if the values have both signs."""
         low, high = float(self.values.min()), float(self.values.max())
         if self.signed:
             return -max(-low, high), max(-low, high)
@@ -57,23 +57,23 @@ class Field:
 
     @property
     def signed(self) -> bool:
-        """Whether the values have both signs, each by a tenth of the other at least."""
+        """Whether the values have both signs, each with at least a tenth of the magnitude of the other."""
         low, high = float(self.values.min()), float(self.values.max())
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
-    def told(self, value: float, units: Mapping[str, str], where: str = "") -> str:
+    def described(self, value: float, units: Mapping[str, str], where: str = "") -> str:
         """Return an extreme value as text."""
         kind = "maximum" if value >= 0.0 else "minimum"
         return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"
 
     @property
     def colours(self) -> str:
-        """Name of the colours: blue to red over white in the middle for both signs."""
+        """Name of the colour map: diverging from blue over white to red for both signs."""
         return "RdBu_r" if self.signed else "viridis"
 
 
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
-    """Return a field of a step by its name, as `names` lists them; raises FastcontactError if there is no such field."""
+    """Return a field of a step by one of `names`; FastcontactError if there is no such field."""
     everywhere = np.arange(mesh.n_points, dtype=np.int32)
     if name in DISPLACEMENTS:
         axis = AXES.index(name[-1]) if "." in name else None
@@ -90,28 +90,28 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
         return Field(mesh, everywhere, step.temperature, name, "")
     if name in step.cell_fields:
         return Field(mesh, everywhere, _of_cells(mesh, step.cell_fields[name]), CELLS.get(name, name), "")
-    apart, node, stress = separated(mesh, step)
-    if name == "von_mises" and apart is mesh:
+    separate_mesh, node, stress = separated(mesh, step)
+    if name == "von_mises" and separate_mesh is mesh:
         return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
     if name not in names(mesh):
         further = [*step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
         raise FastcontactError(unknown("field", name, [*names(mesh), *further]))
     if name in CAPTIONS:
-        return Field(apart, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
+        return Field(separate_mesh, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
     component = name.removeprefix("stress.")
     values = stress[:, STRESS_COMPONENTS.index(component)]
-    return Field(apart, node, values, f"stress {component}", "pressure")
+    return Field(separate_mesh, node, values, f"stress {component}", "pressure")
 
 
 def names(mesh: Mesh) -> list[str]:
-    """Return the names of all fields that a mesh can have."""
+    """Return the names of all possible fields of a mesh."""
     components = STRESS_COMPONENTS[: 4 if mesh.dim == 2 else 6]
     displacements = [name for name in DISPLACEMENTS if "." not in name or name[-1] in AXES[: mesh.dim]]
     return [*CAPTIONS, *(f"stress.{name}" for name in components), *displacements, *SLIPS]
 
 
 def _of_cells(mesh: Mesh, values: Array) -> Array:
-    """Return numbers of solid cells (n_solids,) at the points (n_points,): the mean of the cells around each."""
+    """Return values of solid cells (n_solids,) at the points (n_points,): the mean of the cells around each."""
     total, count, first = np.zeros(mesh.n_points), np.zeros(mesh.n_points), 0
     for block in mesh.solids.values():
         block_values = values[first : first + len(block)]

@@ -1,38 +1,32 @@
-"""The contacts that were found in a mesh: both sides of each, on pale bodies."""
+"""The contacts detected in a mesh: both sides of each, on pale bodies."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import new_axes, settled, size_around
+from fastcontact.results.plot._axes import Axes, new_axes, settled, size_around
 from fastcontact.results.plot.patches import outlines
 from fastcontact.results.plot.solid import show_box
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 @typed(FastcontactError)
 def contacts(
     found_contacts: FoundContacts, *, view: tuple[float, float] = (25.0, -60.0), ax: Axes | None = None
 ) -> Axes:
-    """Draw the contacts that `find_contacts` has found: a colour for each, the secondary side strong, the primary one pale.
+    """Plot the contact pairs of `find_contacts`, one colour each, with the secondary side darker than the primary one.
 
     Parameters
     ----------
     found_contacts : FoundContacts
     view : (float, float)
-        In 3D, height of the eye over the x-y plane and its direction around z [degrees].
+        In 3D, elevation and azimuth of the view [degrees].
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
 
@@ -81,7 +75,7 @@ def _draw_2d(axes: Any, found_contacts: FoundContacts) -> None:
             PolyCollection(list(outlines(name, mesh.points[cells])), facecolors="0.95", edgecolors="0.8", lw=0.3)
         )
     for group, label, colour, opacity in _sides(found_contacts):
-        # From end to end, by way of the node in the middle if there is one.
+        # From end to end, through the middle node if there is one.
         lines = [mesh.points[b[:, [0, 2, 1] if b.shape[1] == 3 else [0, 1]]] for b in mesh.cells_of(group, 1).values()]
         strokes = [line for block in lines for line in block]
         width = 4.0 if opacity < 1.0 else 1.5

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Indices, Mask
 
-# A place closer behind a triangle than this part of the whole size lies on it.
+# A point less than this fraction of the total size behind a triangle lies on it.
 ON_IT = 1e-4
 
 
 class Screen:
-    """Triangles sorted by where they stand on the screen.
+    """Triangles sorted by position on the screen.
 
     Parameters
     ----------
@@ -34,7 +33,7 @@ class Screen:
         self._sort()
 
     def _sort(self) -> None:
-        """List the triangles of every square of the screen, one square after the other."""
+        """List the triangles of every square of the screen, square by square."""
         low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
         across, up = (high - low + 1).T
         count = across * up
@@ -46,11 +45,11 @@ class Screen:
         self.members = number[order]
         self.starts = np.searchsorted(square[order], np.arange(self.n_bins**2 + 1))
 
-    def _square(self, points: Array) -> NDArray[np.int64]:
+    def _square(self, points: Array) -> Indices:
         return np.clip(((points - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
 
     def hidden(self, places: Array) -> Mask:
-        """Return which places (..., 3) [length] lie behind a triangle."""
+        """Return which positions (..., 3) [length] are hidden behind a triangle."""
         flat = places.reshape(-1, 3) @ self.axes.T
         column, row = self._square(flat[:, :2]).T
         square = column * self.n_bins + row
@@ -62,7 +61,7 @@ class Screen:
         behind = self._behind(flat[index], triangle)
         return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
 
-    def _behind(self, flat: Array, triangle: NDArray[np.int64]) -> Mask:
+    def _behind(self, flat: Array, triangle: Indices) -> Mask:
         """Return which places (n, 3) on the screen lie within and behind their triangle (n,)."""
         a, b, c = np.moveaxis(self.corners[triangle], 1, 0)
         area = _cross(b - a, c - a)
@@ -74,7 +73,7 @@ class Screen:
 
 
 def across(eye: Array) -> Array:
-    """Return unit vectors (3, 3): two across the line of sight, and that to the eye [-]."""
+    """Return unit vectors (3, 3): two perpendicular to the line of sight, and the one to the eye [-]."""
     helper = np.eye(3)[int(np.argmin(np.abs(eye)))]
     first = np.cross(helper, eye)
     first /= np.linalg.norm(first)
@@ -82,9 +81,9 @@ def across(eye: Array) -> Array:
 
 
 def seen_along(direction: Array, aligned: float) -> tuple[Array, tuple[str, str] | None]:
-    """Return axes (2, 3) across a unit vector (3,): two of the coordinates, and their names, where it is nearly the third.
+    """Return axes (2, 3) perpendicular to a unit vector (3,), with their names if they are coordinate axes.
 
-    It is where its component there is `aligned` at least.
+    These are chosen if a component of the vector is at least `aligned`.
     """
     along = int(np.argmax(np.abs(direction)))
     if abs(direction[along]) < aligned:

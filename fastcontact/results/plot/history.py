@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,14 +11,11 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Panels, Units, contacts_of, new_axes, new_panels
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contacts_of, new_axes, new_panels
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-# So many numbers of closed nodes stand beside each other above the zones.
+# Largest number of node counts shown side by side above the zones.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
@@ -37,18 +34,18 @@ def history(
 ) -> Sequence[Axes]:
     """Plot force and contact radius of a contact pair over the load.
 
-    Where the force cancels all round, as in a press fit, it is the sum of the normal forces.
+    If the resultant vanishes, as in a press fit, the sum of the normal forces is plotted.
 
     Parameters
     ----------
     steps, pair
         Steps of an analysis, name of a contact pair.
     law : object with ``at_approach(d)``, optional
-        A theory, drawn where `approach` is given.
+        A theory, drawn if `approach` is given.
     approach : float, optional
         Approach of the bodies at load factor 1 [length]; the abscissa is then the approach.
     share : float
-        Part of the theory's contact that the model holds [-]: 0.25 for a quarter of it.
+        Modelled fraction of the theory's contact [-], e.g. 0.25 for a quarter.
     title, units
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional
@@ -96,14 +93,14 @@ def history(
         if entries:
             ax.legend(fontsize=9, loc="upper left")
         top = float(ax.dataLim.y1)
-        room = 0.12 * (entries + 0.3) if entries else 0.05  # for the legend above what is drawn
+        room = 0.12 * (entries + 0.3) if entries else 0.05  # for the legend above the curves
         ax.set_ylim(0.0, (1.0 + room) * top if 0.0 < top < np.inf else None)
         ax.set_xlim(left=min(0.0, float(x.min())))
     return axes
 
 
 def _brackets(ax: Any, x: Array, bracket: Array) -> None:
-    """Draw at each step a bar from the outermost closed place to the first open one; a tick where nothing is open."""
+    """Draw, at each step, a bar from the outermost closed node to the first open one; a tick if no node is open."""
     low, high = bracket.T
     known = np.isfinite(low)
     both = known & np.isfinite(high)

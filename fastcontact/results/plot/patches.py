@@ -11,16 +11,16 @@ from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 
-# Into so many parts each side of a cell is cut, to show how places and a field vary in it.
+# Number of subdivisions of each side of a cell, to show curved sides and nonlinear fields.
 CUTS = 4
-# With more cells than this they are too small for that to be seen.
+# Number of cells above which this would be invisible.
 FEW = 5000
 
 
 def fill(
     ax: Any, blocks: Mapping[str, AnyArray], points: Array, values: Array, colours: str, ends: tuple[float, float]
 ) -> Any:
-    """Fill cells by their shape functions; return what carries the colours.
+    """Fill cells by their shape functions; return the artist with the colours.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ def fill(
     points : ndarray (n_points, 2)
         [length]
     values : ndarray (n_points,)
-        Of any unit.
+        Values in any unit.
     colours : str
         Name of the colours.
     ends : (float, float)
@@ -55,7 +55,7 @@ def fill(
 
 
 def outlines(name: str, corners: Array) -> Array:
-    """Return cells (n, n_nodes, 2) of an element as polygons (n, m, 2) along their sides, curved ones cut in parts."""
+    """Return cells (n, n_nodes, 2) of an element as polygons (n, m, 2) along their sides, curved ones subdivided."""
     kind = elements.get(name)
     if kind.order == 1:
         return corners[:, : kind.n_corners]
@@ -64,7 +64,7 @@ def outlines(name: str, corners: Array) -> Array:
 
 
 def _lattice(name: str) -> tuple[Array, AnyArray]:
-    """Return reference coordinates (n, 2) all over a cell, and the triangles (m, 3) between them."""
+    """Return a lattice of reference coordinates (n, 2) in a cell, and the triangles (m, 3) between them."""
     corner = elements.get(name).n_corners == 3
     last = CUTS if corner else 2 * CUTS
     places = [(i, j) for i in range(CUTS + 1) for j in range(CUTS + 1) if i + j <= last]

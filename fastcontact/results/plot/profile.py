@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import is_dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,12 +12,9 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.results.units import labelled, valued
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 
 @typed(FastcontactError)
@@ -31,9 +28,9 @@ def pressure_profile(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the contact pressure over the distance from the middle of the contact, with theory beside it.
+    """Plot the contact pressure over the distance from the middle of the contact, with theory for comparison.
 
-    In plane problems the distance is that along the surface, with a sign where nodes lie on both sides of the middle; see
+    In plane problems the distance is the arc length, with a sign if nodes lie on both sides of the middle; see
     `ContactResult.place`.
 
     Parameters
@@ -48,8 +45,8 @@ def pressure_profile(
         `normal_stress`.
     title : str
     units : mapping
-        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model (none
-        where it names none); see `UNITS`.
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model, if
+        any; see `UNITS`.
     ax : matplotlib Axes, optional
 
     Examples
@@ -101,17 +98,17 @@ def pressure_profile(
 
 
 def _largest(curve: PressureCurve, units: Units) -> str:
-    """Return the largest pressure of a theory as text; a theory whose pressure is the same everywhere has one alone."""
+    """Return the largest pressure of a theory as text, or the pressure if it is uniform."""
     name = "$p_0$" if np.isfinite(curve.radius) else "$p$"
     return f"{name} = {valued(curve.pressure_max, units, 'pressure')}"
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
-    """Return what can be drawn of theories, by legend."""
-    for given in (theory, *others.values()):
-        if given is not None and not is_dataclass(given) and pressure_curve(given) is None:
+    """Return the curves of theories, by legend."""
+    for theory_given in (theory, *others.values()):
+        if theory_given is not None and not is_dataclass(theory_given) and pressure_curve(theory_given) is None:
             raise FastcontactError(
-                f"a theory has a pressure, as those of fastcontact.analytic do, which {given!r} has not"
+                f"a theory has a pressure, as those of fastcontact.analytic do, which {theory_given!r} has not"
             )
     curves = {legend: pressure_curve(other) for legend, other in others.items()}
     curve = pressure_curve(theory)
@@ -119,20 +116,20 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the ends of the abscissa: a third more than the contact and the theories take, on both sides where there are."""
+    """Return the limits of the abscissa: a third beyond the contact and the theories, on both sides if both exist."""
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
     farthest = float(np.abs(contact.place).max(initial=0.0))
     reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
     reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
     low, nearest = contact.place.min(initial=0.0), float(np.abs(contact.place).min(initial=np.inf))
-    if nearest > 0.2 * reach and not curves:  # a ring: nothing is to be seen between its axis and its bore
+    if nearest > 0.2 * reach and not curves:  # a ring: there is nothing between its axis and its bore
         return nearest - 0.05 * (reach - nearest), reach
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
 def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units) -> None:
-    """Shade where the edge of the contact lies: between the outermost closed place and the first open one."""
+    """Shade the edge of the contact: between the outermost closed node and the first open one."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
@@ -141,7 +138,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units)
         closed = contact.place[contact.active]
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
         ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
-    # Where constraints lie between nodes, the radius that results tell is narrower than what nodes can show.
+    # If constraints lie between nodes, the bracket of the radius is narrower than that of the nodes.
     between = not np.allclose(half_width(contact.place, contact.active, contact.across), contact.radius, rtol=0.01)
     along = "" if contact.tangent is None else " (arc length)"
     label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}{along}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
+    Axes,
     Units,
     bar_beside,
     legend_below,
@@ -30,12 +31,9 @@ from fastcontact.results.plot.shape import framed, scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 # By how much of the size of the body a plane that only touches it is moved inside.
 INSIDE = 1e-7
-# The corners of a tetrahedron in an order in which those on one side come first, by which of the four lie there.
+# Orders of the corners of a tetrahedron in which those on one side come first, by which of the four lie there.
 _FIRST = {k: [i for i in range(4) if k >> i & 1] for k in range(16)}
 _REST = {k: [i for i in range(4) if not k >> i & 1] for k in range(16)}
 
@@ -55,9 +53,9 @@ def section(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot a plane section through a mesh in three dimensions, coloured by a field, its largest value on it marked.
+    """Plot a plane section through a 3D mesh, coloured by a field, with the largest value marked.
 
-    The section is that through the undeformed bodies, drawn where its material has moved to, seen along the normal.
+    The plane cuts the undeformed bodies; the section is drawn in its deformed position, projected along the normal.
 
     Parameters
     ----------
@@ -69,7 +67,7 @@ def section(
     field, scale, edges, title, units
         As in `deformed_shape`; edges are the lines along which the plane cuts facets.
     zoom : float, optional
-        Half the width of the part to draw, around the marked place [length].
+        Half the width of the part to draw, around the largest value [length].
     ax : matplotlib Axes, optional
 
     Raises
@@ -107,14 +105,14 @@ def section(
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
-    state = f"load factor {step.load_factor:g}, displacements x {scale:g}"
+    state = f"{step.instant}, displacements x {scale:g}"
     below, bar = (legend_below(points), bar_beside(points)) if ax is None else (-0.14, 0.8)
     labels = labels or ("along the section", "across it")
     return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, below, bar, labels)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
-    """Return point (3,) [length] and unit normal (3,) [-] of a plane; raises FastcontactError if there is none."""
+    """Return point (3,) [length] and unit normal (3,) [-] of a plane; FastcontactError if they define none."""
     if mesh.dim != 3:
         raise FastcontactError("sections are for meshes in three dimensions: draw the deformed shape of this one")
     at, direction = np.array(point, float), np.array(normal, float)
@@ -127,9 +125,9 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
 
 
 def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tuple[Array, Array]:
-    """Return the section as triangles (n, 3, 7) and strokes (m, 2, 7): place, displacement, value at their corners.
+    """Return the section as triangles (n, 3, 7) and strokes (m, 2, 7): position, displacement, value at their corners.
 
-    A plane along the surface is moved inside by a hair; raises FastcontactError if there is nothing on either side.
+    A plane along the surface is moved slightly inside; raises FastcontactError if the plane does not meet the mesh.
     """
     size = float(np.ptp(shown.mesh.points, axis=0).max())
     data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
@@ -145,7 +143,7 @@ def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tu
 
 
 def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
-    """Return where the heights (n_points,) are zero, of tetrahedra from each cell's middle to the triangles of its facets."""
+    """Return the zero level of heights (n_points,), in tetrahedra from each cell's middle to triangles of its facets."""
     pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
     for name, block in mesh.solids.items():
         kind = elements.get(name)
@@ -166,9 +164,9 @@ def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
 
 
 def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
-    """Return triangles (n, 3, k) in which a level cuts tetrahedra (m, 4, k), strokes (n, 2, k) on their first faces.
+    """Return the triangles (n, 3, k) of a level in tetrahedra (m, 4, k), and its strokes (n, 2, k) on their first faces.
 
-    `height` (m, 4) is that of the corners over the level; the first face is that of the first three corners.
+    `height` (m, 4) is that of the corners above the level; the first face is that of the first three corners.
     """
     above = height >= 0.0
     pattern = above @ np.array([1, 2, 4, 8])
@@ -192,13 +190,13 @@ def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
 
 
 def _between(data: Array, height: Array, i: int, j: int) -> Array:
-    """Return the data (n, k) where the height is zero between two corners."""
+    """Return the data (n, k) interpolated to zero height between two corners."""
     t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
     return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
 
 
 def _fill(axes: Any, flat: Array, values: Array, shown: Field) -> Any:
-    """Fill triangles (n, 3, 2) by the values (n, 3) at their corners; return what carries the colours."""
+    """Fill triangles (n, 3, 2) by the values (n, 3) at their corners; return the artist with the colours."""
     from matplotlib.tri import Triangulation
 
     corners = flat.reshape(-1, 2)
@@ -218,4 +216,4 @@ def _stroke(axes: Any, strokes: Array) -> None:
 def _mark(axes: Any, at: Array, value: float, before: Array, points: Array, units: Units, shown: Field) -> None:
     """Mark the largest value of the section, at (2,) in the picture, at `before` (3,) on the undeformed bodies."""
     size = float(np.ptp(points, axis=0).max())
-    mark(axes, at, f"{shown.told(value, units, ' on the section')}\nundeformed at {placed(before, size)}")
+    mark(axes, at, f"{shown.described(value, units, ' on the section')}\nundeformed at {placed(before, size)}")

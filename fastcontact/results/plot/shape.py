@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
+    Axes,
     Units,
     bar_beside,
     legend_below,
@@ -29,14 +30,11 @@ from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-LARGEST = 1e30  # of coordinates that can be drawn: the libraries multiply them
+LARGEST = 1e30  # largest coordinate that can be drawn: the libraries multiply coordinates
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
-    """Return displaced points (n, dim) [length]; FastcontactError if `scale` moves them out of what can be drawn."""
+    """Return displaced points (n, dim) [length]; FastcontactError if `scale` makes them too large to be drawn."""
     with np.errstate(all="ignore"):
         position = points + scale * displacement
         drawn = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
@@ -61,7 +59,7 @@ def deformed_shape(
     view: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the deformed mesh, in 3D what is seen of its surface, coloured by a field, its largest value marked.
+    """Plot the deformed mesh (in 3D its visible surface), coloured by a field, with the largest value marked.
 
     Parameters
     ----------
@@ -73,18 +71,18 @@ def deformed_shape(
     scale : float
         Factor on the displacements.
     edges : bool, optional
-        Draw the cells' edges; by default up to 5000 cells, or facets of the surface in 3D.
+        Whether to draw edges; by default up to 5000 cells, or facets of the surface in 3D.
     mirrored : bool
-        In 2D, draw the other half beyond x = 0, too: the full section of an axisymmetric body.
+        In 2D, also draw the mirror image at x = 0: the full section of an axisymmetric body.
     zoom : float, optional
-        In 2D, half the width of the part to draw, around the marked place [length]; FastcontactError in 3D.
+        In 2D, half the width of the part to draw, around the largest value [length]; FastcontactError in 3D.
     limits : (float, float), optional
-        Values of the first and the last colour, in the unit of the field.
+        Limits of the colour scale, in the unit of the field.
     title, units
         As in `pressure_profile`.
     view : (float, float), optional
-        In 3D, height of the eye over the x-y plane and its direction around z [degrees]; by default (25, -60), or the first
-        of eight corners, of a box around the body, from which the extreme value is seen.
+        In 3D, elevation and azimuth of the view [degrees]; by default (25, -60), or the first of eight corners of the
+        bounding box from which the largest value is visible.
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
 
@@ -106,7 +104,7 @@ def deformed_shape(
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
     shown, units = field_of(mesh, step, field), units or step.units
     points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
-    heading = title or f"Deformed shape (displacements x {scale:g}), load factor {step.load_factor:g}"
+    heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.9), "3d")
         view = view or view_of_extreme(shown, points)
@@ -129,9 +127,9 @@ def deformed_shape(
 def framed(
     axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float, bar: float, labels: Sequence[str]
 ) -> Any:
-    """Give axes their colour bar, title, a label for each direction, and a legend that begins at a height [-]; return them.
+    """Add a colour bar, a title, a label for each direction, and a legend at height `below` [-] to axes; return them.
 
-    The colour bar is as long as a part `bar` of the room [-].
+    The colour bar takes the fraction `bar` of the available length [-].
     """
     caption, flat = labelled(shown.caption, units, shown.quantity), len(labels) == 2
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=bar)
@@ -144,11 +142,11 @@ def framed(
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
-    """Mark the extreme value: where it stands in the picture, and in another line where it was before the load."""
+    """Mark the extreme value with its deformed and undeformed positions."""
     before = mesh.points[shown.node[shown.extreme]]
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     here, there = placed(at, size), placed(before, size)
-    label = f"{shown.told(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
+    label = f"{shown.described(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
     mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
 
 
@@ -157,7 +155,7 @@ def _draw(
 ) -> Any:  # fmt: skip
     """Draw the cells of a mesh in the plane at positions `nodes` (n_points, 2) in `colours` from one value to the other.
 
-    By default edges are drawn where there are few cells within the box around `box` (n, 2). Return what carries the colours.
+    By default edges are drawn if there are few cells within the box around `box` (n, 2). Return the artist with the colours.
     """
     from matplotlib.collections import PolyCollection
 

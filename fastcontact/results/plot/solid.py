@@ -14,30 +14,30 @@ from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.hiding import Screen
 
-# Cells or facets beyond which edges would only blacken the picture.
+# Number of cells or facets above which edges would only blacken the picture.
 MOST_EDGES = 5000
-# Each flat triangle between the nodes is cut into so many along its sides, to show how a field varies in it.
+# Number of subdivisions of the sides of each flat triangle between the nodes, to show nonlinear fields.
 CUTS = 2
-# How often a piece that is hidden in part is cut in four.
+# Number of recursive subdivisions, into four, of partly hidden pieces.
 FINEST = 4
-# Size of solids beside their frame, which with its labels takes the rest.
+# Size of solids relative to their frame, which with its labels takes the rest.
 ROOM = 0.9
-# The longer side of what is seen of a box may be this part of its diagonal; slender boxes are drawn smaller.
+# Largest ratio of the longer visible side of a box to its diagonal; slender boxes are drawn smaller.
 WIDEST = 0.8
-# Heights and directions of the eye [degrees]: from above and from below, by way of the four corners.
+# Heights and directions of the eye [degrees]: from above and from below, around the four corners.
 VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
-# Ticks on an axis that is seen as long as the diagonal of the box; how near an end of y, relative to it, its numbers stand
-# on those of other axes.
+# Number of ticks on an axis as long as the diagonal of the box in the picture; distance from an end of y, relative to its
+# length, within which its numbers would overlap those of other axes.
 TICKS, NEAR_END = 14, 0.1
 
 
 def draw_solid(
     ax: Any, shown: Field, points: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
 ) -> Any:
-    """Draw what is seen of the outer surface; return what a colour bar is made of.
+    """Draw the visible part of the outer surface; return the mappable for a colour bar.
 
-    The points stand at `points` (n_points, 3) [length]; `colours` are the values of the first and the last colour. Outlines
-    of facets are drawn if `edges` says so, by default up to MOST_EDGES. `view` is height and direction of the eye [degrees].
+    `points` (n_points, 3) are the positions [length]; `colours` are the values of the first and the last colour. Outlines of
+    facets are drawn with `edges`, by default up to MOST_EDGES facets. `view` is height and direction of the eye [degrees].
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -59,9 +59,9 @@ def draw_solid(
     norm = Normalize(*colours)
     faces = colormaps[shown.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
-    lines = faces.copy()  # the colour of the face itself closes the hair cracks between neighbours
+    lines = faces.copy()  # lines in the colour of the face close the hairline gaps between neighbours
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
-        # Whatever is nearer is drawn later: all strokes are moved to the eye, in a parallel projection along themselves.
+        # Nearer objects are drawn later: strokes are moved towards the eye, which does not change their parallel projection.
         drawn = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * eye
         polygons += list(drawn)
         faces = np.vstack([faces, np.zeros((len(drawn), 4))])
@@ -74,9 +74,9 @@ def draw_solid(
 
 
 def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> None:
-    """Let axes in space show the box between two corners (3,) [length] in its own proportions, seen from `view` [degrees].
+    """Show the box between two corners (3,) [length] in its own proportions in 3D axes, seen from `view` [degrees].
 
-    Whatever changes the limits must come here: with other proportions strokes would not lie on their faces.
+    All changes of the limits must use this function: with other proportions strokes would not lie on their faces.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -96,7 +96,7 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
 
 
 def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
-    """Return whether nothing hides the extreme value of a field, on points at `points` (n_points, 3) [length]."""
+    """Return whether the extreme value of a field is visible, with points at `points` (n_points, 3) [length]."""
     eye = towards(view)
     facing = _facing(shown, points, eye)
     screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
@@ -104,7 +104,7 @@ def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
 
 
 def view_of_extreme(shown: Field, position: Array) -> tuple[float, float]:
-    """Return from where to look: the first of VIEWS from which the extreme value of a field is seen."""
+    """Return the first of VIEWS from which the extreme value of a field is visible."""
     return next((view for view in VIEWS if is_seen(shown, position, view)), VIEWS[0])
 
 
@@ -115,51 +115,51 @@ def towards(view: tuple[float, float]) -> Array:
 
 
 def _facing(shown: Field, points: Array, eye: Array) -> list[tuple[str, Array, Array, Indices]]:
-    """Return of each kind of facet, for those that face the eye: name, corners, values of the field, flat triangles."""
+    """Return name, corners, values of the field and flat triangles of the facets that face the eye, by kind."""
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
     facing = []
     for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
         flat = flat_triangles(facets.shape[1])
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
-        kept = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
-        facing.append((name, points[kept], shown.values[kept], flat))
+        visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
+        facing.append((name, points[visible], shown.values[visible], flat))
     return facing
 
 
 def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
-    """Return the parts of triangles (n, 3, 3) that nothing hides, and the values (n, 3) at their corners.
+    """Return the visible parts of triangles (n, 3, 3), and the values (n, 3) at their corners.
 
-    A triangle that is hidden in part is cut in four, again and again; of the last ones those are kept whose middle is seen.
+    Partly hidden triangles are recursively divided into four; of the smallest ones those with a visible middle are kept.
     """
-    kept: list[tuple[Array, Array]] = []
+    visible: list[tuple[Array, Array]] = []
     for left in range(FINEST, -1, -1):
         middle = triangles.mean(axis=1, keepdims=True)
         tests = np.concatenate([middle, middle + 0.98 * (triangles - middle)], axis=1)
         hidden = screen.hidden(tests)
         seen = ~hidden[:, 0] if left == 0 else ~hidden.any(axis=1)
-        kept.append((triangles[seen], values[seen]))
+        visible.append((triangles[seen], values[seen]))
         rest = ~seen & ~hidden.all(axis=1)
         if left == 0 or not rest.any():
             break
         weights = _cut(2)
         triangles = np.einsum("pcw,nwd->npcd", weights, triangles[rest]).reshape(-1, 3, 3)
         values = np.einsum("pcw,nw->npc", weights, values[rest]).reshape(-1, 3)
-    return np.concatenate([part for part, _ in kept]), np.concatenate([part for _, part in kept])
+    return np.concatenate([block for block, _ in visible]), np.concatenate([block for _, block in visible])
 
 
 def _seen_strokes(strokes: Array, screen: Screen) -> Array:
-    """Return the parts of strokes (n, 2, 3) that nothing hides: of those hidden in part, sixteenths."""
+    """Return the visible parts of strokes (n, 2, 3): sixteenths of partly hidden ones."""
     ends = np.linspace(0.0, 1.0, 17)[:, None]
     points = strokes[:, None, 0] + ends * (strokes[:, None, 1] - strokes[:, None, 0])
-    parts = np.stack([points[:, :-1], points[:, 1:]], axis=2)
-    hidden = screen.hidden(parts.mean(axis=2))
-    whole = ~hidden.any(axis=1)
-    partly = ~whole & ~hidden.all(axis=1)
-    return np.concatenate([strokes[whole], parts[partly][~hidden[partly]]])
+    segments = np.stack([points[:, :-1], points[:, 1:]], axis=2)
+    hidden = screen.hidden(segments.mean(axis=2))
+    fully = ~hidden.any(axis=1)
+    partly = ~fully & ~hidden.all(axis=1)
+    return np.concatenate([strokes[fully], segments[partly][~hidden[partly]]])
 
 
 def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
-    """Return the outer facets but for those along cuts inside, where two facets have the same nodes."""
+    """Return the outer facets without those along internal cuts, where two facets have the same nodes."""
     blocks = {}
     for name, facets in outer_facets(mesh).items():
         _, back, count = np.unique(np.sort(node[facets], axis=1), axis=0, return_inverse=True, return_counts=True)

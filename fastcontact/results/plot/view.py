@@ -12,7 +12,7 @@ from fastcontact.results.step import StepResult
 
 
 def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "", screenshot: str | None = None) -> None:
-    """Show the deformed mesh coloured by its von Mises stress in a window that can be turned.
+    """Show the deformed mesh coloured by its von Mises stress in an interactive window.
 
     Parameters
     ----------
@@ -23,12 +23,12 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         Factor on the displacements.
     title : str
     screenshot : str, optional
-        Picture to write instead of opening a window.
+        Picture file to write instead of opening a window.
 
     Raises
     ------
     FastcontactError
-        If PyVista is not installed, or a window is asked for without a display.
+        If PyVista is not installed, or there is no display for a window.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
         scalar_bar_args={"vertical": True, "title": "von Mises stress"},
     )  # fmt: skip
-    plotter.add_text(title or f"load factor {step.load_factor:g}", font_size=10)
+    plotter.add_text(title or step.instant, font_size=10)
     if results.mesh.dim == 2:
         plotter.view_xy()
     plotter.add_axes()
@@ -57,7 +57,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
 
 
 def _has_display() -> bool:
-    """Return whether a window can be opened, as far as the environment tells."""
+    """Return whether the environment has a display for a window."""
     if sys.platform in ("win32", "darwin"):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -1,1 +1,1 @@
-"""The renderer of all studies: tables, figures and pages from plain rows, curves and texts."""
+"""Rendering of all studies: tables, figures and pages from plain rows, curves and texts."""

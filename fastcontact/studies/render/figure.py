@@ -1,4 +1,4 @@
-"""Figures of studies: axes side by side, and what all of them have, scales, labels, grid and legend."""
+"""Figures of studies: panels of axes with scales, labels, grid and legend."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ def panels(
     widths: Sequence[float] | None = None,
     **style: Any,
 ) -> Any:
-    """Return the axes (rows, columns) of a new figure of a `size` [inch]; `style` is of its title.
+    """Return the axes (rows, columns) of a new figure of a `size` [inch]; `style` applies to its title.
 
-    `widths` are those of the columns, in any unit; all are alike by default.
+    `widths` are the relative widths of the columns, by default equal.
     """
     made = new_panels(rows, columns, size, 130, width_ratios=widths)
     if title:
@@ -34,7 +34,7 @@ def panels(
 
 
 def message(ax: Any, text: str) -> None:
-    """Show a text in the place of axes on which there is nothing to draw."""
+    """Show a text in place of axes without data."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 
@@ -49,19 +49,19 @@ def frame(
     title_size: float | str = "large",
     legend_size: float = 8,
 ) -> None:
-    """Give axes that curves were drawn on their scales, title, labels, grid and, where curves have labels, a legend.
+    """Set the scales, title, labels and grid of axes with curves and, if curves have labels, a legend.
 
     Parameters
     ----------
     ax : matplotlib Axes
     title : str
     labels, scales : (str, str)
-        Of the axes x and y; scales are ``"linear"``, ``"log"`` or ``"plain log"``, with few plain numbers instead of powers
-        of ten.
+        For the axes x and y. Scales are ``"linear"``, ``"log"`` or ``"plain log"``, which has a few plain numbers instead of
+        powers of ten.
     grid : float
         Opacity at major ticks [-]; 0 for no grid.
     title_size, legend_size : float or str
-        Sizes of fonts, as matplotlib takes them [point].
+        Font sizes in the form of matplotlib [point].
     """
     for axis, scale, setter in zip((ax.xaxis, ax.yaxis), scales, (ax.set_xscale, ax.set_yscale), strict=True):
         if scale != "linear":
@@ -73,7 +73,7 @@ def frame(
     if scales[1] == "linear":
         ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
         low, high = ax.dataLim.intervaly
-        if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is no trend
+        if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is not a trend
             ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
     if grid:
         ax.grid(which="major", alpha=grid)
@@ -82,7 +82,7 @@ def frame(
 
 
 def _plain(axis: Any) -> None:
-    """Label a logarithmic axis with few plain numbers instead of powers of ten."""
+    """Label a logarithmic axis with a few plain numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_data_interval()

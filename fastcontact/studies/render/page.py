@@ -1,4 +1,4 @@
-"""Pages: one self-contained HTML file of paragraphs, tables and pictures, which loads nothing from elsewhere."""
+"""Pages: a self-contained HTML file of paragraphs, tables and pictures that loads nothing else."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ pre { background: #f6f6f6; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem
 """
 
 
-def page(heading: str, parts: Sequence[str], case_text: str) -> str:
+def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
     """Return a page: its heading, its parts (HTML already), the case file, and the versions that made it."""
-    parts = list(parts)
+    blocks = list(blocks)
     if case_text:
-        parts += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
+        blocks += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
-    parts.append(f"<footer>Made with {html.escape(made)}.</footer>")
+    blocks.append(f"<footer>Made with {html.escape(made)}.</footer>")
     return (
         "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
         "<meta name='viewport' content='width=device-width, initial-scale=1'>"
         f"<title>{html.escape(heading)}</title><style>{STYLE}</style></head>\n<body>\n<h1>{html.escape(heading)}</h1>\n"
-        + "\n".join(parts)
+        + "\n".join(blocks)
         + "\n</body></html>\n"
     )
 
@@ -53,7 +53,7 @@ def paragraph(text: str) -> str:
 
 
 def failure(text: str) -> str:
-    """Return why something failed as a paragraph."""
+    """Return the reason of a failure as a paragraph."""
     return f"<p class='failed'>{html.escape(text)}</p>"
 
 
@@ -63,7 +63,7 @@ def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
 
 
 def image(figure: Any, description: str) -> str:
-    """Return a matplotlib figure as an image element that holds the picture."""
+    """Return a matplotlib figure as an image element with embedded data."""
     data = base64.b64encode(png(figure)).decode("ascii")
     return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
 

@@ -1,4 +1,4 @@
-"""Kernels compiled ahead by helpers: the table tells kernels as they are, and helpers leave them on disk."""
+"""Kernels compiled ahead by helpers: the table describes the kernels correctly, and helpers cache them."""
 
 import importlib
 import inspect

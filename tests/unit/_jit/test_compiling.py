@@ -1,4 +1,4 @@
-"""Who is told that kernels are compiled, when nobody asked for progress."""
+"""Messages about compilation if no progress is requested."""
 
 import io
 import logging

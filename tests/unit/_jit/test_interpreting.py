@@ -1,4 +1,4 @@
-"""Kernels that Python runs while they are not compiled have the bits of compiled ones."""
+"""Kernels that Python runs before they are compiled have the bits of compiled ones."""
 
 import copy
 import dis

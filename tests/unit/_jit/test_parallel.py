@@ -1,4 +1,4 @@
-"""Work shared by threads: ranges that cover everything, and the same bits for any number of them."""
+"""Work shared by threads: ranges cover everything, with the same bits for any number of threads."""
 
 import numpy as np
 import pytest

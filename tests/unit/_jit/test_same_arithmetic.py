@@ -1,4 +1,4 @@
-"""Kernels have the same bits in the process that compiles them and in one that finds them compiled."""
+"""Kernels give the same bits in the process that compiles them and in one that loads them."""
 
 import importlib
 import os

@@ -1,4 +1,4 @@
-"""Threads of other libraries that wait for work sleep, unless the user wants them otherwise."""
+"""Waiting threads of other libraries sleep, unless the user selects otherwise."""
 
 import os
 import subprocess

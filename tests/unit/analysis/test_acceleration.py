@@ -1,4 +1,4 @@
-"""Anderson mixing: on linear maps as good as a Krylov method, and blind to components that do not count."""
+"""Anderson acceleration: as good as a Krylov method on linear maps, and insensitive to irrelevant components."""
 
 import numpy as np
 from hypothesis import given, settings

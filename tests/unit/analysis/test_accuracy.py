@@ -1,4 +1,4 @@
-"""The accuracy that is promised: forces balance to the criterion whatever the linear solver, or an error says why not."""
+"""Forces balance to the criterion with every linear solver, or an error states why not."""
 
 import logging
 from dataclasses import replace
@@ -145,6 +145,7 @@ def test_bodies_that_only_move_have_no_forces_to_balance(solver):
     assert np.abs(step.displacement - [1.0, 2.0]).max() < 1e-8
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg", "pyamg"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_a_body_that_slides_on_one_at_rest_has_no_forces_to_balance(formulation, solver):
@@ -158,6 +159,7 @@ def test_a_body_that_slides_on_one_at_rest_has_no_forces_to_balance(formulation,
     assert np.abs(step.displacement[upper] - [0.5, 0.0]).max() < 1e-8
 
 
+@pytest.mark.each_value
 @pytest.mark.filterwarnings("ignore:.*across its radius")
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-6])
@@ -206,6 +208,7 @@ def test_what_loose_criteria_leave_is_told_with_its_number(criteria):
         solved(model, solver, linear_tolerance=1e-3, criteria=fc.Criteria(**criteria))
 
 
+@pytest.mark.each_value
 @pytest.mark.filterwarnings("ignore:.*across its radius")
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize(

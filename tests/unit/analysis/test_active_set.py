@@ -1,4 +1,4 @@
-"""The inequality solver against enumeration of all active sets, with every linear solver."""
+"""The active-set solver compared with enumeration of all active sets, with every linear solver."""
 
 import itertools
 

@@ -1,4 +1,4 @@
-"""Starts of load steps: linear where the loads go on, none where they turn or jump."""
+"""Initial guess of load steps: linear extrapolation, none where the load turns or jumps."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Friction on eliminated constraints: pivots in groups, multipliers through other rows, the iteration, and results."""
+"""Friction with eliminated constraints: grouped pivots, nonsymmetric rows, iteration and results."""
 
 import numpy as np
 import pytest
@@ -84,14 +84,6 @@ def test_what_fails_on_eliminated_constraints_is_solved_on_their_compliance(monk
     assert np.abs(one.displacement - other.displacement).max() < 1e-7 * np.abs(one.displacement).max()
 
 
-def test_a_run_with_friction_goes_on_bit_for_bit_with_multigrid():
-    model, ramp = rubbing(), fc.linear_ramp(6)
-    states = []
-    whole = fc.solve(model, ramp, linear_solver="amg", on_step=states.append)
-    rest = fc.solve(model, ramp, linear_solver="amg", resume=states[:4])
-    np.testing.assert_array_equal(rest[-1].displacement, whole[-1].displacement)
-
-
 @pytest.mark.parametrize("n", [30, 5000])
 def test_conjugate_residuals_solve_what_is_not_symmetric_and_never_grow(n):
     rng = np.random.default_rng(n)
@@ -141,21 +133,14 @@ def test_nonsymmetric_equations_with_springs_against_a_dense_solution():
     assert np.abs(out).max() < 1e-8 * np.abs(f).max()
 
 
-@pytest.mark.parametrize("stands", [False, True])
-def test_an_iteration_that_does_not_end_is_told(monkeypatch, stands):
-    if stands:
-        monkeypatch.setattr(ConjugateResiduals, "step", lambda *args: True)
+def test_an_iteration_that_does_not_end_is_told(monkeypatch):
+    monkeypatch.setattr(solver, "MAX_ITERATIONS", 1)
     analysis = Stepping(rubbing(), "amg", 1e-12, Criteria())
-    if not stands:
-        analysis.solver.patience = 1
     n = analysis.model.n_dofs
     rows = csr_array((np.ones(2), ([0, 0], np.flatnonzero(analysis.system.free)[[0, 40]])), shape=(1, n))
     drag = FrictionTerms(csr_array(2.0 * rows))
     f = np.where(analysis.system.free, 1.0, 0.0)
-    made = solver.STANDING if stands else 1
-    with pytest.raises(
-        ConvergenceError, match=rf"conjugate residuals stand at .* times the tolerance after {made} iter"
-    ):
+    with pytest.raises(ConvergenceError, match=r"conjugate residuals stall at .* times the tolerance after 1 iter"):
         analysis.solver.load(f).solve_nonsymmetric(rows, np.zeros(1), np.zeros(1, np.int64), np.zeros(n), 1e-12, drag)
 
 
@@ -220,7 +205,7 @@ def test_constraints_that_repeat_each_other_are_solved_on_their_compliance(caplo
 
 def test_a_matrix_too_large_for_factors_stays_an_error(monkeypatch):
     model = stuck(monkeypatch, limit=10)
-    with pytest.raises(ConvergenceError, match="conjugate gradients stand at"):
+    with pytest.raises(ConvergenceError, match="conjugate gradients stall at"):
         fc.solve(model, fc.linear_ramp(1), linear_solver="amg", criteria=fc.Criteria(max_halvings=0))
 
 

@@ -1,4 +1,4 @@
-"""Friction on a compliance that couples forces in turning frames, and what supports leave undetermined."""
+"""Friction with a compliance that couples forces in rotating frames, and tractions that supports leave undetermined."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Parts of the friction solver by themselves: Lemke's pivots, and products of rows."""
+"""Components of the friction solver: Lemke's method, and products of rows."""
 
 import itertools
 

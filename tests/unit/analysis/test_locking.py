@@ -1,4 +1,4 @@
-"""The warning of locking: its number against two solutions, and no word where nothing locks."""
+"""Locking warning: its number compared with two solutions, and no warning without locking."""
 
 import re
 import warnings
@@ -40,6 +40,7 @@ def solved(model, **options):
     return float((force * step.displacement).sum()), (found or [np.nan])[0]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("linear_solver", ["direct", "amg"])
 @pytest.mark.parametrize(("name", "n"), [("quad4", 6), ("quad8", 1), ("hex8", 3)])
 def test_the_excess_is_that_of_two_solutions(name, n, linear_solver):

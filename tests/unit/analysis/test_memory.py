@@ -1,4 +1,4 @@
-"""A finished analysis goes at once: nothing large waits in a reference cycle for the garbage collector."""
+"""A finished analysis is freed at once: no large object waits in a reference cycle."""
 
 import gc
 
@@ -10,6 +10,7 @@ import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_no_cycle_keeps_a_finished_analysis(solver, formulation):

@@ -1,4 +1,4 @@
-"""Nodes that two node-to-segment pairs share: one condition, whose force both carry by their areas."""
+"""Nodes shared by two node-to-segment pairs: one constraint, whose force both carry by area."""
 
 import logging
 
@@ -48,7 +48,7 @@ def together(step):
     return total
 
 
-@pytest.mark.pairwise
+@pytest.mark.each_value
 @pytest.mark.parametrize("element", ["hex8", "tet4"])
 @pytest.mark.parametrize("penalty", [None, 1e5])
 @pytest.mark.parametrize("solver", ["direct", "amg"])
@@ -70,6 +70,7 @@ def test_two_pairs_are_what_one_of_both_is(solver, penalty, element, caplog):
     assert left.active[mine].any()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("open_side", ["LEFT", "RIGHT"])
 def test_a_node_of_two_pairs_of_different_clearance_is_held_by_the_tighter_one(open_side, solver):
@@ -86,6 +87,7 @@ def test_a_node_of_two_pairs_of_different_clearance_is_held_by_the_tighter_one(o
     assert not loose.force_vectors[rows[shut]].any()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("overlap", [-0.001, 0.001])
 def test_a_wall_at_the_same_nodes_is_no_third_of_them(overlap, solver, caplog):

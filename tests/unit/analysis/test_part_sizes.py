@@ -1,4 +1,4 @@
-"""Parts of load steps of nonlinear bodies: halved where they fail, as small afterwards, and larger after few iterations."""
+"""Substeps of nonlinear bodies: halved on failure, equal afterwards, larger after few iterations."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What a load step reports: gaps of the pairing solved, places that do not depend on the steps, work that was done."""
+"""Results of a load step: gaps of the solved pairing, distances independent of the steps, work."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Sensitivities against differences of whole solutions, in every formulation, dimension and kind of parameter."""
+"""Sensitivities compared with differences of solutions, in every formulation, dimension and kind of parameter."""
 
 from __future__ import annotations
 
@@ -309,14 +309,14 @@ NO_QUANTITIES = [
     (("presure", "c"), "unknown quantity 'presure': did you mean 'pressure'"),
     (("pressure_max", "d"), "unknown contact pair 'd'"),
     (("pressure_max",), r"must have the form \(\"pressure_max\", pair\)"),
-    (("pressure", "c", 0), "point 0 is no node of the secondary side of contact 'c'"),
+    (("pressure", "c", 0), "point 0 is not a node of the secondary side of contact 'c'"),
     (("displacement", 10**6, "y"), "point 1000000 is not in the mesh of"),
     (("displacement", 0, "w"), "unknown component"),
     (("reaction", "CONT_UPPER", "x"), "no support acts along x on group 'CONT_UPPER'"),
 ]
 NO_PARAMETERS = [
     (("g", 0), "unknown parameter 'g'"),
-    (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity by that"),
+    (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity to it"),
     (("E", 0, "1"), "unknown component of E '1': there is none here"),
     (("friction", "c"), "no sensitivity by friction: where all sticks"),
     (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from fastcontact.analytic import block_sliding, cattaneo_mindlin_line, cattaneo_mindlin_sphere
@@ -151,16 +149,6 @@ def test_loop_closes_and_its_area_is_the_dissipation():
     # Unloading and reloading paths are images of each other, so the loop has twice the even part's area.
     path = quad(lambda T: contact.unloaded_to(T).tangential_displacement, -peak, peak, epsrel=1e-11)[0]
     assert contact.dissipation_per_cycle == pytest.approx(2.0 * path, rel=1e-8)
-
-
-@given(load=st.floats(0.0, 1.0), force=st.floats(1e-2, 1e4))
-def test_units_do_not_matter(load, force):
-    small = sphere(load, force)
-    metres = {**LIKE, "E1": 1e11, "E2": 1e11, "R1": 1e-2, "R2": 3e-2}
-    big = cattaneo_mindlin_sphere(**metres, force=force, tangential_force=small.tangential_force)
-    scale = 1e-12 * small.normal.radius
-    assert big.stick_radius * 1e3 == pytest.approx(small.stick_radius, rel=1e-10, abs=1e3 * scale)
-    assert big.tangential_displacement * 1e3 == pytest.approx(small.tangential_displacement, rel=1e-9, abs=scale)
 
 
 def test_unlike_materials_raise_a_warning_with_the_number():

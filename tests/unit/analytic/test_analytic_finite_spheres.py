@@ -1,4 +1,4 @@
-"""The finite-body solution of two half spheres: its table, its interpolation, its relation to Hertz."""
+"""Finite-body solution of two half spheres: table, interpolation, relation to Hertz."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Hertz in a box: tables, boundary conditions, force."""
+"""Exact Hertz solution in a box: tables, boundary conditions, force."""
 
 import json
 import math

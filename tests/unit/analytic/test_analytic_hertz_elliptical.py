@@ -1,4 +1,4 @@
-"""Hertz's elliptical contact against a table, integrals and its limits."""
+"""Elliptical Hertz contact compared with a table, integrals and limits."""
 
 import json
 import math

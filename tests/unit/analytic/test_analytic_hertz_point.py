@@ -1,4 +1,4 @@
-"""Hertz's spheres against tables, integrals, limits and the equations of elasticity."""
+"""Hertz contact of spheres compared with tables, integrals, limits and the equations of elasticity."""
 
 import json
 import math

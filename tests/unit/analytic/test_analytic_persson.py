@@ -1,4 +1,4 @@
-"""Pin in a hole: table, balance, and the displacements that the pressure causes in pin and plate."""
+"""Pin in a hole: table, balance, and displacements due to the pressure."""
 
 import json
 import math

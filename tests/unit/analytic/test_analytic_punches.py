@@ -1,4 +1,4 @@
-"""Rigid punches on half spaces and half planes: tables, integrals, the displacement their pressure causes."""
+"""Rigid punches on half spaces and half planes: tables, integrals, displacements due to the pressure."""
 
 import itertools
 import json

@@ -1,4 +1,4 @@
-"""The library as a whole: its table of names, its imports, its results as plain values."""
+"""The analytic library: table of names, imports, results as plain values."""
 
 import inspect
 import pickle

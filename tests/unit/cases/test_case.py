@@ -1,4 +1,4 @@
-"""Case files are checked whole; every mistake is one line that names the key."""
+"""Case files are checked completely; every mistake is one line that names the key."""
 
 import numpy as np
 import pytest

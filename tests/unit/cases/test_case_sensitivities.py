@@ -1,4 +1,4 @@
-"""Sensitivities that a case file asks for: in the summary, in lines for a person, and what is refused before numerics."""
+"""Sensitivities in case files: summary, text output, refusals before numerics."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Checks of case files: what may be compared with what, and what comes out."""
+"""Checks of case files: admissible comparisons and their results."""
 
 import numpy as np
 import pytest
@@ -120,7 +120,7 @@ def test_it_says_what_is_compared():
         ({"quantity": "pole.pressure", "value": 1.0, "theory": "hertz"}, "either 'theory'.* or 'value'"),
         (
             {"quantity": "pole.pressure", "value": 0.0},
-            r"check\[0\]: the value is 0, so no relative deviation can be told",
+            r"check\[0\]: the value is 0, so there is no relative deviation",
         ),
         *(
             ({"quantity": "pole.pressure", "value": 1.0, name: number}, rf"check\[0\].{name} = .* must be ")

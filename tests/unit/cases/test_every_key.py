@@ -1,4 +1,4 @@
-"""Whatever stands behind any key of a case file: the case is read, or one line names the file and the key."""
+"""Any value of any key of a case file is read, or one line names the file and the key."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ BLOCKS = {"generator": "block-on-block"}
         ({"options": {"mortar": {"normals": "none"}}}, "contact.pair: unknown kind of normals 'none'"),
         ({"options": {"mortar": {"no_option": 1}}}, "contact.pair: unknown option of mortar 'no_option'"),
         ({"parameters": {"p": {"support[0].y": "value+1"}}}, "study.parameters.p.'support.0..y' = 'value.1' must be"),
-        ({"parameters": {"p": {"support[7].y": "value"}}}, "asks for entry .7."),
+        ({"parameters": {"p": {"support[7].y": "value"}}}, "refers to entry .7."),
         ({"quantities": ["P.nothing"]}, "unknown quantity 'P.nothing'"),
         ({"double": ["nothing"]}, "unknown argument of the generator block-on-block in .study. 'nothing'"),
         ({"curves": [{"centre": [0.0, math.inf], "radius": 1.0}]}, "centre = .* must be two finite numbers"),

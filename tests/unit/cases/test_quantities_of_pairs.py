@@ -1,4 +1,4 @@
-"""Torques, moments, components and wear of contacts in checks, and summaries that name units where they are known."""
+"""Torques, moments, components and wear of contacts in checks; summaries with units."""
 
 import tomllib
 

@@ -1,4 +1,4 @@
-"""The command line as a person uses it: what it writes, prints, and returns."""
+"""The command line: files, output and exit codes."""
 
 import io
 import json

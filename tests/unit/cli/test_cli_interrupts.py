@@ -1,4 +1,4 @@
-"""Ctrl-C at any time ends a command with one line; it is neither lost nor told with the program's inside."""
+"""Ctrl-C at any time ends a command with one line, without a traceback."""
 
 import contextlib
 import ctypes
@@ -251,9 +251,8 @@ WHEN = {
 }
 
 
-# By default a run when NumPy is imported, where commands are not told apart yet, and a run and a study later on; studies
-# start workers of their own.
-BY_DEFAULT = [("run", "NumPy is imported"), ("run", "a kernel is compiled"), ("sweep", "the compiler is loaded")]
+# By default a run when NumPy is imported, where commands are not told apart yet, and a study, which starts workers, later on.
+BY_DEFAULT = [("run", "NumPy is imported"), ("sweep", "the compiler is loaded")]
 INTERRUPTED = [
     pytest.param(command, when, marks=() if (command, when) in BY_DEFAULT else pytest.mark.slow)
     for command in COMMANDS

@@ -1,4 +1,4 @@
-"""What a command says of numbers and texts that cannot be drawn: one line, no traceback."""
+"""Messages of commands about numbers and texts that cannot be drawn: one line, no traceback."""
 
 import os
 import shutil
@@ -71,8 +71,9 @@ def test_what_is_written_otherwise_is_told(tmp_path, capsys):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
 def test_a_case_from_a_pipe_is_told(tmp_path, capsys):
     os.mkfifo(tmp_path / "a.toml")
-    assert main(["run", str(tmp_path / "a.toml"), "-o", str(tmp_path / "a.vtkhdf")]) == 1
-    assert "is a pipe or a terminal, and a case is read more than once" in capsys.readouterr().err
+    for case in (str(tmp_path / "a.toml"), "-"):
+        assert main(["run", case, "-o", str(tmp_path / "a.vtkhdf")]) == 1
+        assert "is a pipe or a terminal, and a case is read more than once" in capsys.readouterr().err
 
 
 def test_warnings_take_one_line(tmp_path, capsys):

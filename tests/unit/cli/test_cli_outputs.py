@@ -1,4 +1,4 @@
-"""No command replaces what it reads, or one of its outputs by another; no output is left half written."""
+"""No command replaces its inputs, or one output by another; no output remains incomplete."""
 
 from __future__ import annotations
 
@@ -80,6 +80,7 @@ def test_two_outputs_need_two_files(name, files, monkeypatch, capsys):
     assert not Path("both.png").exists()
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_mounted_twice_is_one(files):
     """No link and no other path tells a bind mount."""
     other, mounting = (
@@ -197,8 +198,9 @@ def test_what_a_shell_opened_to_append_to_is_appended_to(name, files):
     assert main(["run", str(files / "case.toml"), "-o", "/dev/stdout"]) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="files as POSIX numbers them")
-@pytest.mark.parametrize("closed", [pytest.param(">&-", marks=pytest.mark.slow), "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", [">&-", "<&- >&- 2>&-"])
 def test_a_process_without_standard_files(closed, files):
     """As daemons are started: no file that is opened takes the place of what is printed."""
     command = f"'{sys.executable}' -m fastcontact run case.toml -o out.vtkhdf --json out.json {closed}"

@@ -1,4 +1,4 @@
-"""What commands of studies say on the way: progress on a terminal, interruptions, values of parameters."""
+"""Output of study commands: progress on a terminal, interruptions, values of parameters."""
 
 import argparse
 import inspect
@@ -147,7 +147,7 @@ def test_a_study_that_is_interrupted_does_not_wait_for_its_runs(tmp_path):
     assert done.returncode not in (0, 1)
 
 
-def test_adaptive_meshes_tell_their_warnings_as_a_run_does(tmp_path):
+def test_adaptive_meshes_tell_their_warnings_as_a_run_does(tmp_path, monkeypatch, capsys):
     (tmp_path / "coarse.toml").write_text("""
 kinematics = "axisymmetric"
 mesh = { generator = "half-spheres", element = "tri3", size = 12.0 }
@@ -158,12 +158,13 @@ ramp = { steps = 1 }
 secondary = "CONT1"
 primary = "CONT2"
 """)
-    command = [sys.executable, "-m", "fastcontact", "converge", "coarse.toml", "--adaptive", "--tolerance", "0.009"]
-    command += ["--max-dofs", "400", "-q", "--json", "a.json"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, cwd=tmp_path)
-    told = done.stderr.splitlines()
-    assert told, done.stdout
-    assert all(line.startswith("warning: ") for line in told), done.stderr
+    monkeypatch.chdir(tmp_path)
+    main(
+        ["converge", "coarse.toml", "--adaptive", "--tolerance", "0.009", "--max-dofs", "400", "-q", "--json", "a.json"]
+    )
+    told = capsys.readouterr().err.splitlines()
+    assert told
+    assert all(line.startswith("warning: ") for line in told), told
     assert len(set(told)) == len(told)
 
 

@@ -1,4 +1,4 @@
-"""Completion in shells: what bash offers after some words, and what is said without the library."""
+"""Completion in shells: candidates in bash, and the message without the library."""
 
 import shutil
 import subprocess

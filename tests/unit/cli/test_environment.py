@@ -1,4 +1,4 @@
-"""Environments in which libraries would end with a traceback: one line, exit code 1."""
+"""Environments in which libraries would raise a traceback: one line, exit code 1."""
 
 import os
 import subprocess
@@ -38,14 +38,18 @@ def test_a_working_folder_that_is_gone(tmp_path):
     assert done.stderr.count("\n") == 1
 
 
-def test_an_unknown_backend_and_no_docstrings(tmp_path):
-    """The package without assertions and docstrings solves and draws; a backend of matplotlib that nobody knows is told."""
+@pytest.mark.slow
+def test_the_package_without_assertions_and_docstrings_solves_and_draws(tmp_path):
     model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
     fc.write_mesh(tmp_path / "block.med", model.mesh)
     (tmp_path / "case.toml").write_text(CASE, encoding="utf-8")
     (tmp_path / "stripped.py").write_text(STRIPPED, encoding="utf-8")
     assert run([], tmp_path, ["stripped.py"]) == (0, "")
-    code, told = run(["plot", "case.vtkhdf", "--png", "a.png"], tmp_path, MPLBACKEND="nonsense")
+
+
+def test_a_backend_of_matplotlib_that_nobody_knows_is_told(solved_case, tmp_path):
+    result = str(solved_case / "old.vtkhdf")
+    code, told = run(["plot", result, "--png", "a.png"], tmp_path, MPLBACKEND="nonsense")
     assert code == 1
     assert told == (
         "error: matplotlib does not know the backend 'nonsense' of the environment variable MPLBACKEND: unset it, or set it "

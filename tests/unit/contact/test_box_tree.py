@@ -1,4 +1,4 @@
-"""The tree of boxes: every facet is in it once, and boxes hold what is below them."""
+"""The tree of bounding boxes: every facet occurs once, and boxes contain their children."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Facets cut by facets in 3D: areas add up, whatever the position in space; products are integrated exactly."""
+"""Intersection of facets in 3D: areas add up at any position; products are integrated exactly."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Constraints of several pairs as one: every part keeps its own rows, and has zeros where others have something."""
+"""Stacked constraints of several pairs: each keeps its rows and has zeros for the others."""
 
 import numpy as np
 import pytest

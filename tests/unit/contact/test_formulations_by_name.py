@@ -1,4 +1,4 @@
-"""The formulations by name are a mapping like any other."""
+"""The formulations by name are an ordinary mapping."""
 
 from fastcontact.contact.formulations import FORMULATIONS, Formulation
 

@@ -1,4 +1,4 @@
-"""Directions that nodes are held in are the same however the axes lie, and in whatever order nodes come."""
+"""Directions in which nodes are held do not depend on the axes or on the order of nodes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Projection on lines along averaged normals: against a plain solution, and its continuity."""
+"""Projection on lines along averaged normals: compared with a plain solution, and its continuity."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Rigid surfaces made of facets: distances and signs against exact ones, orientation, what is refused."""
+"""Rigid surfaces of facets: distances and signs compared with exact ones, orientation, refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Rigid shapes: distances, normals, their agreement, and wrong arguments."""
+"""Rigid shapes: distances, normals, their consistency, and invalid arguments."""
 
 import numpy as np
 import pytest

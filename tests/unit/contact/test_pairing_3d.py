@@ -149,6 +149,7 @@ def test_too_many_points_on_triangles_are_refused():
         bound(Continuous, "tet4", n_gauss=6)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("options", [{}, {"integration": "simpson"}, {"n_gauss": 3}, {"n_gauss": 5}])
 @pytest.mark.parametrize("element", SOLIDS)
 def test_every_rule_determines_the_field_and_keeps_its_resultant(element, options):

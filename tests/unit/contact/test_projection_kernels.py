@@ -1,4 +1,4 @@
-"""Normals of facets in 3D and projection along them: kernels against NumPy, and against what must hold."""
+"""Facet normals in 3D and projection along them: kernels compared with NumPy, and invariants."""
 
 import numpy as np
 import pytest

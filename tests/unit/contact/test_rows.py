@@ -1,4 +1,4 @@
-"""Rows of constraints from pairings, and places on surfaces, against sums written out."""
+"""Rows of constraints from pairings, and positions on surfaces, compared with explicit sums."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The tree search against brute force."""
+"""The tree search compared with brute force."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The closest facet in three dimensions against brute force, and the frame of the projection."""
+"""The closest facet in three dimensions compared with brute force, and the frame of the projection."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Closest points of single facets in 3D: closed forms against the general descent, and claims of a single minimum."""
+"""Closest points of single facets in 3D: closed forms compared with general descent; unique minima."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The smooth surfaces that facets stand for: exact on circles, cylinders and spheres, nothing on flats, and what is told."""
+"""Surface smoothing: exact on circles, cylinders and spheres, no effect on flat sides; messages."""
 
 import warnings
 
@@ -136,7 +136,7 @@ def test_chords_that_push_sides_apart_are_told(options, told):
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         fc.solve(fit(**options), 1)
-    texts = [str(warning.message) for warning in found if "stand off their arcs" in str(warning.message)]
+    texts = [str(warning.message) for warning in found if "deviate from their arcs" in str(warning.message)]
     assert bool(texts) == told
     if told:
         assert "surface_smoothing=True" in texts[0]
@@ -151,7 +151,7 @@ def test_chords_against_exact_shapes_are_told(n, told):
     with warnings.catch_warnings(record=True) as found:
         warnings.simplefilter("always")
         fc.solve(model, 1)
-    texts = [str(warning.message) for warning in found if "stand off their arcs" in str(warning.message)]
+    texts = [str(warning.message) for warning in found if "deviate from their arcs" in str(warning.message)]
     assert bool(texts) == told
     assert all("formulation 'node_to_segment'" in text for text in texts)
 

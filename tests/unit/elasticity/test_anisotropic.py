@@ -1,12 +1,9 @@
-"""Orthotropic and anisotropic materials: moduli, conditions, axes, element loops against NumPy twins."""
+"""Orthotropic and anisotropic materials: moduli, conditions, axes, element loops compared with NumPy twins."""
 
 import numpy as np
 import pytest
 from models import elastic_model
-from test_assembly import SOLIDS as PLANE
-from test_assembly import patch as plane_patch
-from test_assembly import twin as plane_twin
-from test_assembly_3d import MESHES, twin
+from test_assembly import FLAT, MESHES, plane_patch, twin
 
 import fastcontact as fc
 from fastcontact.elasticity.material_axes import PAIRS
@@ -120,18 +117,18 @@ def test_plane_stress_has_no_stress_out_of_the_plane():
 def test_stiffness_in_space_equals_its_numpy_twin(name):
     mesh = MESHES[name]()
     for D in (fc.Orthotropic(**WOOD, axes=TILTED).moduli("3d"), general()):
-        K, expected = stiffness(mesh, "3d", D[None], numbers(mesh)).toarray(), twin(mesh, D)
+        K, expected = stiffness(mesh, "3d", D[None], numbers(mesh)).toarray(), twin(mesh, "3d", D)
         np.testing.assert_allclose(K, expected, atol=1e-12 * np.abs(expected).max())
         np.testing.assert_array_equal(K, K.T)
 
 
 @pytest.mark.parametrize("kinematics", KINEMATICS[:3])
-@pytest.mark.parametrize("element", PLANE)
+@pytest.mark.parametrize("element", FLAT)
 def test_stiffness_in_the_plane_equals_its_numpy_twin(element, kinematics):
     mesh = plane_patch(element)
     D = fc.Orthotropic(**WOOD, axes=IN_PLANE).moduli(kinematics)
     assert not is_isotropic(D[None]).any()
-    K, expected = stiffness(mesh, kinematics, D[None], numbers(mesh)).toarray(), plane_twin(mesh, kinematics, D)
+    K, expected = stiffness(mesh, kinematics, D[None], numbers(mesh)).toarray(), twin(mesh, kinematics, D)
     np.testing.assert_allclose(K, expected, atol=1e-12 * np.abs(expected).max())
     np.testing.assert_array_equal(K, K.T)
 

@@ -1,4 +1,4 @@
-"""Loads: nodal forces against areas, volumes and fine integration; linear relations; messages."""
+"""Loads: nodal forces compared with areas, volumes and fine quadrature; multi-point constraints; messages."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Bodies with nonlinear laws: tangents by differences, energies, the linear limit, refusals."""
+"""Nonlinear bodies: tangents compared with differences, energies, the linear limit, refusals."""
 
 import numpy as np
 import pytest

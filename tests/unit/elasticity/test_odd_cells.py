@@ -1,4 +1,4 @@
-"""Cells that are inside out, or beside those of another material, and points without cells: loops over elements know them."""
+"""Inverted cells, cells next to another material, and points without cells in element loops."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The largest rotation of a cell against half the curl of the displacement, cell by cell in NumPy."""
+"""The largest rotation of a cell compared with half the curl of the displacement in NumPy."""
 
 import numpy as np
 import pytest

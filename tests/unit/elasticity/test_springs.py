@@ -1,4 +1,4 @@
-"""Springs at nodes and between them: exact solutions, held motions, reactions, messages."""
+"""Springs at nodes and between them: exact solutions, restrained motions, reactions, messages."""
 
 import contextlib
 import tomllib

@@ -1,4 +1,4 @@
-"""Supports taken out of a matrix: what is left and what was taken make the whole, rows and columns of supports are empty."""
+"""Elimination of supports from a matrix: parts add up to the whole; rows and columns of supports are empty."""
 
 import numpy as np
 import pytest

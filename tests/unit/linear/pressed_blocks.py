@@ -1,4 +1,4 @@
-"""Two blocks of cells that do not match, for tests of linear solvers under contact."""
+"""Two non-matching blocks, for tests of linear solvers under contact."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Cholesky factors of sparse matrices: their shape against elimination by hand, their numbers against NumPy's."""
+"""Sparse Cholesky factors: structure compared with elimination by hand, values with NumPy."""
 
 import numpy as np
 import pytest

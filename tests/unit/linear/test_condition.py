@@ -1,4 +1,4 @@
-"""The estimate of condition numbers beside exact ones, and matrices that are singular though their factors hide it."""
+"""Estimates of condition numbers compared with exact ones; singular matrices with inconspicuous factors."""
 
 import numpy as np
 import pytest
@@ -40,6 +40,7 @@ def test_what_overflows_has_no_finite_condition():
         assert not np.isfinite(condition(csr_array(np.eye(3)), lambda x, w=wrong: x * w, lambda x, w=wrong: x * w))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("parts", [1, 3])
 @pytest.mark.parametrize("rows", [(0, 1), (70, 3), (199, 198)])
 def test_forces_through_equal_rows_are_refused_though_no_pivot_is_small(parts, rows):

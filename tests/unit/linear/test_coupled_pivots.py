@@ -1,4 +1,4 @@
-"""Equations of many nodes that share unknowns: their pivots are factorised, and no column of the inverse is solved for."""
+"""Constraints that share unknowns: pivots are factorised, and no column of the inverse is computed."""
 
 import numpy as np
 import pressed_blocks
@@ -11,6 +11,7 @@ from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
+from fastcontact.linear.elimination import elimination_kernels
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.solvers import amg
@@ -134,6 +135,23 @@ def check_beside_dual(n, element, friction, most):
     assert found.force == pytest.approx(factors.force, abs=1e-6 * np.abs(factors.force).max())
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_kernels_take_weights_of_pivots_themselves(kind):
+    rng = np.random.default_rng(7)
+    n, pivots = 12, np.array([3, 7, 1, 10])
+    W = csr_array(np.where(rng.uniform(size=(4, n)) < 0.6, rng.normal(size=(4, n)), 0.0).astype(kind))
+    T = np.eye(n)
+    T[pivots] = W.toarray()
+    x, r = rng.normal(size=n).astype(kind), rng.normal(size=n).astype(kind)
+    of_W, close = (W.indptr, W.indices, W.data), 1e-5 if kind == np.float32 else 1e-13
+    moved = r.copy()
+    elimination_kernels.move_forces(pivots, *of_W, moved)
+    assert moved == pytest.approx(T.T @ r, abs=close)
+    completed = x.copy()
+    elimination_kernels.complete(pivots, *of_W, completed)
+    assert completed == pytest.approx(T @ x, abs=close)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_standard_multipliers_over_a_whole_interface_cost_multigrid_what_dual_ones_do(friction):
     check_beside_dual(10, "hex8", friction, 2.0)
@@ -151,7 +169,6 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     monkeypatch.setattr("fastcontact.linear.multigrid.solver.MOST_COLUMNS", 20)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.LARGEST_BLOCK", 8)
     monkeypatch.setattr("fastcontact.linear.elimination.pivot_order.FULL_UP_TO", 8)
-    monkeypatch.setattr("fastcontact.linear.elimination.basis_transformation.eliminate_transformed", lambda *_: None)
     model = pressed(5, element, **options)
     solver, found = solved(model, "amg")
     assert "columns of the inverse stiffness" in solver.gave_up

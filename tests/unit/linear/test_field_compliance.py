@@ -1,8 +1,9 @@
-"""Forces of points that a field represents in part: the equations of the field, and continuous contact by multigrid."""
+"""Forces at points that a field represents in part: equations of the field, and continuous contact by multigrid."""
 
 import numpy as np
 import pytest
 from models import elastic_model
+from pairwise import first_of
 from pressed_blocks import pressed
 from scipy.sparse import csr_array
 
@@ -52,7 +53,7 @@ def rows_at_points(projection, fixed, seed=1):
     return csr_array(projection.P @ nodes), rng.normal(size=m)
 
 
-@pytest.mark.parametrize("closed", ["all", "some", "few", "one"])
+@pytest.mark.parametrize("closed", first_of(2, ["all", "some", "few", "one"]))
 def test_the_equations_of_the_field_are_those_of_the_points(closed):
     projection = along_a_line()
     m = projection.P.shape[0]
@@ -165,7 +166,10 @@ def step_of(model, name):
 
 
 # As others, but for one more option.
-LONG = ("few", "soft penalty", "penalty beside", "tet10", "hex20", "hex20, penalty", "hex20 on a wall")
+LONG = (
+    "few", "soft penalty", "penalty beside", "tet10", "hex20", "hex20, penalty", "hex20 on a wall", "tet10, curved",
+    "tet10 on a wall", "stiff penalty",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=pytest.mark.slow) if c in LONG else c for c in CASES])

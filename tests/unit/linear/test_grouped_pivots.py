@@ -1,4 +1,4 @@
-"""Pivots of equations that come in groups, and multipliers that act through other rows."""
+"""Grouped pivots, and multipliers that act through other rows."""
 
 import numpy as np
 import pytest

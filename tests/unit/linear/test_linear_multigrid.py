@@ -1,4 +1,4 @@
-"""Multigrid against NumPy and SciPy: kernels, set-up, equations; bits, bytes and allocations."""
+"""Multigrid compared with NumPy and SciPy: kernels, set-up, constraints; bits, bytes and allocations."""
 
 import logging
 import tracemalloc
@@ -7,6 +7,7 @@ from dataclasses import replace
 import numba
 import numpy as np
 import pytest
+from pairwise import first_of
 from scipy.sparse import bsr_array, csr_array, diags_array, eye_array
 
 import fastcontact as fc
@@ -57,9 +58,13 @@ def random_blocks(m, n, rows=40, columns=30, dtype=float, seed=0):
     return bsr_array((data, indices, indptr), shape=(rows * m, columns * n)), rng
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-@pytest.mark.parametrize(("m", "n"), [(3, 3), (2, 2), (6, 6), (3, 6), (6, 3), (2, 3), (1, 1), (2, 1)])
-def test_products_are_those_of_scipy(m, n, dtype):
+@pytest.mark.parametrize(
+    ("dtype", "m", "n"),  # by default those that whole runs compile
+    first_of(4, [(np.float32, 3, 6), (np.float64, 3, 3), (np.float32, 6, 6), (np.float32, 2, 3)])
+    + [pytest.param(dtype, m, n, marks=pytest.mark.slow) for dtype in (np.float32, np.float64)
+       for m, n in ((2, 2), (6, 3), (1, 1), (2, 1))],
+)  # fmt: skip
+def test_products_are_those_of_scipy(dtype, m, n):
     A, rng = random_blocks(m, n, dtype=dtype)
     x, z = rng.normal(size=A.shape[1]).astype(dtype), rng.normal(size=A.shape[0]).astype(dtype)
     y = np.full(A.shape[0], np.nan, dtype)
@@ -191,7 +196,8 @@ def test_the_spectrum_is_bounded_and_chebyshev_stays_small_on_its_upper_part():
     K, modes, _, _ = problem()
     level = Hierarchy(matrix_of(K), modes).levels[0]
     inverse = bsr_array((level.inverse.reshape(-1, 3, 3), np.arange(level.n // 3), np.arange(level.n // 3 + 1)))
-    exact = np.linalg.eigvals((inverse @ K).toarray()).real.max()
+    factor = np.linalg.cholesky(inverse.toarray())
+    exact = np.linalg.eigvalsh(factor.T @ (K @ factor)).max()
     assert largest_eigenvalue(level) <= exact * (1 + 1e-10)
     assert exact <= level.bound
     for degree in (1, 2, 3):
@@ -372,7 +378,7 @@ def prepared(precision="single", scale=1.0, divisions=(12, 11, 10)):
     return solver, scale * f, fixed
 
 
-@pytest.mark.parametrize("equations", [0, 6])
+@pytest.mark.parametrize("equations", first_of(1, [0, 6]))
 def test_pyamg_finds_the_same_and_takes_as_many_iterations(equations):
     solver, f, fixed = prepared()
     K, modes, _, _ = problem((12, 11, 10))
@@ -411,16 +417,6 @@ def test_going_on_under_other_equations_is_starting_there():
     again, _ = solver.load(f).solve(second[:0], np.zeros(0), guess=u)
     assert np.abs(again - u).max() < 1e-8 * np.abs(u).max()
     assert solver.counters.iterations > made
-
-
-def test_units_do_not_change_the_iterations():
-    counts, solutions = [], []
-    for scale in (1.0, 1e-25, 1e30):
-        solver, f, _ = prepared(scale=scale)
-        solutions.append(solver.load(f).full_solution(np.zeros(len(f))))
-        counts.append(solver.counters.iterations)
-    assert counts[0] == counts[1] == counts[2]
-    assert solutions[1] == pytest.approx(solutions[0], rel=1e-6, abs=1e-9 * np.abs(solutions[0]).max())
 
 
 def test_both_precisions_agree_and_single_takes_half_the_memory():

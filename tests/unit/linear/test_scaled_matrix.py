@@ -1,4 +1,4 @@
-"""The matrix that multigrid solves with: its numbers split into two parts multiply as they did."""
+"""The matrix of multigrid: entries split into two parts multiply like the original."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Symmetric changes of a matrix by few rows, against dense matrices; sparse rows scaled and taken."""
+"""Low-rank symmetric changes of a matrix compared with dense matrices; scaling and selection of sparse rows."""
 
 import numpy as np
 import pytest

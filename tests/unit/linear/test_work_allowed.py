@@ -1,4 +1,4 @@
-"""Multigrid hands over to factors once a load step has taken more work than they would."""
+"""A factorisation replaces multigrid once a load step has taken more work than it would."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""One test for every reference element: a new element passes it or is wrong."""
+"""One test for every reference element; every new element must pass it."""
 
 import numpy as np
 import pytest

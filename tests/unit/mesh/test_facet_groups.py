@@ -1,4 +1,4 @@
-"""Facets chosen by place, and meshes cut open along them."""
+"""Facets selected by position, and meshes cut along them."""
 
 import numpy as np
 import pytest

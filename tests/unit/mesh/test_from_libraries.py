@@ -1,4 +1,4 @@
-"""Meshes that gmsh, meshio and PyVista hold in memory, and groups of facets by where they lie."""
+"""Meshes from gmsh, meshio and PyVista in memory, and groups of facets by position."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Quality figures of meshes known by heart, and the cells that are refused."""
+"""Quality measures of known meshes, and refused cells."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Facets of one cell only, and cells that facets join, against Python's sorted tuples."""
+"""Outer facets, and cells joined by facets, compared with sorted tuples in Python."""
 
 from collections import Counter
 

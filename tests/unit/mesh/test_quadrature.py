@@ -1,4 +1,4 @@
-"""Quadrature rules against the exact integrals of monomials."""
+"""Quadrature rules compared with exact integrals of monomials."""
 
 import itertools
 from math import factorial

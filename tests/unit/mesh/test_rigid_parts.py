@@ -1,4 +1,4 @@
-"""Parts of bodies between hinges, against the rank of the stiffness matrix: a hinge is a motion that costs no energy."""
+"""Parts of bodies between hinges, compared with the rank of the stiffness matrix."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Cells that are the wrong way round are turned; a mesh that is folded is refused, since turning would hide it."""
+"""Inverted cells are reoriented; a folded mesh is refused, since reorientation would hide the fold."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""What a user gives in haste: turned normals, groups of cells for forces, numbers that mean nothing here."""
+"""Careless input: reversed normals, groups of cells for forces, numbers without meaning."""
 
 import numpy as np
 import pytest

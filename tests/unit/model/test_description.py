@@ -1,4 +1,4 @@
-"""What will be solved, in words."""
+"""The text description of a model."""
 
 import numpy as np
 

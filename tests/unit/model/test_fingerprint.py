@@ -1,4 +1,4 @@
-"""Digests of a model: equal for the same case however it was put together, unequal for every other."""
+"""Digests of a model: equal for the same case however it was built, different for every other case."""
 
 import numpy as np
 import pytest

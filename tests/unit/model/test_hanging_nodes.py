@@ -1,4 +1,4 @@
-"""Nodes that hang on facets of their own body are found in every dimension and order, and no others."""
+"""Hanging nodes on facets of their own body are found in every dimension and order."""
 
 import warnings
 

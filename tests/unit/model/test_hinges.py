@@ -1,4 +1,4 @@
-"""Bodies that hang together at one node or edge are mechanisms unless something holds both parts."""
+"""Bodies connected at one node or edge are mechanisms unless both parts are supported."""
 
 import numpy as np
 import pytest

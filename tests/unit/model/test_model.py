@@ -1,4 +1,4 @@
-"""A model is checked whole before any numerics: one clear line each."""
+"""A model is checked completely before any numerics, with one clear line for each mistake."""
 
 import dataclasses
 import inspect

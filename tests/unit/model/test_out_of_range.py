@@ -1,4 +1,4 @@
-"""Numbers whose squares no computer holds are refused by their names, before any numerics overflow."""
+"""Numbers whose squares overflow are refused by name before any numerics."""
 
 import warnings
 

@@ -1,4 +1,4 @@
-"""How deep bodies lie inside each other."""
+"""Depth of the initial penetration of bodies."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Supports that alone bring contact nodes into the other side are told, whatever the formulation."""
+"""Supports that drive contact nodes into the other side give a warning, in every formulation."""
 
 import warnings
 
@@ -44,6 +44,7 @@ def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulati
         model.check()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("sides", [("CONT_UPPER", "CONT_LOWER"), ("CONT_LOWER", "CONT_UPPER")])

@@ -1,4 +1,4 @@
-"""Pretension sections: what is refused, what case files take, what results hold."""
+"""Pretension sections: refusals, case files, results."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What a model refuses before any numerics, where no other test of its part asks for it."""
+"""Models refused before any numerics that no other test covers."""
 
 import dataclasses
 

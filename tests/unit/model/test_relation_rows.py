@@ -1,4 +1,4 @@
-"""Supports and relations along normals, and between groups: a turned model moves as the model, turned."""
+"""Constraints along normals and between groups: a rotated model gives rotated results."""
 
 import tomllib
 
@@ -61,6 +61,7 @@ def test_supports_along_normals_turn_with_the_body(element):
     np.testing.assert_allclose(other.reaction, one.reaction @ Q.T, atol=1e-9 * np.abs(one.reaction).max())
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_contact_between_turned_bodies_is_the_same(formulation, solver):

@@ -1,4 +1,4 @@
-"""Two pairs may not press the same facets on each other, in whichever roles."""
+"""Two pairs must not join the same facets, in either role."""
 
 import numpy as np
 import pytest
@@ -183,6 +183,7 @@ def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation
         assert contact.pressure == pytest.approx(np.ones(len(contact.points)), rel=1e-6)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("solver", ["direct", "amg"])
 @pytest.mark.parametrize("friction", [None, 0.3])
 @pytest.mark.parametrize("swapped", [False, True])

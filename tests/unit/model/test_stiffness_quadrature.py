@@ -1,4 +1,4 @@
-"""How exact the quadrature of the stiffness is: the integral of squared gradients."""
+"""Accuracy of the quadrature of the stiffness: the integral of squared gradients."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Without any support the axis of an axisymmetric model stays closed, and says so."""
+"""Without a support the axis of an axisymmetric model remains closed, and the description says so."""
 
 import logging
 
@@ -19,6 +19,7 @@ def spheres(mesh, held, **contact):
     return fc.solve(model, fc.linear_ramp(1))[-1]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar", None])
 @pytest.mark.parametrize("element", ["tri3", "quad4", "tri6"])
 def test_results_are_those_of_the_model_whose_axis_is_held(element, formulation):

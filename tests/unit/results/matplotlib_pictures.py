@@ -1,4 +1,4 @@
-"""What stands where in pictures of matplotlib."""
+"""Positions of items in Matplotlib pictures."""
 
 from itertools import combinations
 

@@ -1,4 +1,4 @@
-"""What goes wrong below a result file: the disk fails, somebody stops the program, another program takes the file away."""
+"""Failures below a result file: a failing disk, interruptions, another program that replaces the file."""
 
 from __future__ import annotations
 

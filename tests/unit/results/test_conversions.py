@@ -1,4 +1,4 @@
-"""Results for PyVista, pandas and xarray: all steps, with the numbers of the file; a missing library is told."""
+"""Results for PyVista, pandas and xarray: all steps, with the numbers of the file; a missing library is reported."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Result files that somebody has forged, cut or taken apart: one line, before anything large is read."""
+"""Forged, truncated or dismantled result files: one line, before anything large is read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many small steps in one file: what one more of them costs does not grow with those that are there."""
+"""Many small steps in one file: the cost of a step does not grow with their number."""
 
 from __future__ import annotations
 
@@ -38,6 +38,7 @@ def test_a_step_writes_what_it_adds_and_little_more(
     assert late < 1.1 * early
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shared", [pytest.param(write_arrays.SHARED, marks=pytest.mark.slow), 0])
 def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """However little HDF5 may keep, the file holds every step."""

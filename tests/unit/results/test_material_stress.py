@@ -1,4 +1,4 @@
-"""Stress where materials meet: each side has its own, in the result, its file, for viewers, in pictures and summaries."""
+"""Stress at material interfaces: separate for each side, in results, files, viewers, pictures and summaries."""
 
 import json
 

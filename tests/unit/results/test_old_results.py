@@ -1,4 +1,4 @@
-"""Result files of every schema version that there ever was, this one included, are read for ever (resources/make.py)."""
+"""Result files of every schema version, the current one included, remain readable (resources/make.py)."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def test_viewers_are_shown_the_same_steps(old: tuple[Path, dict, int]) -> None:
 @pytest.mark.parametrize("old", [name for name in FILES if version(name) == 1], indirect=True)
 def test_files_without_a_restart_state_cannot_be_resumed_and_stay_as_they_are(old: tuple[Path, dict, int]) -> None:
     path, before = old[0], old[0].read_bytes()
-    message = "was written by an earlier fastcontact, which kept nothing to go on from: name"
+    message = "was written by an earlier fastcontact, which stored no data to resume from: name"
     with pytest.raises(FileError, match=message):
         ResultWriter(path, open_results(path).mesh, resume=True)
     assert path.read_bytes() == before

@@ -1,4 +1,4 @@
-"""Result files survive whatever ends their writer, and are written on after it."""
+"""Result files survive any end of their writer, and can be continued."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ import contextlib
 import dataclasses
 import os
 import shutil
-import subprocess
-import sys
-import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -73,7 +70,7 @@ def recorded(path: Path, n_steps: int, monkeypatch: pytest.MonkeyPatch) -> tuple
     return writes, ends
 
 
-@pytest.mark.parametrize("apart", [4, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("apart", [12, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("n_steps", "from_step"), [(2, 0), (65, 64)])
 def test_every_write_may_be_the_last_one(
     n_steps: int, from_step: int, apart: int, path: Path, monkeypatch: pytest.MonkeyPatch
@@ -321,7 +318,7 @@ def test_a_second_writer_cannot_resume_either(path: Path) -> None:
 
 def test_what_is_no_result_is_not_resumed(path: Path) -> None:
     path.write_text("mine")
-    with pytest.raises(FileError, match="is no HDF5 file"):
+    with pytest.raises(FileError, match="is not an HDF5 file"):
         ResultWriter(path, MESH, resume=True)
     assert path.read_text() == "mine"
     assert os.listdir(path.parent) == [path.name]
@@ -348,33 +345,6 @@ def test_a_folder_that_vanishes_is_told_at_the_next_step(tmp_path: Path) -> None
     assert len(results) == 1
     assert "no longer there" in results.error
     assert len(resumed(moved, fc.linear_ramp(3))) == 3
-
-
-FULL = """
-    import sys
-    sys.path.insert(0, sys.argv[1])
-    import test_resume as t
-    t.resumed(t.Path(sys.argv[2]), t.fc.linear_ramp(60))
-"""
-
-
-@pytest.mark.slow  # by default `test_a_disk_that_is_full_stops_the_run`, where a limit stands for the end of the disk
-def test_a_full_disk_costs_no_step_and_the_run_goes_on_when_there_is_room(small_disk: Path, path: Path) -> None:
-    full = small_disk / "run.vtkhdf"
-    command = [sys.executable, "-c", textwrap.dedent(FULL), str(Path(__file__).parent), str(full)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    last = done.stderr.strip().splitlines()[-1]
-    assert done.returncode == 1
-    assert f"'{full}' cannot be written at step" in last
-    assert "No space left on device" in last
-    n_steps = len(open_results(full))
-    assert f"{n_steps} steps are complete: see whether the disk is full" in last
-    assert 0 < n_steps < 60
-    shutil.copy(full, path)
-    assert len(resumed(path, fc.linear_ramp(60))) == 60
-    whole = fc.solve(spheres(), fc.linear_ramp(60))[-1]
-    last_step = open_results(path)[-1]
-    assert np.abs(last_step.displacement - whole.displacement).max() <= 1e-12 * np.abs(whole.displacement).max()
 
 
 # ---------------------------------------------------------------------------------------------- packing

@@ -1,4 +1,4 @@
-"""What notebooks and terminals show of results, meshes, models, studies and pictures: short, and right."""
+"""Short displays of results, meshes, models, studies and pictures in notebooks and terminals."""
 
 import contextlib
 import io
@@ -238,6 +238,7 @@ print("listeners", len(compiling.listeners))
 """
 
 
+@pytest.mark.slow
 def test_compiling_is_told_once(tmp_path):
     """To the log, and on the line of the progress; Numba's own functions and cached ones say nothing."""
     run = subprocess.run(

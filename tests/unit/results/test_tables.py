@@ -1,4 +1,4 @@
-"""Tables: the right numbers in the right rows, and CSV files that lose no bit."""
+"""Tables: correct numbers in the right rows, and lossless CSV files."""
 
 from __future__ import annotations
 

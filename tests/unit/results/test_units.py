@@ -1,4 +1,4 @@
-"""Units that a model names: read from a text, shown by everything that comes of it, and no number depends on them."""
+"""Units of a model: read from a text, shown in all outputs, without effect on numbers."""
 
 import numpy as np
 import pytest

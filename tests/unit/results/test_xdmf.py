@@ -1,4 +1,4 @@
-"""XDMF beside a result file: every reference leads to the right numbers, for us and for VTK's own reader."""
+"""XDMF sidecar of a result file: every reference leads to the right numbers, also for VTK's reader."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Grace project files: Grace itself draws them, and says the same numbers."""
+"""Grace project files: Grace draws them and reports the same numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The benchmark suite runs at its smallest size, and its files hold what they promise."""
+"""The benchmark suite runs at its smallest size, and its files are complete."""
 
 import json
 
@@ -30,69 +30,21 @@ def test_the_table_of_robustness(tmp_path, capsys):
         assert row["step"]["iterations"] < 3 * row["linear"]["iterations"]
 
 
-def test_the_table_of_robustness_by_numbers_of_unknowns():
-    robustness = suite("subjects").load("robustness")
-    for divisions in (12, 20, 40):
-        model = robustness.blocks(divisions)
-        assert robustness.divisions_of(model.n_dofs) == divisions
-    meshes = [text for text, _ in robustness.variations(40) if text.startswith("mesh")]
-    assert meshes == ["mesh 40", "mesh 40"]
-
-
-def test_the_table_tells_what_failed():
-    failed = {"varied": "nu 0.5", "friction": 0.0, "n_dofs": 12, "failed": "no way"}
-    assert suite("subjects").load("robustness").lines([failed])[1].endswith("failed: no way")
-
-
 @pytest.mark.slow
 def test_the_table_of_threads(tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", "threads", "--smallest", "--json", str(path)]) == 0
-    told = capsys.readouterr().out
-    assert "serial part by Amdahl's law" in told
-    assert "memory read by a sum" in told
+    assert "serial part by Amdahl's law" in capsys.readouterr().out
     (entry,) = json.loads(path.read_text())["tables"]["threads"]
     one, two = entry["runs"]
     assert (one["threads"], two["threads"]) == (1, 2)
     assert one["efficiency"] == 1.0
-    assert two["efficiency"] == pytest.approx(one["wall_s"] / two["wall_s"] / 2)
     assert one["iterations"] == two["iterations"] > 0
-    for run in entry["runs"]:
-        assert 0.0 < run["cold_wall_s"] < run["wall_s"]
-        assert "linear/multigrid/cycle_kernels.py/multiply" in run["stages"]
-        # Numbers in single precision, and as many again in the low part; places and vectors beside them.
-        assert 1.4 < run["exact_bytes"] / run["single_bytes"] < 2.0
-        assert run["single_bytes"] > 8 * run["n_dofs"] > 0
-        for name in ("single", "exact"):
-            assert run[f"{name}_rate"] == pytest.approx(run[f"{name}_bytes"] / run[f"{name}_s"])
-        assert run["read_rate"] > 0.0
-    assert all(len(stage["wall_s"]) == 2 and stage["serial_s"] >= 0.0 for stage in entry["stages"])
 
 
-def test_the_serial_part_of_walls_on_some_threads():
-    amdahl = suite("subjects").load("threads").amdahl
-    assert amdahl([1, 2, 4], [1.0 + 8.0, 1.0 + 4.0, 1.0 + 2.0]) == pytest.approx((1.0, 8.0))
-    assert amdahl([1, 2, 4], [1.0, 2.0, 3.0]) == (2.0, 0.0)  # slower with each thread
-    assert amdahl([1, 2], [3.0, 1.0]) == pytest.approx((0.0, 2.8))  # more than twice as fast
-    assert amdahl([1], [3.0]) == (3.0, 0.0)
-
-
-def test_what_a_function_calls_outside_of_the_package_is_its_own():
-    """Own times by function and caller, as Python's profiler keeps them."""
-    ours, other, outer = ("/x/fastcontact/a/b.py", 1, "f"), ("/x/fastcontact/c.py", 1, "g"), ("/y/library.py", 1, "h")
-    inner, main_ = ("~", 0, "<built-in>"), ("/y/main.py", 1, "main")
-    stats = {
-        main_: (1, 1, 0.5, 9.0, {}),
-        ours: (1, 1, 1.0, 5.0, {main_: (1, 1, 1.0, 5.0)}),
-        other: (1, 1, 2.0, 3.0, {main_: (1, 1, 2.0, 3.0)}),
-        outer: (4, 4, 4.0, 4.4, {ours: (3, 3, 3.0, 3.3), other: (1, 1, 1.0, 1.1)}),
-        inner: (4, 4, 0.4, 0.4, {outer: (4, 4, 0.4, 0.4)}),
-    }
-    found = suite("subjects").load("threads").stages(stats)
-    assert found == pytest.approx({"a/b.py/f": 1.0 + 3.0 + 0.3, "c.py/g": 2.0 + 1.0 + 0.1, "other": 0.5})
-
-
-@pytest.mark.parametrize("name", [pytest.param(s, marks=SLOW if s == "startup" else ()) for s in sorted(SUBJECTS)])
+@pytest.mark.parametrize(
+    "name", [pytest.param(s, marks=SLOW if s in ("startup", "study", "contact") else ()) for s in sorted(SUBJECTS)]
+)
 def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     path = tmp_path / "run.json"
     assert main(["bench", name, "--smallest", "--json", str(path)]) == 0
@@ -106,41 +58,11 @@ def test_smallest_size_runs_and_is_recorded(name, tmp_path, capsys):
     assert name in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    "problem",
-    [
-        pytest.param("sphere-on-block", marks=SLOW),
-        "forma04c",
-        pytest.param("pressed-blocks", marks=SLOW),
-        pytest.param("pushed-blocks", marks=SLOW),
-    ],
-)
-def test_contact_in_detail(problem, tmp_path):
-    path = tmp_path / "contact.json"
-    assert main(["bench", "contact", "--problem", problem, "--dofs", "1500", "--json", str(path), "-q"]) == 0
-    found = json.loads(path.read_text())
-    two_dimensions = {"superlu"} if problem == "forma04c" else set()
-    measured = {"problem", "n_dofs", "linear", "cold_step", "twenty_steps", "from_assembly", "peak_bytes", "threads"}
-    assert set(found) == measured | two_dimensions
-    assert set(found["linear"]) == {"cpu_s", "iterations", "setup_cpu_s"}
-    assert set(found["cold_step"]) == {"cpu_s", "ratio_to_linear"}
-    assert set(found["from_assembly"]) == {"linear_cpu_s", "cold_step_cpu_s", "ratio_to_linear"}
-    assert set(found["twenty_steps"]) == {"cpu_s", "ratio_to_linear", "setups", "linear_iterations"}
-    assert 750 < found["n_dofs"] < 4000
-    assert found["twenty_steps"]["linear_iterations"] > found["linear"]["iterations"]
-
-
 def test_comparison_with_a_stored_run(tmp_path, capsys):
     path = str(tmp_path / "run.json")
     main(["bench", "search", "--smallest", "--json", path])
     assert main(["bench", "search", "--smallest", "--compare", path]) == 0
     assert "to stored" in capsys.readouterr().out
-
-
-def test_scaling_pictures(tmp_path):
-    pytest.importorskip("matplotlib")
-    assert main(["bench", "search", "--sizes", "100", "900", "--png", str(tmp_path / "png"), "-q"]) == 0
-    assert (tmp_path / "png" / "search.png").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Values set in a parsed case file by path, and what a wrong path says."""
+"""Values set in a parsed case file by path, and the message of a wrong path."""
 
 import pytest
 

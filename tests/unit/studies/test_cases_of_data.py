@@ -1,4 +1,4 @@
-"""Studies of cases that were built of data in Python, and of what no study can be made."""
+"""Studies of cases built from data in Python, and unsuitable cases."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A study of made-up runs, whose limits and model errors are known: tables, sentences, pictures, JSON and CSV."""
+"""A study of synthetic runs with known limits and model errors: tables, sentences, pictures, JSON and CSV."""
 
 import json
 
@@ -136,7 +136,7 @@ def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):
     for k, level in enumerate(levels):
         level["values"]["pressure_max"] = 1.04 * PRESSURE * (1.0 - 0.16 * 0.25**k)
     text = "\n".join(gathered(case, [levels]).lines())
-    assert "that it agrees is no proof of a good mesh" in text
+    assert "this agreement is no proof of a good mesh" in text
     assert "Level 1 " in text
 
 

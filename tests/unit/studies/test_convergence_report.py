@@ -1,4 +1,4 @@
-"""The report of a study: all its tables on one page that needs nothing from outside."""
+"""The report of a study: all tables on one self-contained page."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The check of what tests do not reach: it finds lines and branches, and accepts none without a reason."""
+"""The coverage check finds uncovered lines and branches, and requires a reason for each."""
 
 import importlib.util
 import tomllib

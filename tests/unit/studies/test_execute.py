@@ -1,4 +1,4 @@
-"""Runs side by side: one that takes its process with it is tried once more alone, and costs no other."""
+"""Parallel runs: one that kills its process is tried once more alone, without loss of others."""
 
 import os
 import signal

@@ -23,6 +23,7 @@ def case(root):
     return root / "data/cases/forma04c.toml"
 
 
+@pytest.mark.slow
 def test_a_dask_scheduler_by_its_address(case, tmp_path):
     """One value on one worker; `docs/howto/cluster.md` holds the bits of several against those of processes here."""
     distributed = pytest.importorskip("distributed", reason="needs Dask: pip install 'fastcontact[dask]'")
@@ -66,6 +67,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 def test_an_mpi_process_that_dies_ends_the_study(case, tmp_path, mpiexec):
     script = tmp_path / "dying.py"
     script.write_text(DYING)
@@ -77,6 +79,7 @@ def test_an_mpi_process_that_dies_ends_the_study(case, tmp_path, mpiexec):
     assert not (tmp_path / "x.json").exists()
 
 
+@pytest.mark.slow
 def test_without_mpiexec_a_study_ends(case, tmp_path, mpiexec):
     """Some libraries of MPI can start processes by themselves; where they cannot, the study does not wait for ever."""
     command = [sys.executable, "-m", "fastcontact", "sweep", str(case), "--set", "approach=1,2", "--level", "0"]

@@ -1,4 +1,4 @@
-"""Studies of Python functions that make models: order and limit of known problems, what is refused, and how it is told."""
+"""Studies of Python functions: order and limit of known problems, refusals, reports."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Runs of a study by themselves: their case, their key in the store, and what becomes of a run that goes wrong."""
+"""Single runs of a study: case, key in the store, failures."""
 
 from dataclasses import replace
 

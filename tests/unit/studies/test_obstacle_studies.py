@@ -1,4 +1,4 @@
-"""Studies of any case: rigid obstacles, every generator, theories that are exact, limits that do not settle."""
+"""Studies of any case: rigid obstacles, every generator, exact theories, limits that do not settle."""
 
 import json
 
@@ -166,6 +166,7 @@ def test_values_settle_where_the_last_change_is_small(values, settles):
     assert fit_limit(0.5 ** np.arange(4.0), values).converging is settles
 
 
+@pytest.mark.slow
 def test_pictures_of_a_study_show_uniform_and_shared_theories(tmp_path):
     for case in ("press-fit", "cylinder-on-block"):
         words = ["converge", case, "--levels", "1", "--workers", "1", "--png", str(tmp_path / "s.png"), "-q"]

@@ -1,4 +1,4 @@
-"""Quantities between the nodes: where a field is largest, where a pressure ends."""
+"""Quantities between nodes: maxima of fields, edges of pressures."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""A study that is killed in the middle goes on where it stopped, and runs nothing twice."""
+"""A study that is killed continues where it stopped, and runs nothing twice."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Sweeps: right numbers, tables and files, the store, failures that do not end the rest."""
+"""Sweeps: numbers, tables and files, the store, failures that do not end the others."""
 
 import json
 import re
@@ -102,6 +102,7 @@ def test_theory_is_a_curve_between_the_points_and_axes_are_of_one_kind(sweep):
     )
 
 
+@pytest.mark.slow
 def test_a_theory_that_the_parameter_does_not_change_is_told(case):
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
     found = parameter_sweep(case, {"material[0].E": (1e4, 2e4), "approach": (0.4, 4.0)}, level=0, workers=1)

@@ -1,4 +1,4 @@
-"""A small deck to change: two cubes, the upper one pressed down."""
+"""A small deck for modification: two cubes, the upper one pressed down."""
 
 from case_texts import square
 

@@ -1,4 +1,4 @@
-"""Keyword blocks: parameters, quoted names, lines that go on, files that are included."""
+"""Keyword blocks: parameters, quoted names, continuation lines, included files."""
 
 import pytest
 
@@ -35,7 +35,7 @@ def test_numbers_as_fortran_writes_them(tmp_path, text, value):
 @pytest.mark.parametrize("text", ["O.3", "nan", "inf", "1e999", "1_0", "0x1", "--1"])
 def test_what_is_no_number_is_told_with_its_line(tmp_path, text):
     (found,) = read(tmp_path, f"*Elastic\n1.\n{text}\n")
-    with pytest.raises(CaseError, match=r"a\.inp, line 3, \*ELASTIC: .* is no number"):
+    with pytest.raises(CaseError, match=r"a\.inp, line 3, \*ELASTIC: .* is not a number"):
         found.rows[1].number(0)
 
 
@@ -84,5 +84,5 @@ def test_data_before_any_keyword_is_refused(tmp_path):
 
 
 def test_a_parameter_that_stands_there_twice_is_refused(tmp_path):
-    with pytest.raises(CaseError, match="NSET stands there twice"):
+    with pytest.raises(CaseError, match="NSET is given twice"):
         read(tmp_path, "*Node, nset=a, NSET=b\n")

@@ -2,6 +2,7 @@
 
 import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from pairwise import first_of
 
 import fastcontact as fc
 
@@ -14,7 +15,7 @@ def driven(lines, place):
     return f"*Step\n*Static, direct\n1., 1.\n{lines}*Boundary\ntop, 1, 1, {place}\n*Dsload\nroof, P, 100.\n*End Step\n"
 
 
-@pytest.mark.parametrize(("text", "before"), [(RUBBING, 10.0), (CONTACT, 0.0)])
+@pytest.mark.parametrize(("text", "before"), first_of(1, [(RUBBING, 10.0), (CONTACT, 0.0)]))
 def test_more_friction_from_the_third_step_on(text, before, tmp_path):
     """The upper cube, pressed by 100, is drawn along the lower one: 10 or nothing, then 30, but for its tilt."""
     steps = driven("", 0.0) + driven("", 0.01) + driven(CHANGE, 0.02) + driven("", 0.03)
@@ -36,7 +37,7 @@ def test_what_is_refused(lines, message, tmp_path):
     steps = STEP.replace("*Dsload", lines + "*Dsload")
     with pytest.raises(fc.CaseError, match=message):
         deck_of(tmp_path, NODES + MATERIAL + RUBBING + SUPPORTS + steps)
-    with pytest.raises(fc.CaseError, match=r"\*CHANGE FRICTION: belongs into a step"):
+    with pytest.raises(fc.CaseError, match=r"\*CHANGE FRICTION: belongs in a step"):
         deck_of(tmp_path, WHOLE.replace("*Boundary", CHANGE + "*Boundary"))
 
 

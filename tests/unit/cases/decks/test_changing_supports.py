@@ -1,4 +1,4 @@
-"""Supports that come or go between the steps of a deck."""
+"""Supports that begin or end between the steps of a deck."""
 
 import numpy as np
 import pytest

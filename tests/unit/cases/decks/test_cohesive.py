@@ -1,4 +1,4 @@
-"""Cohesive behaviour of decks: tractions of layers between stiff cubes by the laws as Abaqus writes them; what is refused."""
+"""Cohesive behaviour of decks: tractions between stiff cubes by the laws of Abaqus; refusals."""
 
 import numpy as np
 import pytest
@@ -52,6 +52,7 @@ def traction(sliding, opening, criterion="QUADS", mode="BK"):
     return -kept * K * np.array([sliding, opening])
 
 
+@pytest.mark.each_value
 @pytest.mark.filterwarnings("ignore:hex8 cells are too stiff")
 @pytest.mark.parametrize("criterion", ["QUADS", "MAXS"])
 @pytest.mark.parametrize("mode", ["BK", "POWER LAW"])

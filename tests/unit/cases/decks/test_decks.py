@@ -1,8 +1,9 @@
-"""Decks as models: every keyword translated or refused by its line, histories over steps, results as decks mean them."""
+"""Decks as models: every keyword translated or refused with its line, histories over steps, results."""
 
 import numpy as np
 import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.cases.case import files_of_case, read_case
@@ -39,7 +40,7 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("17, 18\n*Nset, nset=bottom", "17, 99\n*Nset, nset=bottom", "2, 11, 12",
          "element 2 uses node 99, which is not defined"),
         ("17, 18\n*Nset, nset=bottom", "17\n*Nset, nset=bottom", "2, 11, 12", "has 7 nodes, 8 are needed"),
-        ("200000., 0.\n", "200000., O.3\n", "200000.", "'O.3' is no number"),
+        ("200000., 0.\n", "200000., O.3\n", "200000.", "'O.3' is not a number"),
         ("200000., 0.\n", "200000., 0.5\n", "200000.", "material 'steel': Poisson's ratio"),
         ("200000., 0.\n", "200000., 0.\n*Creep\n1., 0.\n", "*Creep", r"material 'steel': \*CREEP is outside of fastcontact"),
         ("200000., 0.\n", "200000., 0.\n*Plastic, hardening=combined\n1., 0.\n", "*Plastic",
@@ -98,12 +99,15 @@ def test_nlgeom_with_plasticity_warns_and_tells_the_strain_found(tmp_path):
 
 @pytest.mark.parametrize(
     ("keyword", "law"),
-    [
-        ("*Hyperelastic, neo hooke\n0.5, 0.2\n", fc.NeoHookean(E=90.0 / 31.0, nu=28.0 / 62.0)),
-        ("*Hyperelastic, mooney-rivlin\n0.4, 0.1, 0.2\n", fc.MooneyRivlin(0.4, 0.1, bulk=10.0)),
-        ("*Hyperelastic, yeoh\n0.5, -0.1, 0.01, 0.2\n", fc.Yeoh(0.5, -0.1, 0.01, bulk=10.0)),
-        ("*Hyperelastic, ogden, n=2\n0.8, 2., 0.2, -1., 0.2\n", fc.Ogden([0.8, 0.2], [2.0, -1.0], bulk=10.0)),
-    ],
+    first_of(
+        2,
+        [
+            ("*Hyperelastic, neo hooke\n0.5, 0.2\n", fc.NeoHookean(E=90.0 / 31.0, nu=28.0 / 62.0)),
+            ("*Hyperelastic, mooney-rivlin\n0.4, 0.1, 0.2\n", fc.MooneyRivlin(0.4, 0.1, bulk=10.0)),
+            ("*Hyperelastic, yeoh\n0.5, -0.1, 0.01, 0.2\n", fc.Yeoh(0.5, -0.1, 0.01, bulk=10.0)),
+            ("*Hyperelastic, ogden, n=2\n0.8, 2., 0.2, -1., 0.2\n", fc.Ogden([0.8, 0.2], [2.0, -1.0], bulk=10.0)),
+        ],
+    ),
 )
 def test_hyperelastic_materials(tmp_path, keyword, law):
     deck = deck_of(tmp_path, WHOLE.replace("*Elastic\n200000., 0.\n", keyword).replace("P, 100.", "P, 0.1"))
@@ -368,9 +372,9 @@ def test_a_deck_with_a_line_left_out_cut_or_twice_is_read_or_refused_in_one_line
     ("old", "new", "said"),
     [
         ("bottom, 3\n", "bottom, 3, 2000000000\n", r"\*BOUNDARY: components 3 to 2000000000 are not within 1 to 6"),
-        ("bottom, 3\n", "bottom, 3, 9223372036854775808\n", "'9223372036854775808' is no whole number"),
-        ("bottom, 3\n", "bottom, 1e308\n", "'1e308' is no whole number"),
-        ("generate\n1, 4\n", "generate\n1, 9223372036854775808\n", "'9223372036854775808' is no whole number"),
+        ("bottom, 3\n", "bottom, 3, 9223372036854775808\n", "'9223372036854775808' is not a whole number"),
+        ("bottom, 3\n", "bottom, 1e308\n", "'1e308' is not a whole number"),
+        ("generate\n1, 4\n", "generate\n1, 9223372036854775808\n", "'9223372036854775808' is not a whole number"),
     ],
 )
 def test_numbers_without_measure_take_neither_time_nor_memory(tmp_path, old, new, said):

@@ -1,4 +1,4 @@
-"""Material axes of decks cell by cell: the same as sections with axes of their own; in parts; what is refused."""
+"""Material axes cell by cell in decks: equal to sections with their own axes; parts; refusals."""
 
 import numpy as np
 import pytest

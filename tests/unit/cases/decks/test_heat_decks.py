@@ -1,4 +1,4 @@
-"""Heat of decks against exact solutions: two bars, films, sources, histories, expansion; and what is refused."""
+"""Heat in decks compared with exact solutions: two bars, films, sources, histories, expansion; refusals."""
 
 import numpy as np
 import pytest
@@ -176,7 +176,7 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
         ("*END STEP\n", "*END STEP\n*STEP\n*FREQUENCY\n3\n*END STEP\n", r"\*STEP: \*FREQUENCY behind \*HEAT TRANSFER"),
         ("*CONDUCTIVITY\n50.\n", "", r"\*MATERIAL: material 'A' has no \*CONDUCTIVITY"),
         ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n50., 0.\n60., 100.\n", r"material 'A': 2 data lines where one"),
-        ("STATE\n", "STATE\n*CLOAD\nHOT, 1, 2.\n", r"\*CLOAD: is no load of heat"),
+        ("STATE\n", "STATE\n*CLOAD\nHOT, 1, 2.\n", r"\*CLOAD: is not a heat load"),
         ("STATE\n", "STATE\n*TEMPERATURE\nHOT, 2.\n", r"\*TEMPERATURE: temperatures are computed"),
         ("STATE\n", "STATE\n*RADIATE\nup, R1, 2.\n", r"\*RADIATE: .*without radiation"),
         ("STATE\n", "STATE\n*FILM\nup, F2NU, 2., 3.\n", r"\*FILM: F2NU is not supported; known are F1, F2"),

@@ -1,4 +1,4 @@
-"""Initial stresses of decks: released, held, overridden by later lines, and what is refused."""
+"""Initial stresses in decks: released, held, overridden by later lines; refusals."""
 
 import numpy as np
 import pytest
@@ -72,7 +72,7 @@ def test_in_the_plane_there_are_four_components(tmp_path):
         ),
         ("low, 20.\n", r"2 entries where 7 are needed"),
         ("lo, 20., 0., 0., 0., 0., 0.\n", r"line \d+, \*INITIAL CONDITIONS: .*'lo'"),
-        ("low, a, 0., 0., 0., 0., 0.\n", "'a' is no number"),
+        ("low, a, 0., 0., 0., 0., 0.\n", "'a' is not a number"),
     ],
 )
 def test_what_is_refused(tmp_path, lines, words):

@@ -1,4 +1,4 @@
-"""Keywords of decks that few use: each must do what it says, which forces and displacements tell."""
+"""Less common keywords of decks, verified by forces and displacements."""
 
 from pathlib import Path
 
@@ -258,7 +258,7 @@ def test_incompatible_modes_are_left_out_in_axisymmetry_and_said(tmp_path):
 
 def test_initial_stresses_of_springs_are_refused_and_of_zero_change_nothing(tmp_path):
     with_spring = before("*Boundary\n", SPRING + "*Spring, elset=springs\n\n1.\n")
-    with pytest.raises(fc.CaseError, match="element 7 is no solid, so it has no initial stress"):
+    with pytest.raises(fc.CaseError, match="element 7 is not a solid, so it has no initial stress"):
         deck_of(tmp_path, before("*Step", "*Initial Conditions, type=STRESS\n7, 1., 1., 1., 0., 0., 0.\n", with_spring))
     deck = deck_of(tmp_path, before("*Step", "*Initial Conditions, type=STRESS\n1, 0., 0., 0., 0., 0., 0.\n"))
     assert deck.model.initial_states == []
@@ -293,7 +293,7 @@ def test_a_locked_section_may_be_named_again_in_a_new_list(tmp_path):
     found = deck_of(tmp_path, text).solve()
     assert len(found) == 3
     assert np.allclose(found[2].displacement, found[1].displacement, atol=1e-12)
-    with pytest.raises(fc.CaseError, match="is let go here: once locked it stays so"):
+    with pytest.raises(fc.CaseError, match="is released here: a locked section stays locked"):
         deck_of(tmp_path, text.replace(f"{again}{HELD}", again))
 
 
@@ -412,9 +412,9 @@ def test_frequencies_about_the_last_step(tmp_path, capsys):
         (text + FREQUENCY + STEP, r"\*STEP: follows a step with \*FREQUENCY"),
         (
             text + FREQUENCY.replace(" 2\n", " 2\n*Boundary\ntop, 3\n"),
-            r"\*BOUNDARY: cannot stand in a step with \*FREQ",
+            r"\*BOUNDARY: cannot be in a step with \*FREQ",
         ),
-        (text + FREQUENCY.replace(" 2\n", " 0\n"), "asks for no mode"),
+        (text + FREQUENCY.replace(" 2\n", " 0\n"), "requests no mode"),
         (text + FREQUENCY.replace(" 2\n", " 2\n*Static\n"), r"either \*STATIC or one"),
     ):
         with pytest.raises(fc.CaseError, match=said):

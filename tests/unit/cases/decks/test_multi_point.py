@@ -1,4 +1,4 @@
-"""*MPC of decks: PIN, TIE and BEAM, and what is refused."""
+"""*MPC in decks: PIN, TIE and BEAM; refusals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Surfaces of nodes that make up no whole faces: contact, ties and couplings of these nodes alone."""
+"""Surfaces of nodes that form no complete faces: contact, ties and couplings of these nodes alone."""
 
 import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, SUPPORTS, WHOLE, deck_of

@@ -1,4 +1,4 @@
-"""What a deck may not say: each is refused with its keyword, its line and a sentence."""
+"""Invalid decks: each is refused with its keyword, its line and a sentence."""
 
 import pytest
 from deck_text import CONTACT, MATERIAL, NODES, STEP, WHOLE, deck_of
@@ -75,9 +75,9 @@ MODEL = {
     ),
     "range that falls": (instead("1, 4\n*Nset", "4, 1\n*Nset"), "the range 4 to 1 by 1 is empty: it must ascend"),
     "surface twice": (before("*Surface, name=roof", "*Surface, name=SM\nup, S1\n"), "surface 'SM' is defined twice"),
-    "load without a step": (before("*Step", "*Cload\n17, 3, 1.\n"), r"\*CLOAD: loads belong into a step"),
-    "nodes in a step": (with_load("*Nset, nset=new\n1\n"), r"\*NSET: cannot stand inside of a step"),
-    "material in a step": (with_load("*Material, name=new\n"), r"\*MATERIAL: cannot stand inside of a step"),
+    "load without a step": (before("*Step", "*Cload\n17, 3, 1.\n"), r"\*CLOAD: loads belong in a step"),
+    "nodes in a step": (with_load("*Nset, nset=new\n1\n"), r"\*NSET: cannot be inside a step"),
+    "material in a step": (with_load("*Material, name=new\n"), r"\*MATERIAL: cannot be inside a step"),
     "friction nowhere": (before("*Surface Int", "*Friction\n0.1\n"), r"\*FRICTION: belongs below \*SURFACE INTER"),
     "kinematic nowhere": (before("*Boundary", "*Kinematic\n1, 3\n"), r"\*KINEMATIC: belongs below \*COUPLING"),
     "coupling alone": (before("*Boundary", "*Coupling, ref node=1, surface=ss\n"), r"\*KINEMATIC or \*DISTRIBUTING must"),
@@ -179,11 +179,11 @@ CONTACTS = {
     "tie of one": (instead(CONTACT, "*Tie, name=t\nss\n"), "a tie needs two surfaces, the secondary and the primary"),
     "surface of an element that is none": (
         instead("up, S1\n", "7, S1\n", before("*Nset, nset=bottom", SPRING)),
-        "element 7 is no solid, so it has no faces",
+        "element 7 is not a solid, so it has no faces",
     ),
     "free faces of one that is none": (
         instead("up, S1\n", "7,\n", before("*Nset, nset=bottom", SPRING)),
-        "element 7 is no solid, so it has no faces",
+        "element 7 is not a solid, so it has no faces",
     ),
     "nodes that are no faces": (
         before("*Surface, name=roof", "*Surface, name=few, type=NODE\n15\n16\n", instead("ss, sm", "few, sm")),
@@ -211,7 +211,7 @@ RELATIONS = {
     "springs of two": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line and then one"),
     "spring with a law": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),
     "spring of no stiffness": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n0.\n"), "the stiffness 0 must be"),
-    "spring of a solid": (before("*Boundary", "*Spring, elset=up\n\n1.\n"), "element 2 is no spring of type SPRINGA"),
+    "spring of a solid": (before("*Boundary", "*Spring, elset=up\n\n1.\n"), "element 2 is not a spring of type SPRINGA"),
     "spring without stiffness": (before("*Boundary", SPRING), r"element 7 of type SPRINGA has no \*SPRING"),
     "gap without a direction": (before("*Boundary", GAP + "*Gap, elset=gaps\n1.\n"), "the direction of the gap elements is"),
     "gap of a solid": (before("*Boundary", "*Gap, elset=up\n1., 0., 0., 1.\n"), "acts on elements of type GAPUNI only"),
@@ -232,7 +232,7 @@ LOADS = {
     "gravity without direction": (with_load("*Dload\nup, GRAV, 9.81\n"), "the direction of GRAV is missing"),
     "pressure on a spring": (
         with_load("*Dload\n7, P1, 1.\n").replace("*Nset, nset=bottom", SPRING + "*Nset, nset=bottom"),
-        "element 7 is no solid, so it has no faces",
+        "element 7 is not a solid, so it has no faces",
     ),
     "amplitude without values": (
         before("*Step", "*Amplitude, name=a\n0., 1., 0., 2.\n"),

@@ -1,4 +1,4 @@
-"""Cyclic symmetry of decks: a quarter of a ring, and what is refused."""
+"""Cyclic symmetry in decks: a quarter of a ring; refusals."""
 
 import numpy as np
 import pytest

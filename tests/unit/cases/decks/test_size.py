@@ -1,4 +1,4 @@
-"""Memory and time of decks: at most 20 bytes a byte, and time that grows as the deck does."""
+"""Memory and time of decks: at most 20 bytes per byte, and time proportional to their size."""
 
 import sys
 import tracemalloc
@@ -64,7 +64,7 @@ def check_size(folder, small, text, count):
 
 
 @pytest.mark.parametrize(
-    "kind", [pytest.param(k, marks=pytest.mark.slow if k in ("sets", "same forces") else ()) for k in LINES]
+    "kind", [pytest.param(k, marks=() if k in ("displacements", "body forces") else pytest.mark.slow) for k in LINES]
 )
 def test_twenty_bytes_a_byte(kind, tmp_path):
     old, new = LINES[kind]
@@ -72,8 +72,13 @@ def test_twenty_bytes_a_byte(kind, tmp_path):
     check_size(tmp_path, small, large, 16**3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "load", ["*Cload\n{node}, 3, {cube}.", "*Dload\n{cube}, P2, {cube}.", "*Dload\n{cube}, P2, 1."]
+    "load",
+    [
+        "*Cload\n{node}, 3, {cube}.",
+        *(pytest.param(f"*Dload\n{{cube}}, P2, {size}.", marks=pytest.mark.slow) for size in ("{cube}", "1")),
+    ],
 )
 def test_twenty_bytes_a_byte_of_lone_cubes(load, tmp_path):
     small, large = (many_forces(n, *load.split("\n")) for n in (2, 1400))

@@ -1,4 +1,4 @@
-"""Temperatures of decks: free expansion, stresses where it is held, histories over steps, and what is refused."""
+"""Temperatures in decks: free expansion, constrained stresses, histories over steps; refusals."""
 
 import numpy as np
 import pytest

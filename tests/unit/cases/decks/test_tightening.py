@@ -1,4 +1,4 @@
-"""Pretension sections of decks: a bar of two cubes, stretched by a force, then locked."""
+"""Pretension sections in decks: a bar of two cubes, stretched by a force, then locked."""
 
 import pytest
 from case_texts import square
@@ -94,7 +94,7 @@ def test_a_shortening_in_the_place_of_a_force(tmp_path):
         ),
         (
             BAR + TIGHT + cooled(HELD) + cooled("*Boundary, op=new\nbottom, 1, 3\ntop, 1, 3\n"),
-            "node 99 of a pretension section is let go here: once locked it stays so",
+            "node 99 of a pretension section is released here: a locked section stays locked",
         ),
     ],
 )

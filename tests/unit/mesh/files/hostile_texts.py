@@ -1,4 +1,4 @@
-"""Texts for which a careless search, or the parser, takes a time that grows with the square of their length."""
+"""Texts for which a naive search or parser takes quadratic time."""
 
 TEXTS = {
     "word": "a" * 300_000,

@@ -1,4 +1,4 @@
-"""Files that declare what they cannot hold are refused within limits of memory and time."""
+"""Files that declare more than they can hold are refused within limits of memory and time."""
 
 import base64
 import errno
@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 from hostile_texts import DECKS, TEXTS
+from pairwise import first_of
 from test_result_files import MESH, step_result, write
 
 import fastcontact as fc
@@ -104,7 +105,7 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
     assert fc.read_mesh(path).n_points == MESH.n_points
     with h5py.File(path, "r+") as file:
         file["ENS_MAA/mesh"].attrs["TYP"] = "a text"
-    with pytest.raises(FileError, match=r"'TYP' of '/ENS_MAA/mesh' of '.*' is no plain number: write the file anew"):
+    with pytest.raises(FileError, match=r"'TYP' of '/ENS_MAA/mesh' of '.*' is not a plain number: rewrite the file"):
         fc.read_mesh(path)
 
 
@@ -122,7 +123,7 @@ def test_texts_in_a_mesh_file_are_not_read(tmp_path):
             r"1.07e\+09 bytes",
         ),
         ("fastcontact/mesh/elements", {"shape": (10**6,), "dtype": h5py.string_dtype()}, "1000000 texts or references"),
-        ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is no text"),
+        ("fastcontact/versions", {"data": ["{}"], "dtype": h5py.string_dtype()}, "is not a text"),
         ("fastcontact/case", {"data": "x", "dtype": h5py.string_dtype(), "chunks": None}, "Expecting value"),
         ("fastcontact/mesh/cell_groups/sizes", {"data": np.zeros(10**6, np.int64)}, r"6 names for sizes of shape"),
     ],
@@ -137,7 +138,7 @@ def test_result_files_that_declare_too_much(results, name, created, message):
 def test_a_schema_that_is_no_whole_number(results, value):
     with h5py.File(results, "r+") as file:
         file["fastcontact"].attrs["schema"] = value
-    with pytest.raises(FileError, match=r"'schema' of '/fastcontact' is no whole number|damaged"):
+    with pytest.raises(FileError, match=r"'schema' of '/fastcontact' is not a whole number|damaged"):
         fc.open_results(results)
 
 
@@ -159,7 +160,7 @@ def test_unknown_kinds_of_cells_are_listed_in_short(tmp_path):
     assert len(str(caught.value)) < 1000
 
 
-@pytest.mark.parametrize("tail", ["", ",", ")", "x"])
+@pytest.mark.parametrize("tail", first_of(2, ["", ",", ")", "x"]))
 def test_surfaces_as_text_that_are_none(tmp_path, tail):
     """A pattern that goes back and forth takes twice as long with each further point."""
     path = tmp_path / "surface.wkt"
@@ -219,16 +220,19 @@ def read(path, file_format):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits neither memory nor computing time")
 @pytest.mark.parametrize(
     ("does", "reason"),
-    [
-        ("while True: pass", "it was not read within 1 s of computing"),
-        ("time.sleep(60)", "it was not read within 2 s"),
-        ("bytearray(1 << 40)", "it announces more than memory can hold"),
-        ("os.abort()", "the reading process was ended by SIGABRT"),
-        ("os._exit(3)", "the reading process failed: no answer"),
-        ("raise RuntimeError('any')", "any"),
-        ("raise SystemExit(1)", "SystemExit"),
-        ("raise RecursionError", "RecursionError"),
-    ],
+    first_of(
+        4,
+        [
+            ("while True: pass", "it was not read within 1 s of computing"),
+            ("time.sleep(60)", "it was not read within 2 s"),
+            ("bytearray(1 << 40)", "it announces more than memory can hold"),
+            ("os.abort()", "the reading process was ended by SIGABRT"),
+            ("os._exit(3)", "the reading process failed: no answer"),
+            ("raise RuntimeError('any')", "any"),
+            ("raise SystemExit(1)", "SystemExit"),
+            ("raise RecursionError", "RecursionError"),
+        ],
+    ),
 )
 def test_whatever_meshio_does_to_its_process(tmp_path, monkeypatch, does, reason):
     folder = tmp_path / "fake" / "meshio"
@@ -310,7 +314,11 @@ def packed_vtu(path, compressor, pack, megabytes, blocks):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits neither memory nor computing time")
 @pytest.mark.parametrize(
     ("compressor", "pack", "blocks"),
-    [("ZLib", zlib.compress, 12_800), ("ZLib", zlib.compress, 1), ("LZMA", lzma.compress, 400)],
+    [
+        ("ZLib", zlib.compress, 12_800),
+        pytest.param("ZLib", zlib.compress, 1, marks=pytest.mark.slow),
+        ("LZMA", lzma.compress, 400),
+    ],
 )
 def test_a_packed_file_takes_no_more_memory_than_it_may(tmp_path, monkeypatch, compressor, pack, blocks):
     path = tmp_path / "packed.vtu"
@@ -331,7 +339,7 @@ LINES = {
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows limits neither memory nor computing time")
-@pytest.mark.parametrize("suffix", LINES)
+@pytest.mark.parametrize("suffix", first_of(3, list(LINES)))
 def test_a_line_of_megabytes_is_refused_within_the_limits(tmp_path, monkeypatch, suffix):
     path = tmp_path / f"line.{suffix}"
     path.write_text(LINES[suffix] + ("12," if suffix in ("inp", "bdf") else "12 ") * 1_000_000)

@@ -1,4 +1,4 @@
-"""Node order of solids in the files of other programs: MED, Gmsh, Abaqus, VTK, each against its own description."""
+"""Node orders of solids in files of other programs: MED, Gmsh, Abaqus, VTK, each compared with its own description."""
 
 import itertools
 import json

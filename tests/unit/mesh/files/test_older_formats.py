@@ -1,4 +1,4 @@
-"""Gmsh's files of versions 1 to 4.1 and code_aster's text: the same mesh from each."""
+"""Gmsh files of versions 1 to 4.1 and code_aster's text: the same mesh from each."""
 
 import numpy as np
 import pytest
@@ -154,8 +154,8 @@ def test_middle_nodes_of_code_aster_stand_on_its_edges(element):
         ("PAIR N1 N2", "PAIR N1 N77", r"line \d+: there is no node 'N77'"),
         ("TIP\nMP", "TIP\nMP M999", r"line \d+: there is no cell 'M999'"),
         ("COOR_2D", "COOR_4D", r"line 5: COOR_4D is not known; a mesh has COOR_2D"),
-        ("MP N1\n", "MP\n", r"POI1 has 1 words, which are no rows of 2"),
-        ("N1 0.0", "N1 zero", r"line \d+: 'zero\S*' is no number"),
+        ("MP N1\n", "MP\n", r"POI1 has 1 words, which do not form rows of 2"),
+        ("N1 0.0", "N1 zero", r"line \d+: 'zero\S*' is not a number"),
         ("MP N1\n", "MP N99\n", r"line \d+: there is no node 'N99' before this line"),
         ("GROUP_NO\nPAIR N1 N2", "GROUP_NO", r"GROUP_NO has no name"),
     ],

@@ -1,4 +1,4 @@
-"""Data as TOML and back: what is read is what was written, and what TOML cannot hold is told."""
+"""Round trip of data through TOML; data that TOML cannot hold are refused."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Blocks, one on another, and the cylinder: sizes, groups, grading, orientation."""
+"""Blocks, block on block, and the cylinder: sizes, groups, grading, orientation."""
 
 import inspect
 import math

@@ -1,4 +1,4 @@
-"""Local refinement: conforming meshes, kept groups and volumes, angles that do not deteriorate, round arcs."""
+"""Local refinement: conforming meshes, groups and volumes, bounded angles, curved boundaries."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The graded block: its measure, its groups, where it is fine."""
+"""The graded block: volume, groups, refinement."""
 
 import numpy as np
 import pytest

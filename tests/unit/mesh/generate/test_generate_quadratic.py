@@ -1,4 +1,4 @@
-"""Mid nodes: one an edge, half-way or on the curve, and no folded cell."""
+"""Mid nodes: one per edge, half-way or on the curve, and no folded cell."""
 
 import numpy as np
 import pytest

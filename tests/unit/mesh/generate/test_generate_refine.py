@@ -1,4 +1,4 @@
-"""Refined meshes: quartered cells, new points on curves and in the groups that they belong to."""
+"""Refined meshes: divided cells, new points on curves and in their groups."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Where the nodes of a line stand, and the triangulation of other outlines than a disc."""
+"""Spacing of nodes on a line, and triangulation of other outlines than a disc."""
 
 import numpy as np
 import pytest
@@ -60,6 +60,7 @@ def polygon(corners, spacing):
     return filled("BODY", sides, spacing)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(
     "corners",
     [

@@ -1,4 +1,4 @@
-"""Mirror, union, weld, move: what they keep and what they change."""
+"""Mirrored, merged, united and transformed meshes: invariants and changes."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Meshes that nobody can mean are refused before any memory is taken for them."""
+"""Meshes of unreasonable size are refused before memory is allocated."""
 
 import tracemalloc
 

@@ -1,4 +1,4 @@
-"""Write the result files of this version that later versions must read, with what they hold told in JSON beside them.
+"""Write the result files of this version that later versions must read, with their contents in JSON.
 
     python tests/unit/results/resources/make.py
 

@@ -1,0 +1,37 @@
+"""Nearest points and close pairs of points; importing SciPy's trees takes as long as many a small run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fastcontact.arrays import Array, Indices
+
+# Pairs of points up to which all distances are computed.
+FEW = 250_000
+# A direction that is along no axis and no diagonal of a mesh, at most 1 long.
+NO_AXIS = np.array([0.46, 0.5718, 0.6789])
+
+
+def nearest(places: Array, positions: Array) -> tuple[Array, Indices]:
+    """Return distance (n,) and row (n,) of the nearest of `places` (m, dim) to each of `positions` (n, dim) [length]."""
+    if len(places) * len(positions) <= FEW:
+        squared = ((positions[:, None] - places) ** 2).sum(axis=2)
+        rows = squared.argmin(axis=1)
+        return np.sqrt(squared[np.arange(len(rows)), rows]), rows
+    from scipy.spatial import cKDTree
+
+    distance, rows = cKDTree(places).query(positions)
+    return np.asarray(distance), np.asarray(rows, np.intp)
+
+
+def close_pairs(points: Array, within: float) -> Indices:
+    """Return the pairs of rows (k, 2) of `points` (n, dim) that are `within` some distance of each other [length]."""
+    if len(points) ** 2 <= FEW:
+        squared = ((points[:, None] - points) ** 2).sum(axis=2)
+        return np.argwhere(np.triu(squared <= within**2, 1))
+    along = np.sort(points @ NO_AXIS[: points.shape[1]])
+    if not (np.diff(along) <= within).any():  # points that are close have neighbouring projections on a direction
+        return np.empty((0, 2), np.intp)
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(points).query_pairs(within, output_type="ndarray"), np.intp).reshape(-1, 2)

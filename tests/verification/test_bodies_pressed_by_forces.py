@@ -1,0 +1,110 @@
+"""Nonlinear bodies that contact and a force alone hold: the way that prescribed displacements take, back, and their limit."""
+
+import warnings
+
+import pytest
+
+import fastcontact as fc
+
+pytestmark = pytest.mark.pairwise
+
+STEEL = fc.LinearElastic(E=1000.0, nu=0.3)
+SOFT = fc.ElasticPlastic(E=1000.0, nu=0.3, yield_stress=2.0, hardening=[(0.0, 2.0), (0.1, 4.0)])
+PERFECT = fc.ElasticPlastic(E=1000.0, nu=0.3, yield_stress=2.0)
+RUBBERS = fc.NeoHookean(E=10.0, nu=0.45), fc.NeoHookean(E=4.0, nu=0.499)
+
+
+def round_body_on_block(kinematics: str, element: str, laws, contact) -> tuple[fc.Model, str]:
+    """Return a body with a round underside on a block, held sideways, and the axis along which it is pressed."""
+    if kinematics == "3d":
+        body = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element)
+        block = fc.generate.box((1.6, 1.6, 1.0), (3, 3, 2), element=element, origin=(0.0, 0.0, -1.0))
+        sides, top, bottom = ("XMIN", "YMIN"), "ZMAX", "ZMIN"
+    else:
+        body = fc.generate.block((1.0, 1.0), (6, 6), element=element)
+        block = fc.generate.block((1.6, 1.0), (11, 7), element=element, origin=(0.0, -1.0))
+        sides, top, bottom = ("LEFT",), "TOP", "BOTTOM"
+    points = body.points.copy()
+    points[:, -1] += 0.15 * (1.0 - points[:, -1]) * (points[:, :-1] ** 2).sum(axis=1)
+    bodies = [
+        fc.generate.renamed(mesh, {name: f"{name}{i}" for name in mesh.group_names})
+        for i, mesh in enumerate((body.replace(points=points), block))
+    ]
+    model = fc.Model(
+        fc.generate.union(*bodies), kinematics, strain="finite" if isinstance(laws[0], fc.NeoHookean) else "small"
+    )
+    for i, law in enumerate(laws):
+        model.add_material(law, groups=[name for name in (f"BLOCK{i}", f"BOX{i}") if name in model.mesh.group_names])
+        for axis, side in zip("xy", sides, strict=False):
+            model.fix(f"{side}{i}", axis)
+    model.fix(f"{bottom}1", "xyz"[: model.mesh.dim])
+    model.add_contact("pair", secondary=f"{top}1", primary=f"{bottom}0", **contact)
+    return model, "xyz"[model.mesh.dim - 1]
+
+
+@pytest.mark.filterwarnings("ignore:.*element.* across its radius", "ignore:.*plastic strain")
+@pytest.mark.parametrize("contact", [{}, {"formulation": "continuous"}, {"formulation": "node_to_segment"}], ids=str)
+@pytest.mark.parametrize(
+    ("kinematics", "element", "laws", "depth"),
+    [
+        ("axisymmetric", "quad8", (STEEL, SOFT), 0.03),
+        ("axisymmetric", "quad4", RUBBERS, 0.25),
+        ("plane_strain", "tri6", (STEEL, SOFT), 0.03),
+        ("3d", "hex8", (STEEL, SOFT), 0.03),
+    ],
+)
+def test_a_force_takes_the_way_of_the_displacement(kinematics: str, element: str, laws, depth: float, contact) -> None:
+    """And no more iterations but a few; at the end it goes back to nothing, and the bodies part."""
+    driven, axis = round_body_on_block(kinematics, element, laws, contact)
+    top, up = ("ZMAX0" if kinematics == "3d" else "TOP0"), "xyz".index(axis)
+    driven.prescribe(top, **{axis: -depth})
+    at = driven.mesh.points_of(top)
+    wanted = fc.solve(driven, 2)
+    force = [float(-step.reaction[at, up].sum()) for step in wanted]
+
+    pressed, _ = round_body_on_block(kinematics, element, laws, contact)
+    pressed.couple(top, axis)
+    pressed.add_force(top, **{axis: -1.0}, ramp=[(0.0, 0.0), (0.5, force[0]), (1.0, force[1]), (2.0, 0.0)])
+    *steps, free = fc.solve(pressed, [0.5, 1.0, 2.0])
+    for step, same in zip(steps, wanted, strict=True):
+        assert step.displacement[at, up] == pytest.approx(same.displacement[at, up], abs=1e-6 * depth)
+        assert len(step.iterations["history"]) <= len(same.iterations["history"]) + 4
+        *_, before, last = [entry["displacement_change"] for entry in step.iterations["history"]]
+        assert last < max(1e-2 * before, 1e-8)
+    assert not free.iterations.get("substeps")
+    assert free.contact["pair"].normal_force < 1e-6 * force[1]
+
+
+def test_a_force_beyond_the_limit_load_is_told_as_such() -> None:
+    """A strip without hardening bears 2 / sqrt(3) of its yield stress."""
+    mesh = fc.generate.block((1.0, 1.0), (2, 2))
+    model = fc.Model(mesh, "plane_strain")
+    model.add_material(PERFECT)
+    model.fix("BOTTOM", "y")
+    model.fix("LEFT", "x")
+    model.add_traction("TOP", y=2.0 * PERFECT.yield_stress)
+    with pytest.raises(
+        fc.ConvergenceError, match=r"largest plastic strain is .* may bear no larger forces: prescribe disp"
+    ):
+        fc.solve(model, [0.5, 1.0])
+
+
+@pytest.mark.parametrize("distance", [-0.05, 0.05])
+def test_sides_that_overlap_at_the_start_are_told_where_the_motion_is_along_them(distance: float) -> None:
+    """As those of a snap fit that is pushed on."""
+    stub = fc.generate.block((1.0, 2.0), (2, 4), name="STUB")
+    cap = fc.generate.block((1.0, 2.0), (2, 4), origin=(1.0 + distance, 0.5), name="CAP")
+    bodies = [
+        fc.generate.renamed(mesh, {side: f"{side}{i}" for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")})
+        for i, mesh in enumerate((stub, cap))
+    ]
+    model = fc.Model(fc.generate.union(*bodies), "plane_strain")
+    model.add_material(STEEL)
+    model.fix("LEFT0", "xy")
+    model.prescribe("RIGHT1", x=0.0, y=-0.5)
+    model.add_contact("bead", secondary="LEFT1", primary="RIGHT0")
+    with warnings.catch_warnings(record=True) as raised:
+        warnings.simplefilter("always")
+        fc.solve(model, 1)
+    told = [text for text in map(str, (w.message for w in raised)) if "begins with a penetration of 0.05 at" in text]
+    assert len(told) == (distance < 0.0)
