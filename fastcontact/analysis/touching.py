@@ -77,9 +77,11 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     closing &= gap > LENGTH_ROUND_OFF * size
     if not (slid := float(shear[closing].sum())) > limit:
         return None
-    begin = gap, normal, traction, _closing(step, constraints, gap)
-    begin = begin if nodes is None else nodes.gathered(constraints, *begin)
-    return Path(*begin, min(math.ceil(slid / limit - LENGTH_ROUND_OFF), MOST))
+    slips = _closing(step, constraints, gap)
+    if nodes is not None:
+        gap, normal, traction, slips = nodes.gathered(constraints, gap, normal, traction, slips)
+    parts = math.ceil(slid / limit - LENGTH_ROUND_OFF)  # where all closes, a whole number but for rounding
+    return Path(gap, normal, traction, slips, min(parts, MOST))
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
