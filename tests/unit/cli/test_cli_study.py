@@ -13,7 +13,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cli import _study, main, sweep
 from fastcontact.studies.execute import Progress
-from fastcontact.studies.progress import Runs, told
+from fastcontact.studies.progress import Runs, reporting
 
 
 @pytest.mark.parametrize(
@@ -195,7 +195,7 @@ def is_running(process):
 def test_a_study_tells_its_runs_where_it_is_asked_to(capsys):
     heard = []
     for show in (False, True):
-        with told(heard.append, show) as ended:
+        with reporting(heard.append, show) as ended:
             ended(Progress("level 1", 1, 2, ("level 2",), 1.0, "", False))
         shown = capsys.readouterr().err
         assert ("the first runs" in shown) is show
