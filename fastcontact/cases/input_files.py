@@ -24,11 +24,11 @@ def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
 
 def digest(paths: Iterator[Path]) -> str:
     """Return a hash of the contents of files, independent of their folder; an unreadable file counts as missing."""
-    whole = hashlib.sha256()
+    hash_of_all = hashlib.sha256()
     for path in paths:
         try:
             with open(path, "rb") as file:
-                whole.update(hashlib.file_digest(file, "sha256").digest())
+                hash_of_all.update(hashlib.file_digest(file, "sha256").digest())
         except OSError:
-            whole.update(b"missing")
-    return whole.hexdigest()
+            hash_of_all.update(b"missing")
+    return hash_of_all.hexdigest()

@@ -323,10 +323,10 @@ class Results(Sequence[StepResult]):
         """Return the restart data of the last step; None without any, or if steps were written since the file was opened."""
         group, name = self._file["fastcontact"], layout.restart_table(number)
         try:
-            kept = unpacked(group[name][()]) if name in group else {}
+            stored = unpacked(group[name][()]) if name in group else {}
         except (ValueError, LookupError, TypeError):
             return None
-        return kept["restart"] if kept.get("step") == number else None
+        return stored["restart"] if stored.get("step") == number else None
 
     def _material_stress(self, number: int) -> MaterialStress | None:
         """Return the stress of each side of material interfaces; None for a step or file without."""

@@ -33,5 +33,5 @@ def cells_by_element(mesh: Mesh, values: Numbers) -> dict[str, Numbers]:
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
     """Return the mean (n_solids, n_components) of each solid cell's nodal stress on its own side [pressure]."""
-    apart, _, stress = separated(mesh, step)
-    return np.concatenate([stress[block].mean(axis=1) for block in apart.solids.values()])
+    separate_mesh, _, stress = separated(mesh, step)
+    return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])

@@ -77,8 +77,8 @@ def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 
     >>> valued(10541.9, {"pressure": "MPa"}, "pressure"), valued(2.5e-7, {}, "length")
     ('10542 MPa', '2.5e-07')
     """
-    whole = 10.0**digits - 0.5 <= abs(value) < 1e6
-    return with_unit(f"{value:.0f}" if whole else f"{value:.{digits}g}", units, quantity)
+    as_integer = 10.0**digits - 0.5 <= abs(value) < 1e6
+    return with_unit(f"{value:.0f}" if as_integer else f"{value:.{digits}g}", units, quantity)
 
 
 def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:

@@ -457,8 +457,8 @@ def _same_mesh(old: Mesh, other: Mesh) -> bool:
     if not np.array_equal(old.points, other.points):
         return False
     for kind in ("cells", "cell_groups", "point_groups"):
-        ours, theirs = getattr(old, kind), getattr(other, kind)
-        if list(ours) != list(theirs) or not all(np.array_equal(ours[name], theirs[name]) for name in ours):
+        of_old, of_other = getattr(old, kind), getattr(other, kind)
+        if list(of_old) != list(of_other) or not all(np.array_equal(of_old[name], of_other[name]) for name in of_old):
             return False
     return True
 

@@ -95,11 +95,11 @@ def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[s
     """Yield a field at the points in one step, as a part of the data set of all steps."""
     name = address.rpartition("/")[2]
     width = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name]
-    parts = [(name, 0, width)]  # label, first column and number of columns of each
+    columns = [(name, 0, width)]  # label, first column and number of columns of each
     if name == "stress":  # XDMF and VTK order the components of a symmetric tensor differently: each is a field
-        parts = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
+        columns = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
     dims = 1 if width == 1 else 2
-    for label, column, count in parts:
+    for label, column, count in columns:
         start, size = (number * n_points, column)[:dims], (n_points, count)[:dims]
         selection = f'<DataItem Format="XML" Dimensions="3 {dims}">{_words((*start, *[1] * dims, *size))}</DataItem>'
         whole = _data(address, (n_points * n_steps, width)[:dims])

@@ -398,12 +398,12 @@ class Building:
         moved = gaps[(gaps <= within) & (np.abs(gaps) > size)]
         if not len(moved):
             return {}
-        apart = (
+        distance = (
             f"{gaps.mean():.6g}"
             if np.ptp(gaps) <= size
             else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
         )
-        self.content.note(pair, f"ADJUST: the distance {apart} of the sides counts as none")
+        self.content.note(pair, f"ADJUST: the distance {distance} of the sides counts as none")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
         closing = -np.where(gaps <= within, gaps, 0.0)
@@ -488,8 +488,8 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
                 f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
             )
         G = law.E / (2.0 * (1.0 + law.nu))
-        kept = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **kept)
+        others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
     return replace(law, **constants)
 
 

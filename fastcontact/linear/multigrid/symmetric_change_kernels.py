@@ -14,16 +14,16 @@ from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
 
 
 @kernel
-def diagonal(indptr, indices, data, low, found, values, slot, size, out):
+def diagonal(indptr, indices, data, low, columns, values, slot, size, out):
     """Add the diagonal blocks of ``D.T G + G.T D`` to `out` (n_blocks * size * size,).
 
-    D is given by `indptr`, `indices`, `data`, G by `low`, `found`, `values`; `slot` (n_nodes,) is the number of the block of
-    each node in `out`.
+    D is given by `indptr`, `indices`, `data`, G by `low`, `columns`, `values`; `slot` (n_nodes,) is the number of the block
+    of each node in `out`.
     """
     sums = np.zeros(slot.shape[0] * size)
     for p in range(indptr.shape[0] - 1):
         for e in range(low[p], low[p + 1]):
-            sums[found[e]] = values[e]
+            sums[columns[e]] = values[e]
         for e in range(indptr[p], indptr[p + 1]):
             node, a = indices[e] // size, indices[e] % size
             block = slot[node] * size * size
@@ -32,7 +32,7 @@ def diagonal(indptr, indices, data, low, found, values, slot, size, out):
                 out[block + a * size + b] += part
                 out[block + b * size + a] += part
         for e in range(low[p], low[p + 1]):
-            sums[found[e]] = 0.0
+            sums[columns[e]] = 0.0
 
 
 @parallel_kernel
@@ -53,8 +53,8 @@ def count_restricted(indptr, indices, start, columns, size, n_coarse, count):
 
 
 @parallel_kernel
-def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, found, out, cols):
-    """Fill the products of rows with a prolongator: coarse nodes `found` (n_blocks,) and their blocks `out`.
+def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, nodes, out, cols):
+    """Fill the products of rows with a prolongator: coarse nodes `nodes` (n_blocks,) and their blocks `out`.
 
     `low` (n_rows + 1,) are the row pointers of the result, `out` holds zeros.
     """
@@ -68,13 +68,13 @@ def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, foun
                 for k in range(start[i], start[i + 1]):
                     J = columns[k]
                     if seen[J] != row:
-                        seen[J], column_slot[J], found[at] = row, at, J
+                        seen[J], column_slot[J], nodes[at] = row, at, J
                         at += 1
                     add_product(out, column_slot[J] * width, (data,), e, P, (k * size + a) * width, ((0,), (0,), cols))
 
 
 @parallel_kernel
-def count_products(start, origin, low, found, n_coarse, count):
+def count_products(start, origin, low, nodes, n_coarse, count):
     """Fill `count` (n_rows,) with the number of blocks in each block row of `products`."""
     n = start.shape[0] - 1
     for c in prange((n + CHUNK - 1) // CHUNK):
@@ -83,18 +83,18 @@ def count_products(start, origin, low, found, n_coarse, count):
             number = 0
             for e in range(start[row], start[row + 1]):
                 for k in range(low[origin[e]], low[origin[e] + 1]):
-                    if seen[found[k]] != row:
-                        seen[found[k]] = row
+                    if seen[nodes[k]] != row:
+                        seen[nodes[k]] = row
                         number += 1
             count[row] = number
 
 
 @parallel_kernel
-def products(start, origin, slot, E, low, found, H, n_coarse, into, columns, out, cols):
+def products(start, origin, slot, E, low, nodes, H, n_coarse, into, columns, out, cols):
     """Fill block rows of ``E.T H``: columns, ascending, and blocks.
 
     E is given by its block columns: `start` (n_rows + 1,), the row `origin` and the block `slot` of each entry; H by rows, as
-    `low`, `found` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` contains zeros.
+    `low`, `nodes` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` contains zeros.
     """
     n, width = start.shape[0] - 1, len(cols)
     for c in prange((n + CHUNK - 1) // CHUNK):
@@ -103,13 +103,13 @@ def products(start, origin, slot, E, low, found, H, n_coarse, into, columns, out
             at = into[row]
             for e in range(start[row], start[row + 1]):
                 for k in range(low[origin[e]], low[origin[e] + 1]):
-                    if seen[found[k]] != row:
-                        seen[found[k]], columns[at] = row, found[k]
+                    if seen[nodes[k]] != row:
+                        seen[nodes[k]], columns[at] = row, nodes[k]
                         at += 1
             columns[into[row] : at].sort()
             for k in range(into[row], at):
                 column_slot[columns[k]] = k
             for e in range(start[row], start[row + 1]):
                 for k in range(low[origin[e]], low[origin[e] + 1]):
-                    to = column_slot[found[k]] * width * width
+                    to = column_slot[nodes[k]] * width * width
                     add_transposed(out, to, (E,), slot[e] * width, H, k * width, (cols, (0,), cols))

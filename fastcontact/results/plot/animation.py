@@ -160,8 +160,8 @@ def _failure_of_writer(path: Path) -> Iterator[None]:
     try:
         yield
     except subprocess.CalledProcessError as error:
-        said = str(error.stderr or "").strip().splitlines()
-        reason = f"{error.returncode} ({said[-1][:200]})" if said else str(error.returncode)
+        lines = str(error.stderr or "").strip().splitlines()
+        reason = f"{error.returncode} ({lines[-1][:200]})" if lines else str(error.returncode)
         raise FastcontactError(
             f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
         ) from error

@@ -110,10 +110,10 @@ def contact_map(
 def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
     """Return one or two axes; raises FastcontactError if too few are given."""
     if axes is not None:
-        given = list(np.atleast_1d(np.array(axes, dtype=object)))
-        if len(given) < 1 + both:
-            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(given)} are given")
-        return given[: 1 + both]
+        axes_given = list(np.atleast_1d(np.array(axes, dtype=object)))
+        if len(axes_given) < 1 + both:
+            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(axes_given)} are given")
+        return axes_given[: 1 + both]
     panels = list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
     panels[0].figure.set_layout_engine("compressed")  # centres a narrow map, next to its colours
     return panels
@@ -136,14 +136,14 @@ def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
 
     Facets are weighted by their pressure, or equally without any pressure.
     """
-    total, whole = np.zeros(3), 0.0
+    total, total_area = np.zeros(3), 0.0
     for facets in blocks.values():
         flat = facets[:, flat_triangles(facets.shape[1])].reshape(-1, 3)
         a, b, c = np.moveaxis(contact.coordinates[flat], 1, 0)
         carried = np.maximum(contact.pressure[flat].mean(axis=1), 0.0) if contact.pressure_max > 0.0 else 1.0
         areas = np.cross(b - a, c - a) * np.reshape(carried, (-1, 1))
-        total, whole = total + areas.sum(axis=0), whole + float(np.linalg.norm(areas, axis=1).sum())
-    if np.linalg.norm(total) < LEAST_MEAN * whole:
+        total, total_area = total + areas.sum(axis=0), total_area + float(np.linalg.norm(areas, axis=1).sum())
+    if np.linalg.norm(total) < LEAST_MEAN * total_area:
         raise FastcontactError(
             f"the surface of contact '{contact.name}' goes around its body: draw a section, or look at it with view"
         )

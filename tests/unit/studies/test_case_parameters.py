@@ -48,8 +48,8 @@ def test_a_name_sets_several_paths_by_their_laws():
         ("contact.pair", "name a single value"),
         ("material.E", "unknown entry"),
         ("material[0].E.x", "unknown entry"),
-        ("a..b", "no path"),
-        ("material[x].E", "no path"),
+        ("a..b", "not a path"),
+        ("material[x].E", "not a path"),
     ],
 )
 def test_a_wrong_path_is_told(path, words):
