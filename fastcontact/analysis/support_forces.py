@@ -29,7 +29,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     ----------
     model : Model
     step : StepResult
-        Of this model.
+        A result of this model.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
     coupling = [relation for relation in model.relations if not any(relation is other for other in related)]
     reaction = step.reaction.ravel() - ground_force(model.springs, step.displacement.ravel())
     rows = [relation.rows for relation in (*related, *coupling)]
-    rows += [section.row(n) for section in model.pretensions]  # possibly locked
+    rows += [section.row(n) for section in model.pretensions]  # a locked section transmits a force like a constraint
     forces = multipliers(reaction, rows, held.ravel())
     reaction = reaction - sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(n))
     by_support: dict[str, Array] = {}
@@ -75,7 +75,9 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
-    """Return the forces (m,) of constraints with rows (m, n_dofs), from components without supports [force].
+    """Return the forces (m,) of constraints with rows (m, n_dofs) [force].
+
+    They follow from the balance of forces at components without supports.
 
     `reaction` (n_dofs,) are the forces of supports and constraints [force]; `held` (n_dofs,) are the components with
     supports.
@@ -95,7 +97,7 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
     ----------
     model : Model
     step : StepResult
-        Of this model.
+        A result of this model.
 
     Raises
     ------

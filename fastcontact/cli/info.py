@@ -16,14 +16,20 @@ HELP = "show the content of a mesh, case, deck or result file: groups, sizes, st
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("file", help="mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)")
-    parser.add_argument("--contacts", action="store_true", help="the surfaces of bodies that face each other instead")
     parser.add_argument(
-        "--distance", metavar="LENGTH", type=float, help="the largest gap for --contacts; the size of facets"
+        "--contacts", action="store_true", help="show the surfaces of bodies that face each other instead"
     )
     parser.add_argument(
-        "--angle", metavar="DEGREES", type=float, default=45.0, help="by how much normals may differ (45)"
+        "--distance", metavar="LENGTH", type=float, help="largest gap for --contacts (default: the size of facets)"
     )
-    parser.add_argument("--png", metavar="FILE", help="picture of the contacts to write")
+    parser.add_argument(
+        "--angle",
+        metavar="DEGREES",
+        type=float,
+        default=45.0,
+        help="by how much normals may deviate from opposite (45)",
+    )
+    parser.add_argument("--png", metavar="FILE", help="write a picture of the contacts")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -91,7 +97,7 @@ def _mesh_of(file: str) -> Any:
 
 
 def _is_deck(path: Path) -> bool:
-    """Whether an Abaqus file holds more than a mesh: steps, parts, or other files."""
+    """Whether an Abaqus file holds more than a mesh: steps, parts, or included files."""
     from fastcontact._tools.paths import existing_file
 
     words = ("*STEP", "*PART", "*INCLUDE")
@@ -120,7 +126,7 @@ def _result_lines(results: Any) -> Iterator[str]:
     if results.error:
         yield f"  stopped: {results.error}"
     elif not results.complete:
-        yield "  incomplete: the run was killed, or goes on"
+        yield "  incomplete: the run was killed, or is still running"
     for step in results:
         closed = ", ".join(f"{name}: {int(c.active.sum())} nodes closed" for name, c in step.contact.items())
         counts = step.iterations
@@ -131,11 +137,11 @@ def _result_lines(results: Any) -> Iterator[str]:
         )
         if "substeps" in counts:
             ends = ", ".join(f"{end:.6g}" for end in counts["substeps"])
-            yield f"    did not converge whole, went in parts up to {ends}"
+            yield f"    did not converge as a whole and was divided at the load factors {ends}"
         yield from (f"    warning: {text}" for text in step.warnings)
-    meet = results[-1].material_stress if len(results) else None
-    if meet is not None:
+    interfaces = results[-1].material_stress if len(results) else None
+    if interfaces is not None:
         yield (
-            f"  materials meet at {len(set(meet.points.tolist()))} nodes: stress there is that of the side with the largest "
-            "von Mises stress, material_stress has each side's"
+            f"  materials meet at {len(set(interfaces.points.tolist()))} nodes: stress there is that of the side with the "
+            "largest von Mises stress; material_stress holds that of each side"
         )

@@ -18,11 +18,11 @@ class MaterialSides:
     Attributes
     ----------
     cells : mapping of str to ndarray (n_cells, n_nodes)
-        Slots of the nodes of each cell, by solid element.
-    node : ndarray of int (n_places,)
+        Slots of the nodes of each cell, by solid element type.
+    node : ndarray of int (n_slots,)
         Node of each slot; the first n_points are the nodes themselves.
     points, material, place : ndarray of int (k,)
-        At interfaces, for each node and each of its materials: node, material, slot; ordered by node.
+        At interfaces, for each node and each of its materials: node, material, slot (`place`); ordered by node.
     """
 
     cells: Mapping[str, Numbers]
@@ -33,31 +33,31 @@ class MaterialSides:
 
 
 def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides:
-    """Return the material interfaces; `material` are the numbers (n_cells,) of each cell's material, by solid element."""
+    """Return the material interfaces; `material` are the numbers (n_cells,) of each cell's material, by element type."""
     n = mesh.n_points
-    least, most = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
+    lowest, highest = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
     for number in np.unique(np.concatenate([np.empty(0, np.int32), *material.values()]))[::-1]:
         inside = np.concatenate([block[material[name] == number].ravel() for name, block in mesh.solids.items()])
-        least[inside] = number
-        most[inside] = np.maximum(most[inside], number)
-    shared = least < most
+        lowest[inside] = number
+        highest[inside] = np.maximum(highest[inside], number)
+    shared = lowest < highest
     if not shared.any():
         none = np.empty(0, np.int32)
         return MaterialSides(dict(mesh.solids), np.arange(n, dtype=np.int32), none, none, none)
-    count = int(most.max()) + 1
+    count = int(highest.max()) + 1
     keys = [
         (block.astype(np.int64) * count + material[name][:, None])[shared[block]] for name, block in mesh.solids.items()
     ]
     rows = np.unique(np.concatenate(keys))
     points, numbers = (rows // count).astype(np.int32), (rows % count).astype(np.int32)
-    further = numbers != least[points]
+    additional = numbers != lowest[points]
     side = points.copy()
-    side[further] = n + np.arange(np.count_nonzero(further), dtype=np.int32)
+    side[additional] = n + np.arange(np.count_nonzero(additional), dtype=np.int32)
     cells = {}
     for name, block in mesh.solids.items():
         here = shared[block]
         cells[name] = block.copy()
         wanted = (block.astype(np.int64) * count + material[name][:, None])[here]
         cells[name][here] = side[np.searchsorted(rows, wanted)]
-    node = np.concatenate([np.arange(n, dtype=np.int32), points[further]])
+    node = np.concatenate([np.arange(n, dtype=np.int32), points[additional]])
     return MaterialSides(cells, node, points, numbers, side)

@@ -3,7 +3,8 @@
 At the centres of linear cells, and at the reduced Gauss points of quadratic ones, stresses are more accurate than elsewhere
 (Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.
 Polynomials fitted to patches of cells (Zienkiewicz and Zhu, 1992) are worse near the edge of a contact, where the pressure
-falls like a square root: they spread it over two cells, and the error of quadratic cells is overestimated two to four times.
+falls like a square root: they smear the fall over two cells, and the error of quadratic cells is overestimated two to four
+times.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Position of the sampling points of quadratic triangles and tetrahedra between centre and corners.
-SIMPLEX = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
+# Distance of the sampling points of quadratic triangles and tetrahedra from the centre over that of the corners.
+SIMPLEX_FRACTION = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 
 def smoothed_stress(
@@ -31,7 +32,7 @@ def smoothed_stress(
     displacement: Array,
     offset: StressOffset | None = None,
 ) -> dict[str, Array]:
-    """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
+    """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each solid cell, by element type.
 
     It is the same at a node for all cells of one material.
 
@@ -42,9 +43,9 @@ def smoothed_stress(
     field : MaterialField
         Materials of all cells.
     displacement : ndarray (n_points, dim)
-        Of all points [length].
+        Displacements of all points [length].
     offset : StressOffset, optional
-        What stresses have by temperature and initial states.
+        Contribution of temperatures and initial states to the stress.
     """
     components = field.moduli.shape[1]
     stress = CellStress(mesh, kinematics, field.moduli, displacement, field.treatment, offset)
@@ -54,9 +55,9 @@ def smoothed_stress(
         average = recovery.NodalAverage(mesh.n_points, components)
         rows = {name: np.flatnonzero(material[name] == number) for name in by_kind}
         for name, chosen in rows.items():
-            xi, outward = sampling(name)
+            xi, extrapolation = sampling(name)
             cells = mesh.cells[name][chosen]
-            average.add(cells, outward, stress.at(name, xi, cells, field.loops[name][chosen], chosen))
+            average.add(cells, extrapolation, stress.at(name, xi, cells, field.loops[name][chosen], chosen))
         nodal = average.result()
         for name, chosen in rows.items():
             by_kind[name][chosen] = nodal[mesh.cells[name][chosen]]
@@ -64,13 +65,13 @@ def smoothed_stress(
 
 
 def sampling(name: str) -> tuple[Array, Array]:
-    """Return the points (n_q, dim) [-] of an element where stresses are best, and the extrapolation (n_nodes, n_q)."""
+    """Return the points (n_q, dim) [-] of an element where stress is most accurate, and the extrapolation (n_nodes, n_q)."""
     element = elements.get(name)
     corners = element.nodes[: element.n_corners]
     centre = corners.mean(axis=0)
     if element.order == 1:
         return centre[None, :], np.ones((element.n_nodes, 1))
     simplex = element.n_corners == element.dim + 1
-    inward = SIMPLEX[element.n_corners] if simplex else 1.0 / math.sqrt(3.0)
+    inward = SIMPLEX_FRACTION[element.n_corners] if simplex else 1.0 / math.sqrt(3.0)
     xi = np.asarray(centre + inward * (corners - centre))
     return xi, np.asarray(element.corner_shape(element.nodes) @ np.linalg.inv(element.corner_shape(xi)))

@@ -17,8 +17,8 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import nodal_rows, sum_of_blocks
 from fastcontact.round_off import ROUND_OFF
 
-# Ratios of the stiffness of a spring between nodes to that of the bodies there that cause a warning and an error.
-STIFF, STIFFEST = 1e5, 1e12
+# Ratios of the stiffness of a spring between nodes to that of the bodies at its ends that cause a warning and an error.
+WARNING_RATIO, ERROR_RATIO = 1e5, 1e12
 DIGITS = 16  # decimal digits of double precision
 
 
@@ -28,12 +28,14 @@ class Springs:
 
     Attributes
     ----------
-    name, grounded
-        Name for messages, and whether they connect nodes to the ground rather than two nodes.
+    name : str
+        Name for messages.
     rows : csr_array (m, n_dofs)
-        Elongation of each spring from the displacements [-].
+        Rows that yield the elongation of each spring from the displacements [-].
     stiffness : ndarray (m,)
         [force / length]; in axisymmetry over the full circle.
+    grounded : bool
+        Whether the springs connect nodes to the ground, not to other nodes.
     """
 
     name: str
@@ -57,7 +59,8 @@ def grounded(
 ) -> Springs:
     """Return springs from each of the `nodes` (n,) to the ground; see `joined`.
 
-    They act along every axis of `stiffness` [force / length], and `along` or across the unit vector `direction` (dim,) [-].
+    They act along every axis in `stiffness`, and along and across the unit vector `direction` (dim,) [-] with the stiffnesses
+    ``along["axial"]`` and ``along["transverse"]`` [force / length].
     """
     directions, values = _frame(stiffness, along or {}, direction, dim)
     rows = nodal_rows(np.tile(nodes, len(values))[:, None], np.repeat(directions, len(nodes), axis=0)[:, None], n_dofs)
@@ -74,10 +77,10 @@ def joined(
 ) -> Springs:
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
-    `ends` (n,) of int each are the first and the second points. Springs act along every axis of `stiffness`
-    [force / length]; ``along["axial"]`` and ``along["transverse"]`` [force / length] act along and across the line of a pair,
-    or the unit vector `direction` (dim,) [-]. ModelError if the two points of a pair are one, or are at one place and have
-    no line between them.
+    `ends` (n,) of int each are the first and the second points. Springs act along every axis in `stiffness`
+    [force / length]; those of the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along and
+    across the line of a pair, or the unit vector `direction` (dim,) [-]. ModelError if the two points of a pair are the same
+    point, or are at the same place, so that no line connects them.
     """
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
@@ -166,36 +169,35 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
     """
     dim, texts = K.blocksize[0], []
     for spring in springs:
-        ratio, body = _stiffer(spring, K.diagonal(), dim)
-        if ratio <= STIFF:
+        ratio, body = _stiffness_ratio(spring, K.diagonal(), dim)
+        if ratio <= WARNING_RATIO:
             continue
         text = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
-        instead = (
-            f"take {0.1 * STIFF * body:.0e} or less, or a relation (relate, relate_groups), which is rigid and exact"
-        )
+        softer = 0.1 * WARNING_RATIO * body
+        instead = f"take {softer:.0e} or less, or a relation (relate, relate_groups), which is rigid and exact"
         lost = round(math.log10(ratio))
-        if ratio > STIFFEST:
+        if ratio > ERROR_RATIO:
             left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"
-            raise ModelError(f"{text}: {left} would be left of results; {instead}")
+            raise ModelError(f"{text}: results would keep {left}; {instead}")
         texts.append(
-            f"{text}: results lose up to {lost} of {DIGITS} digits, and beside contact its force is off by as many times the "
-            f"criteria; {instead}"
+            f"{text}: results lose up to {lost} of {DIGITS} digits, and with contact its force is accurate only to this "
+            f"ratio times the convergence criteria; {instead}"
         )
     return texts
 
 
-def _stiffer(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
+def _stiffness_ratio(spring: Springs, diagonal: Array, dim: int) -> tuple[float, float]:
     """Return the largest ratio of a spring's stiffness to that of the softer body at its ends, and that stiffness."""
     rows = spring.rows.tocoo()
     row, node = rows.coords[0], rows.coords[1] // dim
     ends, index = np.unique(np.stack([row, node]), axis=1, return_inverse=True)
     body = np.bincount(index.ravel(), weights=rows.data**2 * diagonal[rows.coords[1]])
-    # Excludes springs that only add to the diagonal, and points without a body.
-    coupling = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
-    if not coupling.any():
+    # Springs that only add to the diagonal do not count, nor do points without a body.
+    counts = (np.diff(spring.rows.indptr)[ends[0]] > 1) & (body > 0.0)
+    if not counts.any():
         return 0.0, 0.0
-    ratio = spring.stiffness[ends[0][coupling]] / body[coupling]
-    return float(ratio.max()), float(body[coupling][ratio.argmax()])
+    ratio = spring.stiffness[ends[0][counts]] / body[counts]
+    return float(ratio.max()), float(body[counts][ratio.argmax()])
 
 
 def ground_force(springs: Sequence[Springs], u: Array) -> Array:

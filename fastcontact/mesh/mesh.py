@@ -1,4 +1,4 @@
-"""Immutable meshes: points, cells by element, named groups."""
+"""Immutable meshes: points, cells by element type, named groups."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from fastcontact.mesh.facet_search import added, facets_with_nodes
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
-    of_mesh = isinstance(values, np.ndarray) and values.base is None and not values.flags.writeable
-    array = np.array(values, dtype=dtype, order="C", copy=None if of_mesh else True)
+    frozen = isinstance(values, np.ndarray) and values.base is None and not values.flags.writeable
+    array = np.array(values, dtype=dtype, order="C", copy=None if frozen else True)
     array.setflags(write=False)
     return array
 
@@ -33,14 +33,14 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
     if array.size == 0:
         return array.astype(np.int32)
     if array.dtype.kind not in "iuf" or (array.dtype.kind == "f" and not np.array_equal(array, np.floor(array))):
-        raise MeshError(f"{name} must be given by whole numbers, counted from 0, not by {array.dtype} values")
+        raise MeshError(f"{name} must be whole numbers, counted from 0, not {array.dtype} values")
     if array.min() < -(2**31) or array.max() >= 2**31:
-        raise MeshError(f"{name} name the number {array.max()}, beyond the 2147483647 that a mesh can count to")
+        raise MeshError(f"{name} contain the number {array.max()}: the largest that a mesh can hold is 2147483647")
     return array
 
 
 def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
-    """Return the offset of each block in the sequence of all, by name."""
+    """Return the number of the first cell of each block, where cells are numbered over all blocks, by name."""
     return dict(zip(blocks, np.cumsum([0, *map(len, blocks.values())]).tolist(), strict=False))
 
 
@@ -50,7 +50,7 @@ class Mesh:
     """Points, cells and named groups.
 
     A mesh has cells of several dimensions: solids, and facets (lines in 2D) for groups of the boundary. Cells are
-    numbered consecutively over all elements in the order of `cells`; a cell group is a sorted array of these numbers.
+    numbered consecutively over all element types in the order of `cells`; a cell group is a sorted array of these numbers.
     MeshError if an array has the wrong shape, a number is not finite, or an index is out of range.
 
     Parameters
@@ -58,7 +58,7 @@ class Mesh:
     points : array_like (n_points, dim)
         Reference coordinates [length].
     cells : mapping of str to array_like (n_cells, n_nodes)
-        Connectivity by element name (``"tri3"``, ``"line2"``, ...).
+        Connectivity by element type (``"tri3"``, ``"line2"``, ...).
     cell_groups : mapping of str to array_like (n,)
         Cell numbers of each named group of cells.
     point_groups : mapping of str to array_like (n,)
@@ -103,7 +103,7 @@ class Mesh:
         if conn.ndim != 2 or conn.shape[1] != element.n_nodes:
             raise MeshError(f"cells of {name} must have shape (n_cells, {element.n_nodes}), not {conn.shape}")
         if conn.size and (conn.min() < 0 or conn.max() >= n_points):
-            raise MeshError(f"a cell of {name} names point {conn.max()}, but there are {n_points} points (0-based)")
+            raise MeshError(f"a cell of {name} refers to point {conn.max()}, but there are {n_points} points (0-based)")
         return conn
 
     @staticmethod
@@ -112,7 +112,7 @@ class Mesh:
         for name, members in groups.items():
             numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
             if len(numbers) and (numbers[0] < 0 or numbers[-1] >= count):
-                raise MeshError(f"{kind} group '{name}' names {kind} {numbers[-1]}, but there are {count}")
+                raise MeshError(f"{kind} group '{name}' contains {kind} {numbers[-1]}, but there are {count} (0-based)")
             numbers.setflags(write=False)
             checked[name] = numbers
         return MappingProxyType(checked)
@@ -150,17 +150,17 @@ class Mesh:
 
     @cached_property
     def offsets(self) -> dict[str, int]:
-        """Number of the first cell of each element."""
+        """Number of the first cell of each element type."""
         return starts_of(self.cells)
 
     @property
     def solids(self) -> dict[str, AnyArray]:
-        """Connectivity (n_cells, n_nodes) of the cells that have the dimension of the space, by element."""
+        """Connectivity (n_cells, n_nodes) of the cells that have the dimension of the space, by element type."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim}
 
     @property
     def facets(self) -> dict[str, AnyArray]:
-        """Connectivity (n_cells, n_nodes) of the cells one dimension below the space, by element."""
+        """Connectivity (n_cells, n_nodes) of the cells one dimension below the space, by element type."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim - 1}
 
     @property
@@ -169,7 +169,7 @@ class Mesh:
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
     def split(self, numbers: AnyArray) -> dict[str, Indices]:
-        """Return for each element the rows (m,) of its cells in `numbers` (n,); elements without such cells are absent."""
+        """Return by element type the rows (m,) of the cells `numbers` (n,); types without such cells are absent."""
         rows = {}
         for name, start in self.offsets.items():
             inside = (numbers >= start) & (numbers < start + len(self.cells[name]))
@@ -178,7 +178,7 @@ class Mesh:
         return rows
 
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
-        """Return the connectivity (n_cells, n_nodes) of a cell group by element, only for dimension `dim` if given.
+        """Return the connectivity (n_cells, n_nodes) of a cell group by element type, only of the dimension `dim` if given.
 
         MeshError if there is no cell group of that name.
         """
@@ -215,7 +215,7 @@ class Mesh:
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
         if not self.group_names:
-            return f"the mesh has no groups at all, so none is '{group}': name groups in the mesher, or with Mesh.with_groups"
+            return f"the mesh has no groups, and thus no '{group}': name groups in the mesher, or with Mesh.with_groups"
         return unknown(kind, group, known)
 
     def point(self, group: str) -> int:
@@ -257,7 +257,8 @@ class Mesh:
         name : str
             Name of the group; an existing group of this name is replaced.
         where : callable
-            From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes do.
+            From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes are
+            True.
         between : bool
             Select facets between two cells, such as a section through a body, instead of those on the outer surface.
         of : str, optional
@@ -294,10 +295,10 @@ class Mesh:
         return self.with_facets({name: facets})
 
     def _cells_inside(self, name: str, group: str) -> dict[str, Mask]:
-        """Return which solid cells (n_cells,) are in a group, by element; MeshError, with facet group `name`, if none."""
+        """Return which solid cells (n_cells,) a group has, by element type; MeshError, with facet group `name`, if none."""
         if not self.cells_of(group, dim=self.dim):
             raise MeshError(
-                f"facet group '{name}' is to be of '{group}', which holds no solid cells: name a body's group"
+                f"facet group '{name}' cannot be taken from '{group}', which has no solid cells: name a body's group"
             )
         rows = self.split(self.cell_groups[group])
         return {kind: np.isin(np.arange(len(block)), rows.get(kind, [])) for kind, block in self.solids.items()}
@@ -305,7 +306,7 @@ class Mesh:
     def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
         """Return the mesh with new groups of facets; missing facets are added, groups of the same names are replaced.
 
-        `groups` (n_facets, n_nodes) of int holds the nodes of the facets, by name of the group and by element.
+        `groups` (n_facets, n_nodes) of int holds the nodes of the facets, by name of the group and by element type.
         """
         cells = dict(self.cells)
         rows: dict[str, dict[str, AnyArray]] = {}

@@ -340,7 +340,7 @@ class Results(Sequence[StepResult]):
         if len(cells) != len(self._file["VTKHDF/Types"]):
             raise ValueError("the table of stresses by material is cut off")
         if rows["points"].min() < 0 or rows["points"].max() >= self.mesh.n_points:
-            raise ValueError("the table of stresses by material names points that are not there")
+            raise ValueError("the table of stresses by material refers to points that are not there")
         columns = (np.ascontiguousarray(rows[name]) for name in ("points", "material", "stress"))
         return MaterialStress(cells, *columns)
 

@@ -162,12 +162,12 @@ MESH = [
     Mistake("coordinates in one dimension", lambda: fc.Mesh([[0.0], [1.0]], {}), fc.MeshError,
             r"points must have shape \(n_points, 2\) or \(n_points, 3\), not \(2, 1\)"),
     Mistake("a cell names a point that is not there", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 3]]}),
-            fc.MeshError, r"a cell of tri3 names point 3, but there are 3 points \(0-based\)"),
+            fc.MeshError, r"a cell of tri3 refers to point 3, but there are 3 points \(0-based\)"),
     Mistake("cells with a node too few", lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1]]}), fc.MeshError,
             r"cells of tri3 must have shape \(n_cells, 3\), not \(1, 2\)"),
     Mistake("a group names a cell that is not there",
             lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"A": [1]}), fc.MeshError,
-            r"cell group 'A' names cell 1, but there are 1"),
+            r"cell group 'A' contains cell 1, but there are 1 \(0-based\)"),
     Mistake("an inverted cell", lambda: of_square(cells=turned), fc.MeshError,
             r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: turn it with mesh, count = fastcontact\.topology\.oriented\(mesh\), or refine if it is curved"),
     Mistake("a folded cell", lambda: of_square(moved(4, (0.9, 0.9))), fc.MeshError, r"cell 3 .* is inverted"),
@@ -179,7 +179,7 @@ MESH = [
     Mistake("a duplicate cell", lambda: of_square(cells=lambda c: np.vstack([c, c[1]])), fc.MeshError,
             r"cell 1 \(quad4 at \(0\.25, 0\.75\)\) occurs in the mesh 2 times, one of 1 such cells: remove the copies"),
     Mistake("a mesh without groups", lambda: blocks(changed(cell_groups={}, point_groups={})), fc.MeshError,
-            r"the mesh has no groups at all, so none is 'LOWER_BOTTOM': name groups in the mesher, or with Mesh\.with_groups"),
+            r"the mesh has no groups, and thus no 'LOWER_BOTTOM': name groups in the mesher, or with Mesh\.with_groups"),
     Mistake("a mesh of facets only", lambda: fc.Model(fc.Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}), "plane_strain"),
             fc.ModelError, r"the mesh has no solid cells, only line2"),
     Mistake("3D faces without solids",
@@ -494,7 +494,7 @@ LOADS = [
     Mistake("a spring as a rigid link",
             lambda: fc.solve(with_load("add_spring", group="UPPER_TOP_LEFT", to="LOWER_BOTTOM_LEFT", y=1e30), 1),
             fc.ModelError,
-            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): no digit would be left of results; take \de\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact"),
+            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): results would keep no digit; take \de\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact"),
 ]
 # fmt: on
 

@@ -208,7 +208,7 @@ def repeated_equations(patch):
 
 
 CALLS = [
-    ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' names point 9 of 4: write the file anew"),
+    ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' refers to point 9 of 4: write the file anew"),
     ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' do not fit together: check the file, or convert it to \.med"),
     ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' may not be read: ask its owner for the permission"),
     ("equations on the same unknown", repeated_equations, pivot_order.RepeatedError, REPEATED),
@@ -227,7 +227,7 @@ CALLS = [
     ("multigrid without iterations", stuck, fc.ConvergenceError, r"."),
     ("a stiffness that is not positive definite", indefinite, fc.ModelError, r"the stiffness matrix is not positive definite: check the material and the cells"),
     ("no triangulation is found", no_triangulation, fc.MeshError, r"no triangulation with edges up to .* at the pole and .* far from it was found: change a size a little, or let it grow"),
-    ("triangles that leave a hole", lambda: _triangulate._checked(np.zeros((3, 3), int), 10, 8), fc.MeshError, r"the triangulation has 3 triangles where 10 fill the outline"),
+    ("triangles that leave a hole", lambda: _triangulate._checked(np.zeros((3, 3), int), 10, 8), fc.MeshError, r"the triangulation has 3 triangles, but 10 are needed to fill the outline"),
     ("a maker of no known finer meshes", no_finer_meshes, fc.errors.CaseError, r"it is not known how the generator 'rings' makes finer meshes: name its arguments in \[study\] as halve = \[\.\.\.\] or double = \[\.\.\.\]"),
     ("an element on other corners", not_makeable, fc.errors.CaseError, r"meshes of tri3 cannot be made from the case's quad4: give a generator"),
     ("a study without a level", no_level, fc.MeshError, r"no level could be solved; .*: the mesh is folded"),

@@ -242,7 +242,11 @@ def two_materials(path):
 
 @pytest.mark.parametrize(
     ("spoil", "said"),
-    [("cut", "the table of stresses by material is cut off"), ("far", "names points that are not there"), ("none", "")],
+    [
+        ("cut", "the table of stresses by material is cut off"),
+        ("far", "refers to points that are not there"),
+        ("none", ""),
+    ],
 )
 def test_stresses_by_material_of_a_damaged_file(spoil, said, tmp_path):
     step = two_materials(tmp_path / "a.vtkhdf")

@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Closest facet to each of many points in 2D.
 
-Facets are straight lines (2 nodes) or parabolas (3 nodes, the middle last): ``corners`` (n_facets, n_nodes, 2).
+Facets are straight lines (2 nodes) or parabolas (3 nodes, the middle one last), at ``nodes`` (n_facets, n_nodes, 2).
 """
 
 import numpy as np
@@ -11,55 +11,55 @@ from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, op
 
 
 @inlined_kernel
-def _curve(corners, f, s):
+def _curve(nodes, f, s):
     """Return the point and the first and second derivatives of facet `f` at s in [-1, 1]."""
-    ax, ay, bx, by = corners[f, 0, 0], corners[f, 0, 1], corners[f, 1, 0], corners[f, 1, 1]
-    if corners.shape[1] == 2:
+    ax, ay, bx, by = nodes[f, 0, 0], nodes[f, 0, 1], nodes[f, 1, 0], nodes[f, 1, 1]
+    if nodes.shape[1] == 2:
         tx, ty = 0.5 * (bx - ax), 0.5 * (by - ay)
         return 0.5 * (ax + bx) + s * tx, 0.5 * (ay + by) + s * ty, tx, ty, 0.0, 0.0
-    mx, my = corners[f, 2, 0], corners[f, 2, 1]
+    mx, my = nodes[f, 2, 0], nodes[f, 2, 1]
     cx, cy = ax + bx - 2.0 * mx, ay + by - 2.0 * my
     tx, ty = 0.5 * (bx - ax), 0.5 * (by - ay)
     return mx + s * tx + 0.5 * s * s * cx, my + s * ty + 0.5 * s * s * cy, tx + s * cx, ty + s * cy, cx, cy
 
 
 @kernel
-def _project(corners, f, x, y):
+def _project(nodes, f, x, y):
     """Return s in [-1, 1] of the point of facet `f` closest to (x, y), and the squared distance."""
-    if corners.shape[1] == 2:
-        px, py, tx, ty, _, _ = _curve(corners, f, 0.0)
+    if nodes.shape[1] == 2:
+        px, py, tx, ty, _, _ = _curve(nodes, f, 0.0)
         s = ((x - px) * tx + (y - py) * ty) / (tx * tx + ty * ty)
         s = min(1.0, max(-1.0, s))
     else:
         s, best = 0.0, np.inf
         for k in range(9):
             trial = -1.0 + 0.25 * k
-            px, py, _, _, _, _ = _curve(corners, f, trial)
+            px, py, _, _, _, _ = _curve(nodes, f, trial)
             d = (x - px) * (x - px) + (y - py) * (y - py)
             if d < best:
                 best, s = d, trial
         for _ in range(50):
-            px, py, tx, ty, cx, cy = _curve(corners, f, s)
+            px, py, tx, ty, cx, cy = _curve(nodes, f, s)
             slope = (x - px) * tx + (y - py) * ty
             curvature = tx * tx + ty * ty - ((x - px) * cx + (y - py) * cy)
-            if not curvature > 0.0:  # far inside the centre of curvature: step as on a straight facet
+            if not curvature > 0.0:  # beyond the centre of curvature: step as on a straight facet
                 curvature = tx * tx + ty * ty
             new = min(1.0, max(-1.0, s + slope / curvature))
             change = abs(new - s)
             s = new
             if change < 1e-15:
                 break
-    # At a node that facets share, all of them have the same distance to the last bit: then the first one is taken.
+    # At a common node all its facets have exactly the same distance: the one with the lowest number is taken.
     if abs(s) == 1.0:
         end = 0 if s < 0.0 else 1
-        px, py = corners[f, end, 0], corners[f, end, 1]
+        px, py = nodes[f, end, 0], nodes[f, end, 1]
     else:
-        px, py, _, _, _, _ = _curve(corners, f, s)
+        px, py, _, _, _, _ = _curve(nodes, f, s)
     return s, (x - px) * (x - px) + (y - py) * (y - py)
 
 
 @interpretable_kernel
-def closest_facets(points, order, begin, end, corners, numbers, tree, result):
+def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
     """Project points (n, 2) on their closest facets; of equally close facets on the one with the lowest number.
 
     Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space follow each other. Facets are in
@@ -82,34 +82,34 @@ def closest_facets(points, order, begin, end, corners, numbers, tree, result):
                 top = open_box(tree, box, (x, y), stack, squares, top)
                 continue
             f = box - leaves
-            s, d = _project(corners, f, x, y)
+            s, d = _project(nodes, f, x, y)
             if d < best or (d == best and numbers[f] < numbers[closest]):
                 closest, best, best_s, reach = f, d, s, ROUNDING * d
         result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
             result.facet[i] = numbers[closest]
-            _write(result, i, corners, closest, best_s, x, y)
+            _write(result, i, nodes, closest, best_s, x, y)
 
 
 @inlined_kernel
-def _write(closest, i, corners, f, s, x, y):
+def _write(result, i, nodes, f, s, x, y):
     """Fill the results for point `i`, at (x, y), except the number of the facet `f`."""
-    px, py, tx, ty, _, _ = _curve(corners, f, s)
+    px, py, tx, ty, _, _ = _curve(nodes, f, s)
     square = tx * tx + ty * ty
     length, along = np.sqrt(square), ((x - px) * tx + (y - py) * ty) / square
-    closest.xi[i, 0], closest.normal[i, 0], closest.normal[i, 1] = s, ty / length, -tx / length
+    result.xi[i, 0], result.normal[i, 0], result.normal[i, 1] = s, ty / length, -tx / length
     outward = along if s == 1.0 else -along if s == -1.0 else 0.0
-    closest.overhang[i] = max(0.5 * outward, 0.0)
-    # As a mean of the nodes, which at an end is that node to the last bit.
+    result.overhang[i] = max(0.5 * outward, 0.0)
+    # A weighted mean of the nodes, which at an end of the facet is exactly that node.
     a, b, c = 0.5 * (1.0 - s), 0.5 * (1.0 + s), 0.0
-    if corners.shape[1] == 3:
+    if nodes.shape[1] == 3:
         a, b, c = -s * a, s * b, 1.0 - s * s
     square = 0.0
     for d in range(2):
-        coordinate = a * corners[f, 0, d] + b * corners[f, 1, d]
-        if corners.shape[1] == 3:
-            coordinate += c * corners[f, 2, d]
-        closest.position[i, d] = coordinate
+        coordinate = a * nodes[f, 0, d] + b * nodes[f, 1, d]
+        if nodes.shape[1] == 3:
+            coordinate += c * nodes[f, 2, d]
+        result.position[i, d] = coordinate
         gap = (x if d == 0 else y) - coordinate
         square += gap * gap
-    closest.distance[i] = np.sqrt(square)
+    result.distance[i] = np.sqrt(square)

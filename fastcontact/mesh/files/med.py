@@ -92,7 +92,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
     n_vertices = sum(len(block.nodes) for block in blocks if block.kind == VERTEX)
     for block in blocks:
         if len(block.nodes) and (block.nodes.min() < 0 or block.nodes.max() >= len(points)):
-            raise MeshError(f"a cell names node {block.nodes.max() + 1}, but nodes go from 1 to {len(points)}")
+            raise MeshError(f"a cell refers to node {block.nodes.max() + 1}, but nodes go from 1 to {len(points)}")
     return build_mesh(points, blocks, point_groups, _group_names(families, -1)), n_vertices
 
 
@@ -401,6 +401,6 @@ def _read_instant(file: Any, support: Any, n_points: int, n_components: int) -> 
             continue
         rows = values(file["PROFILS"][name], "PFL").astype(np.int64) - 1
         if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_points:
-            raise FileError(f"profile '{name}' names point {rows.max() + 1} of {n_points}: write the file anew")
+            raise FileError(f"profile '{name}' refers to point {rows.max() + 1} of {n_points}: write the file anew")
         field[rows] = values_of_profile
     return field

@@ -39,7 +39,7 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
 def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
     """Return the linear mesh of a grid, its cells in the group `solid`.
 
-    The `grid` (n + 1, m + 1, 2) [length] is counter-clockwise: the first index runs to the right, the second up. `sides` maps
+    The `grid` (n + 1, m + 1, 2) [length] is right-handed: the first index runs to the right, the second up. `sides` maps
     BOTTOM, RIGHT, TOP, LEFT to names of groups of lines; with `triangles`, each quadrangle is divided in two along
     alternating diagonals.
     """
@@ -58,7 +58,7 @@ def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: boo
 
 
 def _cut(quads: Indices) -> Indices:
-    """Return triangles (2 n m, 3) of quadrangles (n, m, 4), with diagonals alternating in a chessboard pattern."""
+    """Return the triangles (2 n m, 3) into which diagonals divide quadrangles (n, m, 4), alternating like a chessboard."""
     i, j = np.indices(quads.shape[:2])
     rising = quads[..., [[0, 1, 2], [0, 2, 3]]]
     falling = quads[..., [[0, 1, 3], [1, 2, 3]]]

@@ -1,6 +1,6 @@
 """Triangulation of bodies with a convex outline of named sides, without random numbers.
 
-Edges are not longer than a size function. A lattice, or rings about the pole, are the first guess of the inner points.
+Edges are at most as long as a size function prescribes. The first inner points form a lattice, or rings about the pole.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ from fastcontact.mesh.generate._smooth import delaunay, edges_of, polish, relax
 from fastcontact.mesh.generate._spacing import Spacing
 from fastcontact.mesh.mesh import Mesh
 
-# Inner points are closer than the longest admissible edge, since no triangulation has equal edges: fractions to be tried in
-# turn, and the smallest angle [degrees] at which an attempt, or an earlier better one, is accepted.
+# Since no triangulation has equal edges, inner points are placed at a fraction of the longest admissible edge. Attempts with
+# these fractions are made in turn until the best one so far has no angle below the second number [degrees].
 _ATTEMPTS = ((0.84, 35.0), (0.82, 35.0), (0.80, 33.0), (0.78, 31.0), (0.75, 29.0), (0.70, 20.0))
 _ROUNDS = 8  # number of passes that add points where edges are too long
-_AROUND = 3.0  # distance from an added point, in edge lengths, within which points move
-_ROW = np.sqrt(3.0) / 2  # height of an equilateral triangle
-_CLEAR = 0.6  # smallest distance of seeds from the outline, in edge lengths
+_MOVING_RADIUS = 3.0  # distance from an added point, in edge lengths, within which points move
+_ROW_HEIGHT = np.sqrt(3.0) / 2  # height of an equilateral triangle
+_CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 
 
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    The names and the nodes of its `sides` (n, 2) [length] run counter-clockwise, each from the end of the previous one.
+    Its `sides`, pairs of a name and nodes (n, 2) [length], run counter-clockwise, each from the end of the previous one.
     `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)
-    here = np.arange(len(outline))
-    lines = np.column_stack([here, np.roll(here, -1)])
+    starts = np.arange(len(outline))
+    lines = np.column_stack([starts, np.roll(starts, -1)])
     groups, first = {solid: np.arange(len(triangles))}, len(triangles)
     for name, nodes in sides:
         groups[name] = first + np.arange(len(nodes) - 1)
@@ -86,13 +86,13 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
         points = np.vstack([points, added])
         movable = np.arange(len(points)) >= n_fixed
         # Only around the new points: elsewhere the positions are already good.
-        near = nearest(added, points)[0] < _AROUND * spacing(points)
+        near = nearest(added, points)[0] < _MOVING_RADIUS * spacing(points)
         points = relax(points, movable & near, spacing, 16)
     return None
 
 
 def _middles_of_long_edges(points: Array, n_fixed: int, spacing: Spacing) -> Array:
-    """Return the middle points (m, 2) of too long edges, only of the longest at each point."""
+    """Return the middle points (m, 2) of edges that are too long; at each point only the longest counts."""
     edges = edges_of(delaunay(points))
     # Sides of the outline are excluded, but not chords that cut off a corner.
     side = np.isin(edges[:, 1] - edges[:, 0], (1, n_fixed - 1)) & (edges[:, 1] < n_fixed)
@@ -110,7 +110,9 @@ def _checked(triangles: Indices, n_points: int, n_outline: int) -> Indices:
     """Return the triangles if they fill the polygon: by Euler's formula there are 2 n_points - 2 - n_outline."""
     expected = 2 * n_points - 2 - n_outline
     if len(triangles) != expected:
-        raise MeshError(f"the triangulation has {len(triangles)} triangles where {expected} fill the outline")
+        raise MeshError(
+            f"the triangulation has {len(triangles)} triangles, but {expected} are needed to fill the outline"
+        )
     return triangles
 
 
@@ -120,7 +122,7 @@ def inner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
     field = _lattice(spacing, density, low, high) if spacing.uniform else _rings(spacing, density, low, high)
     corners = _spaced(_corner_seeds(outline, spacing, density), outline, spacing, density)
     size = density * spacing(field)
-    inside = field[_depth(outline, field) > _CLEAR * size]
+    inside = field[_depth(outline, field) > _CLEARANCE * size]
     if not len(corners):
         return inside
     free = nearest(corners, inside)[0] > 0.7 * density * spacing(inside)
@@ -148,7 +150,7 @@ def _depth(outline: Array, points: Array) -> Array:
 
 
 def _corner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
-    """Return a point on the bisector of each corner of about 90 degrees, so that its angle is halved, not cut off."""
+    """Return a point on the bisector of each corner of about 90 degrees: an edge then halves the angle of the corner."""
     ahead = np.roll(outline, -1, axis=0) - outline
     behind = np.roll(outline, 1, axis=0) - outline
     ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]
@@ -164,12 +166,14 @@ def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array
     """Return an equilateral lattice over the box, with one row through the pole."""
     size = density * spacing.far
     pole = np.asarray(spacing.pole)
-    rows = np.arange(np.floor((low[1] - pole[1]) / (_ROW * size)), np.ceil((high[1] - pole[1]) / (_ROW * size)) + 1)
+    rows = np.arange(
+        np.floor((low[1] - pole[1]) / (_ROW_HEIGHT * size)), np.ceil((high[1] - pole[1]) / (_ROW_HEIGHT * size)) + 1
+    )
     columns = np.arange(np.floor((low[0] - pole[0]) / size) - 1, np.ceil((high[0] - pole[0]) / size) + 1)
     affordable(2.0 * len(rows) * len(columns))
     row, column = np.meshgrid(rows, columns, indexing="ij")
     x = pole[0] + size * (column + 0.5 * (row % 2))
-    return np.column_stack([x.ravel(), (pole[1] + _ROW * size * row).ravel()])
+    return np.column_stack([x.ravel(), (pole[1] + _ROW_HEIGHT * size * row).ravel()])
 
 
 def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
@@ -184,7 +188,7 @@ def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
     rings, radius, shift, total = [], 0.0, 0.0, 0
     while radius < farthest:
         size = density * float(spacing.at_distance(radius))
-        radius += _ROW * size
+        radius += _ROW_HEIGHT * size
         n = max(6, round(2 * np.pi * radius / size))
         total += n
         affordable(2.0 * total)

@@ -16,10 +16,10 @@ from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, ne
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
-# How deep the picture goes, in contact radii.
-DEEP = 4.0
+# Depth of the picture, in contact radii.
+PLOTTED_DEPTH = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
-# Colours of these, and of von Mises.
+# Colours of these, and of the von Mises stress.
 COLOURS = ("C0", "C1", "C2")
 
 
@@ -72,7 +72,7 @@ def axis_stress(
     upright = abs(_axis(step, pair)[1][1]) > 0.5
     bodies = ("upper body", "lower body") if upright else ("right body", "left body")
     axes, units = new_axes(ax, (6.4, 4.8)), units or step.units
-    reach = DEEP * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
+    reach = PLOTTED_DEPTH * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
     values = {caption: stress[:, component] for caption, component in COMPONENTS.items()} | {
         "von Mises": von_mises(stress)
@@ -91,7 +91,7 @@ def axis_stress(
             axes.plot(fine, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, {step.instant}"
-    axes.set(xlabel=labelled("depth under the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
+    axes.set(xlabel=labelled("depth below the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
     axes.set_title(title, fontsize="medium")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
@@ -105,23 +105,23 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
     across the axis, yy along it, xy between the two.
     """
     if mesh.dim != 2:
-        raise FastcontactError("stresses along the axis are for meshes in two dimensions: probe points in three")
+        raise FastcontactError("stresses along the axis need a two-dimensional mesh: in three dimensions probe points")
     pole, direction = _axis(step, pair)
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     height = (mesh.points[used] - pole) @ direction
     offset = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
-    # The normal of a deformed facet is that of the surface up to a few thousandths.
-    leaning = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
-    on_axis = np.abs(offset) <= tolerance + leaning * np.abs(height)
+    # The normal of a deformed facet agrees with that of the surface to a few thousandths.
+    slope_tolerance = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
+    on_axis = np.abs(offset) <= tolerance + slope_tolerance * np.abs(height)
     nodes, height = used[on_axis], height[on_axis]
     if len(nodes) < 2:
         raise FastcontactError(
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
     # There are two nodes at the pole, one of each body, which are distinguished by the positions of their cells.
-    behind = _sides(mesh, nodes, pole, direction)
-    side = np.where(np.abs(height) > tolerance, np.sign(height), behind).astype(np.int64)
+    body_side = _sides(mesh, nodes, pole, direction)
+    side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
     return np.abs(height)[order], side[order], _turned(step.stress[nodes], direction)[order]
 

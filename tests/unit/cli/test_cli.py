@@ -168,7 +168,7 @@ def test_steps_that_went_in_parts_are_told(solved, tmp_path, capsys):
     assert len(ends) > 1
     assert f"  1 load step did not converge as a whole and went in {len(ends)} parts" in captured.out.splitlines()
     assert main(["info", str(path)]) == 0
-    assert f"went in parts up to {ends[0]:.6g}, " in capsys.readouterr().out
+    assert f"was divided at the load factors {ends[0]:.6g}, " in capsys.readouterr().out
 
 
 def test_a_run_that_was_killed_is_incomplete(solved, tmp_path, capsys):
@@ -176,7 +176,7 @@ def test_a_run_that_was_killed_is_incomplete(solved, tmp_path, capsys):
         out = fc.ResultWriter(tmp_path / "killed.vtkhdf", results.mesh)
         out.write(results[0])
         assert main(["info", str(out.path)]) == 0
-    assert "  incomplete: the run was killed, or goes on" in capsys.readouterr().out.splitlines()
+    assert "  incomplete: the run was killed, or is still running" in capsys.readouterr().out.splitlines()
 
 
 @pytest.mark.parametrize("background", [False, True])

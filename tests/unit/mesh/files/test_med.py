@@ -550,7 +550,7 @@ def test_meshes_of_another_kind(tmp_path, attribute, value, message):
 @pytest.mark.parametrize(
     ("where", "values", "message"),
     [
-        ("MAI/TR3/NOD", [1, 2, 71, 3, 4, 5], "names node 71, but nodes go from 1 to 70"),
+        ("MAI/TR3/NOD", [1, 2, 71, 3, 4, 5], "refers to node 71, but nodes go from 1 to 70"),
         ("MAI/TR3/NOD", [1, 2, 3, 4, 5], "5 node numbers, which is not a multiple of 3"),
         ("MAI/TR3/FAM", [0], "1 family numbers for 2 cells"),
         ("NOE/COO", np.zeros(141), "141 coordinates for 70 nodes"),
