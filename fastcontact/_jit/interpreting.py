@@ -2,7 +2,7 @@
 
 A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and its compilation one or two
 seconds. Python runs it until it has spent about the time of a compilation on it, in this run and earlier ones: for any
-later runs, that takes at most twice the time of the better choice. The arithmetic is the same to the last bit: sums,
+later runs, that takes at most twice the time of the better choice. The arithmetic is bitwise identical: sums,
 products, quotients and square roots of doubles, in the order written.
 """
 

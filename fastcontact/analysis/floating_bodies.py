@@ -132,7 +132,7 @@ class FloatingBodies:
         """Return a report of the regularisation, as plain numbers and strings.
 
         Keys: ``motions``, names of the free motions; ``springs``, their positions; ``spring_stiffness`` [force / length];
-        ``force_left``, the remaining force of each spring [force]; ``relative_to_load``, the largest one over the load;
+        ``force_left``, the remaining force of each spring [force]; ``relative_to_load``, the largest one divided by the load;
         ``positions``, number of rigid positions.
         """
         left = np.abs(rigid.spring_force)

@@ -65,7 +65,7 @@ class Case:
     sensitivities : list of (tuple, list of tuple)
         Quantities and their parameters, see `fastcontact.sensitivities`.
     modes : dict, optional
-        Arguments of `fastcontact.modes` about the last step; None without ``[modes]``.
+        Arguments of `fastcontact.modes` at the last step; None without ``[modes]``.
     deck : Deck, optional
         The input deck from which the case was built.
     """
@@ -101,7 +101,7 @@ class Case:
 
 
 def read_case(path: str | Path) -> Case:
-    """Read a case file, a ready case by its name, or an input deck (``.inp``), and build its model.
+    """Read a case file, a ready-made case by its name, or an input deck (``.inp``), and build its model.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def read_case(path: str | Path) -> Case:
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
         # A value that passed all checks by key: only Python's message says what is wrong.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready cases") from error
+        raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready-made cases") from error
 
 
 def _case_of_deck(path: Path) -> Case:
@@ -179,7 +179,9 @@ def _unreadable(path: Path, error: Exception) -> str:
     if path.is_dir():
         return "it is a folder; name a file in it"
     if not path.exists():
-        ready = f"; the ready case of this name needs no path: '{path.stem}'" if path.stem in shipped_cases() else ""
+        ready = (
+            f"; the ready-made case of this name needs no path: '{path.stem}'" if path.stem in shipped_cases() else ""
+        )
         return f"it does not exist{ready}"
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__

@@ -1,4 +1,4 @@
-"""Ready cases: the case files that come with the package, available by name."""
+"""Ready-made cases: the case files that come with the package, available by name."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def shipped_cases() -> dict[str, Path]:
 
 
 def shipped_case(name: str) -> Path:
-    """Return the case file of a ready case; raises CaseError if there is none, with the nearest names."""
+    """Return the case file of a ready-made case; raises CaseError if there is none, with the nearest names."""
     cases = shipped_cases()
-    check_known("ready case", name, cases, CaseError)
+    check_known("ready-made case", name, cases, CaseError)
     return cases[name]
 
 
 def case_path(given: str | Path) -> Path:
-    """Return the file of a path, or of the name of a ready case where there is no such file; raises CaseError if none."""
+    """Return the file of a path, or of the name of a ready-made case if there is no such file; raises CaseError if none."""
     path = Path(given)
     try:
         if path.exists() or path.suffix or path.name != str(given):

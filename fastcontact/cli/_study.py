@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--csv", metavar="FILE", help="write the table")
     parser.add_argument("--png", metavar="FILE", help="write a picture")
     parser.add_argument("--html", metavar="FILE", help="write a report in one file, pictures inside")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one a processor; 1: this one)")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per processor; 1: this one)")
     parser.add_argument(
         "--executor",
         default="processes",
@@ -58,7 +58,7 @@ def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
 def stopped(options: argparse.Namespace) -> str:
     """Return the message after an interruption."""
     if options.store:
-        return f"stopped; the same command goes on where it stopped, with the runs in {options.store}"
+        return f"stopped; the same command continues where it stopped, with the runs in {options.store}"
     return "stopped; with --store DIR the same command would go on where it stopped"
 
 

@@ -1,4 +1,4 @@
-"""``fastcontact cases``: the ready cases, listed, printed or copied."""
+"""``fastcontact cases``: the ready-made cases, listed, printed or copied."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
-HELP = "list the ready cases; print one, or copy it to change it"
+HELP = "list the ready-made cases; print one, or copy it to change it"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

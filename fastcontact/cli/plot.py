@@ -1,4 +1,4 @@
-"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, and its history over the load."""
+"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, and its history over the load steps."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fastcontact.cli import _results
 from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
-HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load"
+HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
 # Kinds of pictures of one contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
 
@@ -19,16 +19,16 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     _results.arguments(parser)
     parser.add_argument("--png", metavar="FILE", help="picture to write")
     kinds = parser.add_mutually_exclusive_group()
-    kinds.add_argument("--history", action="store_true", help="force and contact radius over the load instead")
+    kinds.add_argument("--history", action="store_true", help="force and contact radius over the load steps instead")
     kinds.add_argument("--axis", action="store_true", help="stresses along the axis under the contact, against theory")
     kinds.add_argument(
-        "--zones", action="store_true", help="where the contact is open, closed and slides, over the load"
+        "--zones", action="store_true", help="where the contact is open, closed and slides, over the load steps"
     )
     kinds.add_argument(
         "--map", action="store_true", help="pressure and shear (or --field contact_slip) over the contact (3D)"
     )
     kinds.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
-    kinds.add_argument("--animate", metavar="FILE", help="a moving picture over the load: .gif, with ffmpeg .mp4")
+    kinds.add_argument("--animate", metavar="FILE", help="a moving picture over the load steps: .gif, with ffmpeg .mp4")
     kinds.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
     parser.add_argument(
         "--field", metavar="NAME", default="von_mises",
@@ -111,7 +111,7 @@ def _of_bodies(
 
 
 def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw a contact pair: its map, its zones or history over the load, or the stresses under it."""
+    """Draw a contact pair: its map, its zones or history over the load steps, or the stresses under it."""
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}

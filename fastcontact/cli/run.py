@@ -31,20 +31,24 @@ LARGE = 30_000
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument(
-        "case", help="case file (TOML), the name of a ready case (see 'fastcontact cases'), or a deck (.inp)"
+        "case", help="case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)"
     )
     parser.add_argument("-o", "--output", help="result file (default: the case's name with .vtkhdf, here)")
     parser.add_argument(
-        "--resume", action="store_true", help="go on after the last complete step of the result file, if it holds any"
+        "--resume",
+        action="store_true",
+        help="continue after the last complete step of the result file, if it holds any",
     )
     parser.add_argument(
         "--json", metavar="FILE", help="write a summary of the last step and the iterations, or why the run failed"
     )
     parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
-    parser.add_argument("--modes", metavar="FILE", help="write the modes about the last step, a step each (.vtkhdf)")
+    parser.add_argument(
+        "--modes", metavar="FILE", help="write the natural modes of the state of the last step (.vtkhdf)"
+    )
     parser.add_argument(
         "--nodal-diameters", metavar="N[,N...]",
-        help="modes of the whole ring of a sector by these nodal diameters, such as 0,1,2, or all; shapes are the ring's",
+        help="modes of the whole ring of a sector with these nodal diameters, such as 0,1,2, or all; shapes are the ring's",
     )  # fmt: skip
     parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
     parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
@@ -207,7 +211,7 @@ def _kept_steps(output: Path, steps: int) -> str:
     if not steps:
         return f"'{output}' holds no complete step"
     many = "one complete step" if steps == 1 else f"all {steps} complete steps"
-    return f"'{output}' keeps {many}: 'fastcontact run --resume' goes on from there"
+    return f"'{output}' keeps {many}: 'fastcontact run --resume' continues from there"
 
 
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:

@@ -4,7 +4,7 @@ It is the only choice that is accurate on any two surfaces (``bench/defaults.py`
 Node-to-segment contact takes the normal of one of two facets where two nodes face each other, and nodes that face each other
 at first no longer do once the bodies slide; even with averaged normals it does not transmit a uniform pressure between
 non-matching meshes. Quadrature over whole facets is inaccurate where the other side ends or bends. Standard multipliers gain
-one digit on smooth quadratic facets in the plane, but each of their gaps involves the neighbouring nodes: with multigrid
+one digit on smooth quadratic facets in two dimensions, but each of their gaps involves the neighbouring nodes: with multigrid
 every closed constraint costs a linear solution.
 
 Against rigid obstacles the default is the continuous formulation, which also enforces contact between nodes, with two
@@ -22,7 +22,7 @@ from typing import Any
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.mesh import elements
 
-# Options of mortar in the plane that exist for standard multipliers only.
+# Options of mortar in two dimensions that exist for standard multipliers only.
 OF_STANDARD = ("n_gauss", "augmentation")
 
 

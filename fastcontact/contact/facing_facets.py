@@ -30,7 +30,7 @@ class OuterFacets:
     ----------
     mesh : Mesh
     blocks : dict of str to ndarray of int (n_facets, n_nodes)
-        Connectivity by element, normals outward.
+        Connectivity by element type, normals outward.
     body, cell : ndarray of int (n,)
         Body and solid cell of each facet.
     """
@@ -122,7 +122,7 @@ class OuterFacets:
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 
     def facets(self, numbers: Indices) -> dict[str, Numbers]:
-        """Return the connectivity of the facets `numbers` by element."""
+        """Return the connectivity of the facets `numbers` by element type."""
         blocks = {}
         for (name, block), first in zip(self.blocks.items(), self.first):
             inside = numbers[(numbers >= first) & (numbers < first + len(block))] - first

@@ -149,7 +149,7 @@ def find_contacts(
         Groups of solid cells that form the bodies; by default the connected sets of cells. Self-contact of a body is
         not searched.
     moduli : mapping of str to array_like (n_cells,), optional
-        Moduli of the solid cells, by element [pressure]; `Model.add_contacts` takes them from the materials.
+        Moduli of the solid cells, by element type [pressure]; `Model.add_contacts` takes them from the materials.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Checks of the two sides of a contact pair before any numerics."""
+"""Checks of the two sides of a contact pair before any computation."""
 
 from __future__ import annotations
 

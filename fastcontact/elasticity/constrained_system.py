@@ -1,6 +1,6 @@
 """Linear system with supports and multi-point constraints eliminated: ``u = T v + t``.
 
-T is the identity except for the displacements that multi-point constraints express by others, t are the prescribed
+T is the identity except for the displacements that multi-point constraints express in terms of others, t are the prescribed
 displacements. The matrix of the solver is ``T.T K T``. It has the size and blocks of K: in the rows and columns of eliminated
 components only the diagonal remains.
 """

@@ -248,7 +248,7 @@ def listed(groups: Sequence[str] | None) -> str:
 
 
 def solid_rows(mesh: Mesh, groups: Sequence[str] | None) -> dict[str, Indices]:
-    """Return the numbers (n,) of the solid cells of groups, or of all, by element."""
+    """Return the numbers (n,) of the solid cells of groups, or of all, by element type."""
     if groups is None:
         return {name: np.arange(len(block)) for name, block in mesh.solids.items()}
     rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[group] for group in groups])))
@@ -276,7 +276,7 @@ def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
 
 
 def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
-    """Return the facets (n, n_nodes) of a group by element, each once, even if the mesh contains it several times.
+    """Return the facets (n, n_nodes) of a group by element type, each once, even if the mesh contains it several times.
 
     Raises MeshError if there is no such group of cells, ModelError if it has no facets.
     """

@@ -167,7 +167,7 @@ class MaterialField:
 
     @cached_property
     def distinct(self) -> dict[str, Numbers]:
-        """Material (n_cells,) of every cell by solid element; materials between which stress is continuous share a number.
+        """Material (n_cells,) of every cell by element type; materials between which stress is continuous share a number.
 
         Such materials have the same moduli, axes and expansion.
         """

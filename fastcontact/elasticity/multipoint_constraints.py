@@ -84,7 +84,7 @@ class Elimination:
     Attributes
     ----------
     pivots : ndarray of int (n_pivots,)
-        The displacement components expressed by the others.
+        The displacement components expressed in terms of the others.
     T : csr_array (n, n)
         Identity except for the rows of the pivots; the columns of the pivots are empty [-].
     S : csr_array (n, m)

@@ -42,7 +42,7 @@ class DeformedBodies:
     force : ndarray (n_points, dim)
         Internal forces [force].
     history : dict of str to ndarray (n_cells, n_q, 9)
-        History by solid element, if the load step ended here.
+        History by solid element type, if the load step ended here.
     stress : dict of str to ndarray (n_cells, n_q, n_components)
         Cauchy stress [pressure].
     energy, plastic_work : float

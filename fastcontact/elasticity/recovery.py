@@ -48,7 +48,7 @@ def stress_at_points(
     material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
         By solid element: material number of each cell, or of each quadrature point (`MaterialField.loops`).
     displacement : ndarray (n_points, dim)
-        Of all points [length].
+        Displacements of all points [length].
     averaged : ndarray of bool (n_materials,), optional
         Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); by
         default none.
@@ -153,7 +153,7 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides 
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:
     """Return the nodal forces (n_points, dim) [force] that balance the stresses at the quadrature points.
 
-    These are `at_points` (n_cells, n_q, n_components) [pressure], by solid element.
+    These are `at_points` (n_cells, n_q, n_components) [pressure], by solid element type.
     """
     loops, force = element_kernels.loops(mesh.dim), np.zeros((mesh.n_points, mesh.dim))
     for name, values in at_points.items():

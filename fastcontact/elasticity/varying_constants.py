@@ -80,7 +80,7 @@ def _number(value: Any) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of a mesh, `rows` (m,) of int by solid element."""
+    """Cells of a mesh, `rows` (m,) of int by solid element type."""
 
     mesh: Mesh
     rows: Rows
@@ -217,7 +217,7 @@ class CellAxes(Varying):
 
 
 def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
-    """Return the values `values` for `cells` or for all solid cells, by element; NaN elsewhere."""
+    """Return the values `values` for `cells` or for all solid cells, by element type; NaN elsewhere."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
         blocks[name] = np.full((len(block), *values.shape[1:]), np.nan)

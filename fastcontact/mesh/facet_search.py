@@ -20,7 +20,7 @@ def facets_with_nodes(
     Parameters
     ----------
     solids : mapping of str to ndarray of int (n_cells, n_nodes)
-        Connectivity by element.
+        Connectivity by element type.
     chosen : ndarray of bool (n_points,)
     between : bool
         Whether to return facets between two cells; otherwise those of a single cell.

@@ -14,7 +14,7 @@ from fastcontact.arrays import Array
 Rule = tuple[Array, Array]
 
 
-@cache  # used in every pairing of mortar in the plane
+@cache  # used in every pairing of mortar in two dimensions
 def gauss_line(n: int) -> Rule:
     """Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)

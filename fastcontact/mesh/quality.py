@@ -33,7 +33,7 @@ class MeshQuality:
     n_points, n_bad, dim : int
         Number of points, and of solid cells that are degenerate or inverted, see `check_cells`; dimension of the space.
     n_cells : dict of str to int
-        Number of cells by element, facets too.
+        Number of cells by element type, facets too.
     """
 
     smallest_angle: float

@@ -1,1 +1,1 @@
-"""The description of a problem: materials, supports, loads and contact pairs, checked before any numerics."""
+"""The description of a problem: materials, supports, loads and contact pairs, checked before any computation."""

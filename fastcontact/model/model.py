@@ -1,4 +1,4 @@
-"""Model: a mesh with kinematics, materials, supports, loads and contact pairs; checked whole before any numerics.
+"""Model: a mesh with kinematics, materials, supports, loads and contact pairs; checked whole before any computation.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """

@@ -26,7 +26,7 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
 
 
 def cells_by_element(mesh: Mesh, values: Numbers) -> dict[str, Numbers]:
-    """Return values of all solid cells (n_solids,) by element."""
+    """Return values of all solid cells (n_solids,) by element type."""
     ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
     return dict(zip(mesh.solids, np.split(values, ends), strict=True))
 

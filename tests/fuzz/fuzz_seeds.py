@@ -194,7 +194,7 @@ def make_seeds(folder: Path) -> dict[str, Path]:
 
 
 def _case(path: Path, folder: Path) -> Path:
-    """Copy a ready case; the meshes it names are copied beside it."""
+    """Copy a ready-made case; the meshes it names are copied beside it."""
     target = folder / path.name
     text = path.read_text(encoding="utf-8")
     if "../meshes/" in text:

@@ -550,7 +550,7 @@ OPTIONS = [
 # fmt: on
 
 MISTAKES = [*MESH, *MATERIALS, *SUPPORTS, *CONTACT, *LOADS, *RAMP, *OPTIONS]
-# Warnings that only the solution can tell; all others come before any numerics.
+# Warnings that only the solution can tell; all others come before any computation.
 AFTER = (
     "a spring as a rigid link",
     "a contact that is never reached",

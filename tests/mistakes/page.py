@@ -13,7 +13,7 @@ from spoilt import MESHES
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "mistakes.md"
 HEAD = """# Mistakes and their messages
 
-Every mistake in an input is reported at once, before any numerics, in one line that names the culprit and the remedy.
+Every mistake in an input is reported at once, before any computation, in one line that names the culprit and the remedy.
 The command line then ends with exit code 1; the library raises one of its [errors](errors.md) with the same text. A
 doubtful but solvable model is solved, with a warning that states a number: on screen, in the log, in `--json`, in the
 result file (`open_results(path).warnings`), and in Python as `FastcontactWarning`.
@@ -22,7 +22,7 @@ The tables are generated from tests, which make each mistake and compare the mes
 finite-element programs commonly do with the same mistake; no program does all of it.
 """
 SECTIONS = (
-    ("In a case file", "`fastcontact run` with the ready case FORMA04 A and one change:", CASES),
+    ("In a case file", "`fastcontact run` with the ready-made case FORMA04 A and one change:", CASES),
     ("In a mesh file", "The same with a damaged mesh:", MESHES),
     ("On the command line", "", COMMANDS),
     ("Where results are written", "", ACCIDENTS),

@@ -174,7 +174,7 @@ CALLS = [
     ("a mesh of Ansys with Gmsh's suffix", of_ansys, fc.errors.FileError, r"a\.msh' is not a Gmsh file, which starts with \$MeshFormat: convert it to \.med"),
     ("a result with fewer steps than it says", lambda folder: resulting(folder, steps_announced), fc.errors.FileError, r"only 1 of 2 steps"),
     ("a case with a name beyond all limits", lambda: cases.read_case("a" * 5000 + ".toml"), fc.errors.CaseError, r"cannot look for the case file 'a+' \(File name too long\)"),
-    ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready cases"),
+    ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready-made cases"),
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"'a\.png' cannot be written \(No space left on device\)"),
     ("a picture without contact", lambda: _outputs.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' holds no finished step yet"),

@@ -1,4 +1,4 @@
-"""Each invalid input ends with exit code 1 and one line that names the culprit, before any numerics."""
+"""Each invalid input ends with exit code 1 and one line that names the culprit, before any computation."""
 
 import re
 import shutil

@@ -49,7 +49,7 @@ class Deck:
     thickness : float
         Thickness of a plane model [length]; `solve` returns forces for the whole thickness.
     modes : dict, optional
-        Arguments of `fastcontact.modes` about the last step, from ``*FREQUENCY``; None without it.
+        Arguments of `fastcontact.modes` at the last step, from ``*FREQUENCY``; None without it.
 
     Examples
     --------

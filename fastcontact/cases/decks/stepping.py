@@ -76,7 +76,7 @@ def end_step(content: Content, step: Step) -> None:
     content.modes = {"n": step.modes, "stress_stiffening": stiffening}
     content.note(
         step,
-        f"{step.modes} modes about the last step, {'with' if stiffening else 'without'} the stiffness by its stresses "
+        f"{step.modes} modes at the last step, {'with' if stiffening else 'without'} the stiffness by its stresses "
         "(PERTURBATION, or NLGEOM before)",
     )
 

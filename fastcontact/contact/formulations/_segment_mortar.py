@@ -1,4 +1,4 @@
-r"""Segment-based mortar contact in the plane with a multiplier field, integrated exactly over the segments.
+r"""Segment-based mortar contact in two dimensions with a multiplier field, integrated exactly over the segments.
 
 Every secondary facet is cut in each pairing, see `_cut_lines`, and every segment gets its own Gauss points (Puso and
 Laursen, 2004). A uniform pressure is then transmitted exactly between non-matching meshes, which neither node-to-segment

@@ -91,7 +91,7 @@ class Elimination:
 def eliminate(
     B: csr_array, c: Array, force_rows: csr_array | None = None, nodes: Indices | None = None, size: int = 1
 ) -> Elimination:
-    """Choose the unknowns to eliminate from ``B u = c`` and express them by the others; see `pivot_order`.
+    """Choose the unknowns to eliminate from ``B u = c`` and express them in terms of the others; see `pivot_order`.
 
     Parameters
     ----------

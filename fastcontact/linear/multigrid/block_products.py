@@ -3,7 +3,7 @@
 The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products: it cannot see that positions
 from an index array are contiguous. Here a row of a block is one vector instruction. This halves the time of a product with a
 matrix (16.7 to 8.5 ns per unknown in single precision, 311 469 unknowns, one thread). With plain compiled loops instead of
-`add_product` and `add_transposed` the results have the same bits, but the set-up takes 1.5 instead of 0.5 s, and an analysis
+`add_product` and `add_transposed` results are bitwise identical, but the set-up takes 1.5 instead of 0.5 s, and an analysis
 of one step 3.7 to 4.4 instead of 3.0 to 3.4 s (sphere on a block, 279 447 unknowns).
 
 This is the only place in `linear` with processor-specific code. `block_products_llvm` contains the instructions; the

@@ -322,7 +322,7 @@ class Multigrid:
         if times < RAISES or self.precision == "double":
             self.hierarchy.raise_bounds(RAISE)
             return
-        log.info("multigrid: single precision is not enough for this matrix, the cycle goes on in double precision")
+        log.info("multigrid: single precision is not enough for this matrix, the cycle continues in double precision")
         reduced = self._reduced
         self.build_in("double")
         self.constrain(reduced.elimination, reduced.springs)

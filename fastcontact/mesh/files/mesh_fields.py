@@ -82,7 +82,7 @@ def read_field(
 
 
 def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
-    """Return the nodes of the solid cells of groups, by element in the order of the mesh."""
+    """Return the nodes of the solid cells of groups, by element type in the order of the mesh."""
     if groups is None:
         return list(mesh.solids.values())
     names = [groups] if isinstance(groups, str) else list(groups)

@@ -29,7 +29,7 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    Its `sides`, pairs of a name and nodes (n, 2) [length], run counter-clockwise, each from the end of the previous one.
+    Its `sides` (n, 2) [length], each a name and nodes, run counter-clockwise, each from the end of the previous one.
     `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])

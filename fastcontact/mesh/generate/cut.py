@@ -87,7 +87,7 @@ def _sides(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
 def _cells_beyond(
     mesh: Mesh, group: str, section: set[Facet], points: Numbers, direction: Array
 ) -> dict[str, list[int]]:
-    """Return the solids at a section on the side to which `direction` points, by element."""
+    """Return the solids at a section on the side to which `direction` points, by element type."""
     touched = np.zeros(mesh.n_points, bool)
     touched[points] = True
     number: dict[tuple[str, int], int] = {}

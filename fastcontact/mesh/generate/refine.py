@@ -107,7 +107,7 @@ class _NewPoints(NamedTuple):
 
     `keys` (n,) are equal for all cells that share a point; `sources` are the name of an element, the number of a point of its
     lattice, rows of cells, and the numbers of their points there; `lattices` (n_cells, n_lattice) are the points of
-    every cell by element.
+    every cell by element type.
     """
 
     keys: AnyArray

@@ -395,7 +395,7 @@ class ModelContact(ModelConnections):
         if pair.obstacle is not None:
             if not kind.against_obstacles:
                 raise ContactError(
-                    f"contact '{pair.name}': mortar in the plane needs multipliers='dual' at an obstacle"
+                    f"contact '{pair.name}': mortar in two dimensions needs multipliers='dual' at an obstacle"
                 )
             primary = RigidSide(pair.obstacle, np.array(pair.motion), pair.rotation)
             specific.setdefault("surface_smoothing", False)

@@ -65,7 +65,7 @@ class ModelMaterials(ModelBase):
             raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
-        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element the row of each solid cell.
+        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element type the row of each solid cell.
 
         The first rows are those of the materials; materials that vary have further rows for the centre of each cell.
         """
@@ -79,7 +79,7 @@ class ModelMaterials(ModelBase):
         )
 
     def material_of_cells(self) -> dict[str, Numbers]:
-        """Return the material of every solid cell (n_cells,), by element."""
+        """Return the material of every solid cell (n_cells,), by element type."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -131,7 +131,7 @@ class ModelMaterials(ModelBase):
         Parameters
         ----------
         displacement : ndarray (n_points, dim)
-            Of a step result [length].
+            Displacements of a step result [length].
 
         Examples
         --------

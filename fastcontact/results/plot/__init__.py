@@ -1,4 +1,4 @@
-"""Pictures: pressure profiles with theory, contact maps, deformed shapes, sections and histories over the load.
+"""Pictures: pressure profiles with theory, contact maps, deformed shapes, sections and histories over the load steps.
 
 Every function takes an optional ``ax`` and returns the axes it drew on; save with ``ax.figure.savefig``.
 """

@@ -1,4 +1,4 @@
-"""The deformed shape over the load as a moving picture."""
+"""The deformed shape over the load steps as a moving picture."""
 
 from __future__ import annotations
 

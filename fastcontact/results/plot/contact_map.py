@@ -120,7 +120,7 @@ def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
 
 
 def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
-    """Return the facets (n, m) of the secondary surface by element, as positions in the arrays of the contact."""
+    """Return the facets (n, m) of the secondary surface by element type, as positions in the arrays of the contact."""
     inside = contact.points.max(initial=-1) < mesh.n_points
     row = np.full(max(mesh.n_points, int(contact.points.max(initial=-1)) + 1), -1)
     row[contact.points] = np.arange(len(contact.points))

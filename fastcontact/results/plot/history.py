@@ -1,4 +1,4 @@
-"""A contact pair over the load: force and radius; nodes that are open, stick and slide."""
+"""A contact pair over the load steps: force and radius; nodes that are open, stick and slide."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def history(
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot force and contact radius of a contact pair over the load.
+    """Plot force and contact radius of a contact pair over the load steps.
 
     If the resultant vanishes, as in a press fit, the sum of the normal forces is plotted.
 
@@ -116,7 +116,7 @@ def _brackets(ax: Any, x: Array, bracket: Array) -> None:
 def contact_zones(
     steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNKNOWN, ax: Axes | None = None
 ) -> Axes:
-    """Plot the state of every secondary node over the load: open, closed (sticking, with friction) or sliding.
+    """Plot the state of every secondary node over the load steps: open, closed (sticking, with friction) or sliding.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def fill(
     ----------
     ax : matplotlib Axes
     blocks : mapping of str to ndarray of int (n_cells, n_nodes)
-        Cells by element.
+        Cells by element type.
     points : ndarray (n_points, 2)
         [length]
     values : ndarray (n_points,)

@@ -1,4 +1,4 @@
-"""The ready cases: found by name, listed, copied, and each within its stated tolerances."""
+"""The ready-made cases: found by name, listed, copied, and each within its stated tolerances."""
 
 import json
 import re
@@ -137,5 +137,7 @@ def test_a_wheel_carries_the_cases_and_their_meshes(root):
 
 def test_the_path_of_a_ready_case_tells_its_name_where_there_is_no_such_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(fc.CaseError, match="does not exist; the ready case of this name needs no path: 'forma04a'"):
+    with pytest.raises(
+        fc.CaseError, match="does not exist; the ready-made case of this name needs no path: 'forma04a'"
+    ):
         read_case("data/cases/forma04a.toml")

@@ -139,7 +139,7 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     assert "step 2 was cut in halves once, the part from " in told
     assert [line.split()[0] for line in history] == ["iterations", "1", "2", "3"]
     path = tmp_path / "hard.vtkhdf"
-    assert kept == f"  '{path}' keeps one complete step: 'fastcontact run --resume' goes on from there"
+    assert kept == f"  '{path}' keeps one complete step: 'fastcontact run --resume' continues from there"
     results = fc.open_results(path)
     assert len(results) == 1
     assert not results.complete
@@ -195,7 +195,7 @@ def test_a_run_interrupted_from_the_keyboard_says_what_it_keeps(solved, tmp_path
     told = capsys.readouterr().err.splitlines()
     assert told[-2:] == [
         "interrupted",
-        f"  '{path}' keeps all 2 complete steps: 'fastcontact run --resume' goes on from there",
+        f"  '{path}' keeps all 2 complete steps: 'fastcontact run --resume' continues from there",
     ]
     assert main(["run", str(solved / "small.toml"), "-o", str(path), "--resume", "-q"]) == 0
     expected = fc.open_results(solved / "small.vtkhdf")[-1]

@@ -330,7 +330,7 @@ def test_the_end_of_a_study_by_sigterm(solved_case, tmp_path):
     process.terminate()
     _, said = process.communicate(timeout=60)
     assert process.returncode == 143, said
-    assert said == "error: stopped; the same command goes on where it stopped, with the runs in store\n"
+    assert said == "error: stopped; the same command continues where it stopped, with the runs in store\n"
     deadline = time.monotonic() + 20
     while left := of_session(process.pid):
         assert time.monotonic() < deadline, f"{left} still run"

@@ -1,4 +1,4 @@
-"""A model is checked completely before any numerics, with one clear line for each mistake."""
+"""A model is checked completely before any computation, with one clear line for each mistake."""
 
 import dataclasses
 import inspect

@@ -1,4 +1,4 @@
-"""Numbers whose squares overflow are refused by name before any numerics."""
+"""Numbers whose squares overflow are refused by name before any computation."""
 
 import warnings
 

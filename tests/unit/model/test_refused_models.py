@@ -1,4 +1,4 @@
-"""Models refused before any numerics that no other test covers."""
+"""Models refused before any computation that no other test covers."""
 
 import dataclasses
 

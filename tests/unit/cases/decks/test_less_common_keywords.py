@@ -401,12 +401,12 @@ def test_frequencies_about_the_last_step(tmp_path, capsys):
     )
     deck = deck_of(tmp_path, text + FREQUENCY)
     assert deck.modes == {"n": 2, "stress_stiffening": True}
-    assert "2 modes about the last step, with the stiffness by its stresses" in notes_of(deck)
+    assert "2 modes at the last step, with the stiffness by its stresses" in notes_of(deck)
     k = np.cos(np.pi / 4)
     exact = np.sqrt(6 * 2e5 / 8e-9 * (1 - k) / (2 + k)) / (2 * np.pi)
     assert fc.modes(deck.model, deck.solve()[-1], n=1).frequencies[0] == pytest.approx(exact, rel=1e-3)  # 100 of 2e5
     assert main(["run", str(tmp_path / "deck.inp"), "-o", str(tmp_path / "r.vtkhdf")]) == 0
-    assert f"frequencies about the last step: {exact / 1e5:.0f}" in capsys.readouterr().out
+    assert f"natural frequencies at the last step: {exact / 1e5:.0f}" in capsys.readouterr().out
     for wrong, said in (
         (text.replace(STEP, FREQUENCY), r"\*FREQUENCY needs a step with \*STATIC before"),
         (text + FREQUENCY + STEP, r"\*STEP: follows a step with \*FREQUENCY"),
