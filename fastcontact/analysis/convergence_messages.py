@@ -97,7 +97,8 @@ def limit_load(problem: Problem, state: State) -> str:
     if not strain:
         return ""
     beyond = (
-        f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics serve: such bodies bear less than real ones"
+        f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics are valid: "
+        "the model bears less load than the body"
         if strain > LARGEST_PLASTIC_STRAIN
         else ""
     )

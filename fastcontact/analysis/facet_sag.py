@@ -59,9 +59,9 @@ def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
         return ""
     finer = f"facets of length {size * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {size:.2g}"
     return (
-        f"facets of '{side.group}' and of what it faces deviate from their arcs by up to {spread:.3g}, which may move "
-        f"pressures by the order of {error:.3g}, beside a mean of {mean:.3g}: {remedy}; "
-        f"{'quadratic elements, or ' if order == 1 else ''}{finer} bring it down"
+        f"facets of '{side.group}' and of what it faces deviate from their arcs by up to {spread:.3g}, which may change "
+        f"pressures by about {error:.3g}, where their mean is {mean:.3g}: {remedy}; "
+        f"{'quadratic elements, or ' if order == 1 else ''}{finer} reduce this"
     )
 
 

@@ -85,8 +85,8 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
     if many > MANY_STEPS or depth > STRAIN * size:
         yield (
             f"contact '{name}' wears off {depth:.3g}, {depth / size:.2g} times the size of the model, in steps "
-            f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the "
-            "unit of one over pressure?"
+            f"{many:.2g} times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, "
+            "in the unit of one over pressure?"
         )
     else:
         yield (
@@ -112,7 +112,7 @@ def _unsettled(state: State) -> Iterator[str]:
     update, change = state.last_change or (0, 0.0)
     if change > NOTABLE:
         yield (
-            f"the contact geometry had not settled after the {update} updates asked for: the last one changed the "
+            f"the contact geometry had not converged after the {update} updates requested: the last one changed the "
             f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
         )
 
@@ -179,14 +179,16 @@ def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
         strains = np.einsum("cij,cj->ci", field.compliance[field.rows[name][others]], mean)
         strain = max(strain, float(recovery.equivalent_strain(strains).max(initial=0.0)))
     if strain > STRAIN:
-        yield f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} where linear kinematics hold well"
+        yield (
+            f"the largest equivalent strain is {strain:.3f}, beyond the {STRAIN} up to which linear kinematics are accurate"
+        )
     else:
         yield from _large_stress_free_strain(problem, last)
     plastic = last.cell_fields.get("plastic_strain")
     if plastic is not None and (most := float(plastic.max())) > LARGEST_PLASTIC_STRAIN:
         yield (
             f"the largest plastic strain is {most:.2f}, beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics "
-            "serve: pressures on it are too low"
+            "are valid: contact pressures there are too low"
         )
 
 
@@ -200,8 +202,8 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
     strain = float(np.abs(recovery.nodal_stress(model.mesh, model.kinematics, moduli, rows, last.displacement)).max())
     if strain > STRAIN:
         yield (
-            f"temperatures and initial states bring strains of {strain:.3g}, beyond the {STRAIN} where linear kinematics "
-            "hold well: are they in the units of the model?"
+            f"temperatures and initial states cause strains of {strain:.3g}, beyond the {STRAIN} up to which linear "
+            "kinematics are accurate: are they in the units of the model?"
         )
 
 
@@ -214,8 +216,8 @@ def _large_rotation(problem: Problem, state: State) -> Iterator[str]:
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
     if angle > ROTATION:
         yield (
-            f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics take "
-            f"it for small, which leaves out strains of about {0.5 * angle**2:.3f}"
+            f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
+            f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
 
 
@@ -267,7 +269,7 @@ def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool
     elif not touched:
         yield f"contact '{name}' never closed: {gap}. Check its sides and which way the loads push"
     elif loaded:
-        yield f"contact '{name}' is lost at the end, after it was closed: {gap}"
+        yield f"contact '{name}' has opened again at the end: {gap}"
 
 
 def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> Iterator[str]:

@@ -26,7 +26,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="processes (default), mpi (start with: mpiexec -n N python -m mpi4py.futures -m fastcontact ...), or the "
         "address of a Dask scheduler such as tcp://host:8786",
     )
-    parser.add_argument("--store", metavar="DIR", help="folder of finished runs: started again, these are not redone")
+    parser.add_argument(
+        "--store", metavar="DIR", help="folder of finished runs, which are not repeated if the study is started again"
+    )
 
 
 def check_targets(options: argparse.Namespace, *also: str | None) -> None:

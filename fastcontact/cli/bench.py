@@ -16,13 +16,15 @@ HELP = "run the benchmarks of the checkout"
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     parser.add_argument("names", nargs="*", metavar="NAME", help="benchmarks (default: all)")
-    parser.add_argument("--smallest", action="store_true", help="the smallest size of each, once: does it run?")
-    parser.add_argument("--sizes", type=int, nargs="+", metavar="N", help="about how many unknowns")
-    parser.add_argument("--json", metavar="FILE", help="write figures and environment")
-    parser.add_argument("--png", metavar="FOLDER", help="draw time and memory against unknowns, a picture a benchmark")
+    parser.add_argument("--smallest", action="store_true", help="run the smallest size of each once, as a check only")
+    parser.add_argument("--sizes", type=int, nargs="+", metavar="N", help="approximate numbers of unknowns")
+    parser.add_argument("--json", metavar="FILE", help="write results and environment")
+    parser.add_argument(
+        "--png", metavar="FOLDER", help="draw time and memory against unknowns, a picture for each benchmark"
+    )
     parser.add_argument("--compare", metavar="FILE", help="compare with a run stored by --json")
-    parser.add_argument("--problem", metavar="NAME", help="with contact, in detail: sphere-on-block, forma04c ...")
-    parser.add_argument("--dofs", type=int, metavar="N", help="with --problem: about how many unknowns")
+    parser.add_argument("--problem", metavar="NAME", help="a contact problem in detail: sphere-on-block, forma04c ...")
+    parser.add_argument("--dofs", type=int, metavar="N", help="with --problem: approximate number of unknowns")
     parser.add_argument("--linear", metavar="SOLVER", help="with --problem: linear solver (default: the problem's)")
     parser.add_argument("--tolerance", type=float, metavar="T", help="with --problem: of solver and geometry (1e-8)")
 

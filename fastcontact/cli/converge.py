@@ -17,7 +17,7 @@ HINT = "--html FILE makes a report to send on"
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
-    parser.add_argument("case", help="case file (TOML); its table [study] names the meshes")
+    parser.add_argument("case", help="case file (TOML); its table [study] defines the meshes")
     parser.add_argument("--levels", type=int, default=5, metavar="N", help="number of meshes (default 5)")
     parser.add_argument("--elements", metavar="NAMES", help="elements to compare, e.g. quad4,quad8, or all")
     parser.add_argument("--formulations", metavar="NAMES", help="e.g. node_to_segment,continuous, or all")
@@ -30,7 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     adaptive.add_argument("--tolerance", type=float, default=1e-3, metavar="T", help="relative error (default 0.001)")
     adaptive.add_argument("--max-dofs", type=int, default=400_000, metavar="N", help="where to stop (default 400000)")
     adaptive.add_argument(
-        "-o", "--output", metavar="FILE", help="result file of the last mesh, with the error of cells"
+        "-o", "--output", metavar="FILE", help="result file of the last mesh, with the error of each cell"
     )
     _study.arguments(parser)
 

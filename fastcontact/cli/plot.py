@@ -17,10 +17,12 @@ OF_CONTACT = ("history", "axis", "zones", "map")
 def arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of this command."""
     _results.arguments(parser)
-    parser.add_argument("--png", metavar="FILE", help="picture to write")
+    parser.add_argument("--png", metavar="FILE", help="write the picture to this file")
     kinds = parser.add_mutually_exclusive_group()
     kinds.add_argument("--history", action="store_true", help="force and contact radius over the load steps instead")
-    kinds.add_argument("--axis", action="store_true", help="stresses along the axis under the contact, against theory")
+    kinds.add_argument(
+        "--axis", action="store_true", help="stresses along the axis below the contact, compared with theory"
+    )
     kinds.add_argument(
         "--zones", action="store_true", help="where the contact is open, closed and slides, over the load steps"
     )
@@ -41,7 +43,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="with --animate: one vibration of the shape that is --step, in N pictures",
     )
     parser.add_argument("--zoom", metavar="LENGTH", type=float, help="half the width to draw around the largest value")
-    parser.add_argument("--mirrored", action="store_true", help="draw the full section beyond the axis, too")
+    parser.add_argument("--mirrored", action="store_true", help="draw the mirror image beyond the axis, too")
     parser.add_argument("--scale", type=float, default=1.0, help="factor on the displacements (default 1)")
 
 

@@ -42,7 +42,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--json", metavar="FILE", help="write a summary of the last step and the iterations, or why the run failed"
     )
-    parser.add_argument("--plot", metavar="PNG", help="plot the contact pressure of the last step against theory")
+    parser.add_argument(
+        "--plot", metavar="PNG", help="plot the contact pressure of the last step, compared with theory"
+    )
     parser.add_argument(
         "--modes", metavar="FILE", help="write the natural modes of the state of the last step (.vtkhdf)"
     )
@@ -51,7 +53,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="modes of the whole ring of a sector with these nodal diameters, such as 0,1,2, or all; shapes are the ring's",
     )  # fmt: skip
     parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
-    parser.add_argument("--estimate-error", action="store_true", help="estimate the error of every cell, into the file")
+    parser.add_argument(
+        "--estimate-error", action="store_true", help="estimate the error of every cell and write it into the file"
+    )
     parser.add_argument("--strict", action="store_true", help="exit with code 3 if a check of the case fails")
     parser.add_argument("--threads", type=int, metavar="N", help="threads of parallel kernels")
 

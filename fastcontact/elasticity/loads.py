@@ -318,7 +318,7 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     if array.shape != (len(flat),) or array.dtype.kind not in "fiu":
         raise ModelError(
             f"{name} is a function that returned {array.dtype} numbers of shape {array.shape} for {len(flat)} points: "
-            f"it must return one real number a point, shape ({len(flat)},)"
+            f"it must return one real number per point, shape ({len(flat)},)"
         )
     bad = np.flatnonzero(~np.isfinite(array))
     if len(bad):

@@ -44,7 +44,7 @@ def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, facing: str,
             f"contact '{pair.name}' joins facets of '{pair.secondary}' and '{pair.primary}' that contact '{other.name}' "
             f"joins already: '{pair.secondary}' and '{facing}' share facets with {len(secondary)} nodes (first: point "
             f"{secondary[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the two contacts, or "
-            "make their groups apart"
+            "separate their groups"
         )
 
 
@@ -96,7 +96,7 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
             nodes = _common(ours.points, ours.secondary, secondary)
             if len(nodes) and len(_common(ours.points, ours.primary, primary)):
                 yield (
-                    f"contacts '{one.name}' and '{other.name}' go on in each other at {len(nodes)} common nodes of their "
+                    f"contacts '{one.name}' and '{other.name}' continue each other at {len(nodes)} common nodes of their "
                     f"sides (first: point {nodes[0]}): the pressure near these is not unique; make one contact of both, "
                     "with one group for each side"
                 )

@@ -112,7 +112,7 @@ def convergence_study(
         )
     case = case if isinstance(case, Case) else read_case(case)
     if levels < 1:
-        raise CaseError(f"levels = {levels} must be at least 1; a limit takes 3")
+        raise CaseError(f"levels = {levels} must be at least 1; an extrapolated limit needs 3")
     chosen = settings(case)
     check_names(case, [*chosen.quantities, *quantities])
     members = combinations(chosen, elements, formulations)

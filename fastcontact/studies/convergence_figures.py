@@ -25,7 +25,7 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     """Draw the mesh error of a quantity over h in log-log scale, with error bars of the limit, fits and slopes."""
     known = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not known:
-        return message(ax, f"no limit of the {title(quantity)}:\na limit takes three levels")
+        return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
     named = isinstance(all_series[0].combination, Named)
     few = len(known) <= MOST_CURVES_WITH_BARS
     for position, (k, series) in enumerate(known):

@@ -110,7 +110,9 @@ class Study(Report):
                 f"warning: {text}" for text in sorted({text for level in series.levels for text in level.warnings})
             ]
             if not series.limits:
-                remarks.append(f"no limits: {len(series.levels)} levels were solved, and a limit takes three")
+                remarks.append(
+                    f"no limits: {len(series.levels)} levels were solved, and an extrapolated limit needs three"
+                )
             remarks += [f"level {number} failed: {text}" for number, text in series.failed.items()]
         return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]
 

@@ -14,7 +14,9 @@ MAIN = ("pressure_max", "force")
 def sentences(series: Series) -> list[str]:
     """Return sentences about the difference of one element and formulation from theory."""
     if not series.limits:
-        return [f"{series.combination}: {len(series.levels)} levels were solved, and a limit takes three."]
+        return [
+            f"{series.combination}: {len(series.levels)} levels were solved, and an extrapolated limit needs three."
+        ]
     names = [name for name in series.shown(MAIN) if name in series.limits]
     about = [text for name in names for text in _about_quantity(series, name)]
     return about + _about_equal_force(series)

@@ -158,7 +158,7 @@ COMMANDS = [
      r"'.*forma04a\.med' is what this command reads: name another file to write"),
     ("threads as a word", ["run", "case.toml", "--threads", "two"],
      r"argument --threads: invalid int value: 'two'; see 'fastcontact run --help'"),
-    ("no level asked for", ["converge", "case.toml", "--levels", "0"], r"levels = 0 must be at least 1; a limit takes 3"),
+    ("no level asked for", ["converge", "case.toml", "--levels", "0"], r"levels = 0 must be at least 1; an extrapolated limit needs 3"),
     ("unknown parameter of a sweep", ["sweep", "case.toml", "--set", "aproach=1,2"],
      r"unknown parameter 'aproach': did you mean 'approach'\?"),
     ("report of a study into a missing folder", ["converge", "case.toml", "--html", "no/study.html"],

@@ -106,7 +106,7 @@ DOUBTS = [
         lambda: generate.half_spheres("tri3", size=5.0),
         of(STEEL, SPHERES, "[solve]\ngeometry_updates = 1\n", kinematics="axisymmetric"),
         (
-            r"the contact geometry had not settled after the 1 updates asked for: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or leave them out",
+            r"the contact geometry had not converged after the 1 updates requested: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or leave them out",
         ),
     ),
     Doubt(
@@ -115,7 +115,7 @@ DOUBTS = [
         of(STEEL, BLOCKS, PAIR, steps=4).replace(
             "ramp.steps = 4", "ramp = { steps = 4, table = [[0.0, 0.0], [0.5, 1.0], [1.0, -1.0]] }"
         ),
-        (r"contact 'pair' is lost at the end, after it was closed: the smallest gap is 0\.01",),
+        (r"contact 'pair' has opened again at the end: the smallest gap is 0\.01",),
     ),
     Doubt("contact is never reached", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
           (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",)),
@@ -128,16 +128,16 @@ DOUBTS = [
         ),
     ),
     Doubt("strains are large", lambda: block((1.0, 1.0), (2, 2)), of(STEEL, held("BOTTOM", x=0.0, y=0.0), held("TOP", y=0.3)),
-          (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 where linear kinematics hold well",)),
+          (r"the largest equivalent strain is 0\.\d+, beyond the 0\.1 up to which linear kinematics are accurate",)),
     Doubt("plastic strains are large", lambda: block((1.0, 1.0), (2, 2)),
           of(STEEL + 'law = "elastic_plastic"\nyield_stress = 3.0\n', held("LEFT", x=0.0), held("BOTTOM", y=0.0), held("TOP", y=-0.7)),
-          (r"the largest plastic strain is 0\.\d+, beyond the 0\.5 up to which linear kinematics serve: pressures on it are too low",)),
+          (r"the largest plastic strain is 0\.\d+, beyond the 0\.5 up to which linear kinematics are valid: contact pressures there are too low",)),
     Doubt(
         "rotations are large",
         lambda: block((1.0, 1.0), (1, 1)),
         of(STEEL, turned(0.5)),
         (
-            r"the largest rotation is 0\.500 radian, near \[0\.5 0\.5\]: linear kinematics take it for small, which leaves out strains of about 0\.125",
+            r"the largest rotation is 0\.500 radian, near \[0\.5 0\.5\]: linear kinematics treat it as small, which neglects strains of about 0\.125",
         ),
     ),
     Doubt(
@@ -191,7 +191,7 @@ DOUBTS = [
             '[contact.pair]\nsecondary = "CONT_INNER"\nprimary = "CONT_OUTER"\nformulation = "continuous"\nclearance = -0.2\n',
         ),
         (
-            r"contact 'pair': facets of 'CONT_INNER' and of what it faces deviate from their arcs by up to 0\.297, which may move pressures by the order of 49\.9, beside a mean of 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 bring it down",
+            r"contact 'pair': facets of 'CONT_INNER' and of what it faces deviate from their arcs by up to 0\.297, which may change pressures by about 49\.9, where their mean is 3\.85: surface_smoothing=True measures the gap between the arcs; quadratic elements, or facets of length 0\.25 instead of 6\.5 reduce this",
         ),
     ),
     Doubt(
@@ -246,7 +246,7 @@ DOUBTS = [
             "motion = { y = -0.2 }\nrotation = { angle = 0.1, centre = [0.0, 5.0] }\nwear = 1.0\n",
         ),
         (
-            r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: is its wear Archard's coefficient by the hardness, in the unit of one over pressure\?",
+            r"contact 'drum' wears off \S+, \S+ times the size of the model, in steps \S+ times as long as pressures can follow: is its wear Archard's coefficient divided by the hardness, in the unit of one over pressure\?",
         ),
     ),
     Doubt(

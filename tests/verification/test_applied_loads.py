@@ -322,7 +322,7 @@ def test_a_body_pulled_away_is_told_clearly():
     assert [step.load_factor for step in done] == [0.25, 0.5, 0.75]
 
 
-@pytest.mark.filterwarnings("ignore:contact .* is lost at the end")
+@pytest.mark.filterwarnings("ignore:contact .* has opened again at the end")
 def test_a_force_goes_and_the_contact_force_with_it():
     mesh = fc.generate.half_spheres("tri3", size=5.0)
     model = driven_by_force(mesh, "node_to_segment", 2e5, ramp=[(0, 0), (0.5, 1), (1, 0)])

@@ -46,7 +46,7 @@ def test_a_bilateral_pair_slides_without_resistance(formulation):
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("make", [blocks, boxes])
-@pytest.mark.filterwarnings("ignore:contact .* is lost at the end")
+@pytest.mark.filterwarnings("ignore:contact .* has opened again at the end")
 def test_once_closed_means_closed_in_a_load_step_before(make, formulation, swap):
     mesh = make()
     kinematics = "3d" if mesh.dim == 3 else "plane_strain"

@@ -104,7 +104,7 @@ def joint(pull, formulation="mortar", locked_from=1.0, first=1.0):
     return model
 
 
-@pytest.mark.filterwarnings("ignore:contact 'joint' is lost at the end")
+@pytest.mark.filterwarnings("ignore:contact 'joint' has opened again at the end")
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("formulation", ["mortar", "node_to_segment", "continuous"])
 @pytest.mark.parametrize("pull", [-2.0, 1.5, 4.4, 6.0])

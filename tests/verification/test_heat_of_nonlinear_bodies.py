@@ -36,7 +36,7 @@ def free_body(law, kinematics, element):
     return model
 
 
-@pytest.mark.filterwarnings("ignore:temperatures and initial states bring strains")
+@pytest.mark.filterwarnings("ignore:temperatures and initial states cause strains")
 @pytest.mark.parametrize(
     ("law", "kinematics", "element"),
     [(law, "axisymmetric", "quad8") for law in LAWS]
@@ -67,7 +67,7 @@ def test_given_temperatures_expand_as_computed_ones_and_axes_have_their_own():
     assert step.cell_fields["J"] == pytest.approx(1.3 * 1.1 * 1.2, rel=1e-10)
 
 
-@pytest.mark.filterwarnings("ignore:temperatures and initial states bring strains")
+@pytest.mark.filterwarnings("ignore:temperatures and initial states cause strains")
 @pytest.mark.parametrize("conducted", [True, False])
 def test_a_held_bar_yields_as_it_is_heated_and_is_pulled_as_it_cools(conducted):
     E, alpha, yields, slope = 200e3, 1e-5, 200.0, 10e3

@@ -267,12 +267,12 @@ def test_all_that_a_step_changes_is_kept_or_set_anew():
 def test_contact_that_was_lost_is_known_from_the_last_step_alone():
     """A restart from the last step says that contact was there, as the whole analysis does."""
     ramp = fc.Ramp((0.5, 1.0, 1.5), table=((0.0, 0.0), (0.5, 0.5), (1.0, -0.5), (1.5, -0.6)))
-    with pytest.warns(fc.FastcontactWarning, match="is lost at the end"):
+    with pytest.warns(fc.FastcontactWarning, match="has opened again at the end"):
         fc.solve(spheres(), ramp)
     shorter = fc.Ramp((0.5, 1.0), table=ramp.table)
-    with pytest.warns(fc.FastcontactWarning, match="is lost at the end"):
+    with pytest.warns(fc.FastcontactWarning, match="has opened again at the end"):
         steps = fc.solve(spheres(), shorter)
-    with pytest.warns(fc.FastcontactWarning, match="is lost at the end"):
+    with pytest.warns(fc.FastcontactWarning, match="has opened again at the end"):
         fc.solve(spheres(), ramp, resume=steps[-1:])
 
 

@@ -85,7 +85,7 @@ def test_large_strains_without_stress_are_told(state):
     else:
         model.add_temperature(5e4)
     with pytest.warns(
-        fc.FastcontactWarning, match=r"temperatures and initial states bring strains of 0.5, beyond the 0.1"
+        fc.FastcontactWarning, match=r"temperatures and initial states cause strains of 0.5, beyond the 0.1"
     ):
         fc.solve(model, 1)
 

@@ -90,7 +90,7 @@ def test_two_levels_have_no_limit_and_say_so(case):
     study = gathered(case, [[made_up(0), made_up(1)]])
     assert not study.best.limits
     text = "\n".join(study.lines())
-    assert "no limits: 2 levels were solved, and a limit takes three" in text
+    assert "no limits: 2 levels were solved, and an extrapolated limit needs three" in text
     assert study.as_dict()["quantities"]["force"]["limit"] is None
     assert np.isnan(study.best.orders("force")).all()
     study.figure()
