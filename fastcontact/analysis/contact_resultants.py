@@ -206,7 +206,7 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     Returns
     -------
     structured ndarray (n_steps,)
-        ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in space ``moment_x`` ...; ``area``; ``centre_x`` ...;
+        ``step``, ``load_factor``; ``force_x`` ...; ``moment_z``, in 3D ``moment_x`` ...; ``area``; ``centre_x`` ...;
         ``normal_force``, ``mean_gap``, ``pressure_mean``, ``pressure_max``, ``dissipation``, ``friction_work``.
 
     Examples

@@ -53,7 +53,7 @@ class State:
         For each contact pair with tangential compliance, the positions of constraints and their elastic slips under the
         current forces [length].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
-        For each contact pair in space, the point of first contact [length] and the normal there [-].
+        For each contact pair in three dimensions, the point of first contact [length] and the normal there [-].
     bonds : dict of str to Bond
         State of the cohesive layer of each contact pair with one.
     locked : dict of str to float or ndarray (m,)

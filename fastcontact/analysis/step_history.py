@@ -76,7 +76,7 @@ def keep_path(
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
-    """Return the point of first contact [length] of each contact pair in space, and the normal there.
+    """Return the point of first contact [length] of each contact pair in three dimensions, and the normal there.
 
     It is fixed once the bodies have met; before, it is the closest point for the current obstacles and clearances.
     """

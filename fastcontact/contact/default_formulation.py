@@ -8,9 +8,9 @@ one digit on smooth quadratic facets in two dimensions, but each of their gaps i
 every closed constraint costs a linear solution.
 
 Against rigid obstacles the default is the continuous formulation, which also enforces contact between nodes, with two
-exceptions. Linear triangles, and in space all facets whose nodes all carry pressure, corners included, take node-to-segment:
+exceptions. Linear triangles, and in 3D all facets whose nodes all carry pressure, corners included, take node-to-segment:
 triangles and tetrahedra cannot satisfy all conditions of the continuous formulation, and its pressures oscillate by up to
-40 %; in space each of its integration points costs a linear solution. The other facets in space, which are quadratic, take
+40 %; in 3D each of its integration points costs a linear solution. The other facets in 3D, which are quadratic, take
 mortar where there is friction, because points with friction cannot be eliminated.
 """
 
@@ -60,8 +60,8 @@ def against_obstacle(
             why = "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
             return "node_to_segment", dict(options), why
         if dim == 3 and all(all_nodes_carry(name) for name in facets):
-            return "node_to_segment", dict(options), "the continuous one costs many times as much in space"
+            return "node_to_segment", dict(options), "the continuous one costs many times as much in three dimensions"
         if dim == 3 and options.get("friction") and not any(name in options for name in OF_STANDARD):
-            why = "multigrid cannot eliminate the continuous one with friction in space"
+            why = "multigrid cannot eliminate the continuous one with friction in three dimensions"
             return "mortar", {**options, "multipliers": "dual"}, why
     return "continuous", dict(options), "it also covers the region between nodes"

@@ -1,6 +1,6 @@
 """Pairing: projection of secondary points onto primary facets, and rows of the gap function.
 
-Mortar in space pairs facets with facets instead, in `formulations._cut_faces`.
+Mortar in three dimensions pairs facets with facets instead, in `formulations._cut_faces`.
 """
 
 from __future__ import annotations

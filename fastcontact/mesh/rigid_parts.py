@@ -1,7 +1,7 @@
 """Parts of bodies connected by a hinge: they share a single node, or nodes on one line.
 
-Cells with a common facet belong to one part, and so do parts with two common nodes in the plane, or with three non-collinear
-ones in space. The remaining common nodes of parts are hinges.
+Cells with a common facet belong to one part, and so do parts with two common nodes in 2D, or with three non-collinear
+ones in 3D. The remaining common nodes of parts are hinges.
 """
 
 from __future__ import annotations
@@ -117,6 +117,6 @@ def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
     mean = np.column_stack([np.bincount(pair, points[at, d]) for d in range(dim)]) / count[:, None]
     away = points[at] - mean[pair]
     moment = np.stack([[np.bincount(pair, away[:, i] * away[:, j]) for j in range(dim)] for i in range(dim)])
-    # In the plane the common nodes must extend in one direction, in space in two.
+    # In two dimensions the common nodes must extend in one direction, in three in two.
     spread = np.linalg.eigvalsh(np.moveaxis(moment, 2, 0))[:, 1]
     return np.asarray((spread > (IN_LINE * np.ptp(points, axis=0).max()) ** 2)[pair])

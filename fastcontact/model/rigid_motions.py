@@ -30,7 +30,7 @@ MODE_NAMES = {
 ZERO = 1e-8
 # A motion that contact does not stop within this multiple of the size of the model is unbounded.
 FAR = 1e3
-# Number of edges of the pyramid that approximates Coulomb's cone in space: forces up to 8 % outside the cone are
+# Number of edges of the pyramid that approximates Coulomb's cone in three dimensions: forces up to 8 % outside the cone are
 # accepted here.
 EDGES = 8
 # Largest factor on the coefficient of friction that is considered to hold a body.

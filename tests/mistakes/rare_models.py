@@ -121,7 +121,7 @@ MISTAKES = [
     Mistake("an obstacle pushed along the radius", lambda: round_obstacle(force={"x": 1.0}), fc.ModelError,
             r"a force cannot move obstacle 'plane' along x, the radius: in axisymmetry give y only"),
     Mistake("standard multipliers against an obstacle", lambda: obstacle(motion={"y": -1.0}, formulation="mortar", multipliers="standard"),
-            fc.ContactError, r"mortar in the plane needs multipliers='dual' at an obstacle"),
+            fc.ContactError, r"mortar in two dimensions needs multipliers='dual' at an obstacle"),
     Mistake("a clearance from an obstacle's nodes", lambda: obstacle(motion={"y": -1.0}, clearance_primary=0.1),
             fc.ContactError, r"a rigid obstacle has no nodes to measure from: give contact 'plane' the option 'clearance'"),
     Mistake("tied with friction", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", friction=0.3), fc.ContactError,

@@ -187,7 +187,7 @@ class PressureFieldFormulation(Formulation):
     def eliminable(self) -> bool:
         """See `Formulation`: forces outside the field are compliant, but the field values can be eliminated.
 
-        This holds in space without friction, which would couple them in all directions.
+        This holds in three dimensions without friction, which would couple them in all directions.
         """
         return self.points.shape[1] == 3 and not self.friction
 

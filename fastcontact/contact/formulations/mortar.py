@@ -1,7 +1,7 @@
 """Mortar contact: gaps integrated exactly over the segments where two facets overlap.
 
 Two methods share this name. With standard multipliers in two dimensions contact is decided at integration points, see
-`_segment_mortar`; between faces in space, and with dual multipliers, each node has one weighted gap, see `_weighted_mortar`.
+`_segment_mortar`; between faces in 3D, and with dual multipliers, each node has one weighted gap, see `_weighted_mortar`.
 """
 
 from __future__ import annotations
