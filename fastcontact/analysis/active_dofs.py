@@ -84,7 +84,7 @@ class ActiveDofs:
         return self._system.reduced(force)
 
     def size(self, v: Array) -> float:
-        """Return the largest of all unknowns, the inactive ones at the beginning of the step."""
+        """Return the largest of all unknowns; condensed ones have their values from the beginning of the step."""
         return largest(v)
 
     def scale(self, u: Array, lift: Array) -> float:

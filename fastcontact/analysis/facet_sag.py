@@ -1,8 +1,9 @@
 """Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
 
-Chords with a sag up to h cause pressure errors of the order of E h / L in bodies of modulus E, whatever the
-interference: L is the length of the facets where both sides have non-matching facets, and that of the contact where the
-other side is an exact shape.
+If the gap is off by up to the sag h of the chords, strains are off by the order of h / L, and pressures by E h / L with
+Young's modulus E, whatever the interference. This estimate is heuristic and calibrated below. L is the length of the
+facets if both sides have facets that do not match, and the length of the contact if the other side is an exact rigid
+shape.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def sag_warnings(problem: Problem, state: State, last: StepResult) -> dict[str, 
 
 
 def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
-    """Return a warning about the pressure error due to a `spread` of the sag [length]; empty where small."""
+    """Return a warning about the pressure error due to a `spread` of the sag [length]; an empty string if it is small."""
     side, order = pair.secondary, pair.secondary.order
     size = float(
         np.median(np.concatenate([np.linalg.norm(np.ptp(pair.points[b.facets], axis=1), axis=1) for b in side.blocks]))
@@ -59,9 +60,9 @@ def _text(pair: Formulation, spread: float, contact: ContactResult) -> str:
         return ""
     finer = f"facets of length {size * (doubtful * mean / error) ** (1.0 / power):.2g} instead of {size:.2g}"
     return (
-        f"facets of '{side.group}' and of what it faces deviate from their arcs by up to {spread:.3g}, which may change "
-        f"pressures by about {error:.3g}, where their mean is {mean:.3g}: {remedy}; "
-        f"{'quadratic elements, or ' if order == 1 else ''}{finer} reduce this"
+        f"facets of '{side.group}' and of the other side deviate from their arcs by up to {spread:.3g}, which may change "
+        f"pressures by about {error:.3g}, compared with a mean of {mean:.3g}: {remedy}; "
+        f"{'quadratic elements, or ' if order == 1 else ''}{finer} reduce the error"
     )
 
 

@@ -25,9 +25,9 @@ class Iterate:
     Attributes
     ----------
     u : ndarray (n_dofs,)
-        Displacements, inactive components as at the beginning of the step [length].
+        Displacements; components that are condensed keep their values from the beginning of the step [length].
     active : dict of str to ndarray of bool (m,)
-        Next active set by the last solution, for each contact pair.
+        For each contact pair, the active set that the last solution predicts for the next one.
     pressure : dict of str to ndarray (n_nodes,)
         Last nodal pressures of each contact pair [pressure].
     frictional : FrictionalEquilibrium, optional
@@ -59,7 +59,7 @@ class Iterate:
         self.frictional = self.rigid = None
 
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
-        """Store, for each pair, the next active set of the solution and its nodal pressures, without those of fluid."""
+        """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
         for name, rows in constraints.rows().items():
             self.active[name] = solution.wanted[rows]
             forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
@@ -67,24 +67,24 @@ class Iterate:
 
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
-    """Pair the two sides of every contact pair on the deformed configuration, or on the undeformed one if that is kept."""
+    """Pair both sides of every contact pair on the deformed configuration, with `keep_pairing` on the undeformed one."""
     displacement, u = problem.displacement(iterate.u), iterate.u
     if len(problem.force_driven):
         u = np.where(problem.system.fixed, load.lift, u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
     positions, parts = problem.force_driven.positions(u), {}
-    still = np.zeros(problem.model.mesh.dim)
+    no_motion = np.zeros(problem.model.mesh.dim)
     for name, pair in problem.pairs.items():
         at = replace(problem.configuration(name, state, load, paired_at, u), pressure=iterate.pressure.get(name))
-        turns = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
-        moved = at.obstacle - at.obstacle_start if turns else None
+        rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
+        moved = at.obstacle - at.obstacle_start if rotates else None
         constraints_of_pair = pair.constraints(replace(at, rounded=True) if iterate.rounded else at)
-        parts[name] = problem.force_driven.constraints(name, constraints_of_pair, positions.get(name, still), moved)
+        parts[name] = problem.force_driven.constraints(name, constraints_of_pair, positions.get(name, no_motion), moved)
     return stacked(parts)
 
 
 def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
-    """Return the initial active set (m,): that of the last solution, extrapolated in the first pairing of a step."""
+    """Return the initial active set (m,): the one predicted by the last solution, or extrapolated at the first pairing."""
     sets = [_start_of(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
     return np.concatenate(sets)
 

@@ -52,11 +52,11 @@ class Watch:
 
         Parameters
         ----------
-        part, force : ndarray
+        unknowns, force : ndarray
         change : float
             Change of the displacements from the previous ones [length].
         size : float
-            Of the displacements [length].
+            Largest displacement [length].
 
         Returns
         -------

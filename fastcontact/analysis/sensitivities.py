@@ -30,7 +30,7 @@ from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import TINY
 
-# Largest effect of points between two facets on a derivative, relative to it.
+# Largest admissible relative difference of one-sided derivatives, due to points that project onto edges between facets.
 BETWEEN = 1e-6
 
 
@@ -49,7 +49,7 @@ class Sensitivities:
         largest one of its pair, or the smallest open gap relative to the largest displacement, whichever is smaller;
         at most 1 [-].
     solutions : int
-        Linear solutions for the adjoint: one, and those for the variation of the contact geometry.
+        Linear solutions of the adjoint problem: one, and those for the variation of the contact geometry.
 
     Examples
     --------
@@ -99,15 +99,16 @@ def sensitivities(
         pair, point)`` [pressure].
     parameters : sequence of sequences
         ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, which is given by one of its
-        groups or by its number in the model; of an `Orthotropic` with the axes, as ``("E", material, "1")``, ``("nu",
-        material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or ``("expansion",
-        material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads on a group, or
-        of the force on a rigid obstacle by its name [-]; ``("speed", group)``, the angular speed of centrifugal forces
-        [radian / time]; ``("temperature", group)``, the factor of the temperature rise [-]; the latter three also with
-        ``"all solid cells"`` for loads without a group; ``("pretension", name)``, the factor of the force or the
-        shortening of a section [-]; ``("prescribed", group)``, the factor of the displacements prescribed on a group,
-        or ``("prescribed", group, "y")`` of one component [-]; ``("motion", obstacle)``, the factor of its motion [-];
-        ``("clearance", pair)``, a length added to the gap [length]. All factors have the value 1.
+        groups or by its number in the model; of an `Orthotropic` with the numbers of the axes, as ``("E", material,
+        "1")``, ``("nu", material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or
+        ``("expansion", material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads
+        on a group, or of the force on a rigid obstacle by its name [-]; ``("speed", group)``, the angular speed of
+        centrifugal forces [radian / time]; ``("temperature", group)``, the factor of the temperature rise [-]; "load",
+        "speed" and "temperature" also with ``"all solid cells"`` instead of a group, for loads without one;
+        ``("pretension", name)``, the factor of the force or the shortening of a section [-]; ``("prescribed", group)``,
+        the factor of the displacements prescribed on a group, or ``("prescribed", group, "y")`` of one component [-];
+        ``("motion", obstacle)``, the factor of its motion [-]; ``("clearance", pair)``, a length added to the gap
+        [length]. All factors have the value 1.
     ramp, criteria, linear_solver
         Those of `solve`.
     margin : float
@@ -121,8 +122,8 @@ def sensitivities(
     ------
     ModelError
         If there is no such quantity or parameter; with friction, wear, or locked pretension sections, since results
-        then depend on earlier steps; if an active constraint is about to open or an open one to close; if a node lies
-        between two facets, where the derivatives to both sides differ.
+        then depend on earlier steps; if an active constraint is about to open or an open one to close; if a node
+        projects onto the edge between two facets, and the one-sided derivatives differ there.
 
     Examples
     --------
@@ -153,7 +154,7 @@ def check_labels(model: Model, quantity: Sequence[str | int], parameters: Sequen
     """Raise ModelError or MeshError if a model has no such quantity or parameter, see `sensitivities`."""
     model.refuse_nonlinear("sensitivities are")
     if model.conducts:
-        raise ModelError("sensitivities are there without conduction of heat, which depends on the contact")
+        raise ModelError("sensitivities are not available with conduction of heat, which depends on the contact")
     check_quantity(model, tuple(quantity))
     for parameter in parameters:
         check_parameter(model, tuple(parameter))
@@ -180,7 +181,7 @@ def _between(contact: MovingContact, kinks: csr_array, off: float) -> str:
     named = ", ".join(f"{p} {np.array2string(mesh.points[p], precision=4)}" for p in points[:3])
     more = f" and {len(points) - 3} more" if len(points) > 3 else ""
     return (
-        f"points {named}{more} lie opposite nodes of the other side, between two of its facets: to either side derivatives "
-        f"differ by {off:.1e} of themselves. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
+        f"points {named}{more} lie opposite nodes of the other side, between two of its facets: the one-sided derivatives "
+        f"differ by a fraction of {off:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
         "differently, or take the default formulation"
     )

@@ -22,9 +22,9 @@ from fastcontact.mesh import elements
 from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Poisson's ratio above which the mean stress is examined. Under a ball it scatters by 14 to 23 % at nu = 0.3, where the
-# pressure is accurate, by 38 to 47 % at 0.45 and by 66 to 75 % at 0.48, where the pressure at the pole is off by 15 to
-# 27 % and 27 to 43 %.
+# Poisson's ratio above which the mean stress is examined, and its scatter above which a warning is given. Under a ball
+# it scatters by 14 to 23 % at nu = 0.3, where the pressure is accurate, by 38 to 47 % at 0.45 and by 66 to 75 % at
+# 0.48, where the pressure at the pole is off by 15 to 27 % and 27 to 43 %.
 SUSPICIOUS, ALTERNATING = 0.45, 0.3
 # Error in the energy norm above which a warning is given: 25 % under the same ball on coarse triangles, 52 to 67 % in thin
 # parts that carry a third of the exact load in bending.
@@ -46,29 +46,29 @@ class StressScatter:
     Attributes
     ----------
     elements : list of str
-        Elements of first order without incompatible modes; may be empty.
+        Names of the linear elements without incompatible modes; may be empty.
     energy : float
-        Energy norm of the recovered stress minus the stress, over that of the stress [-].
+        Energy norm of the difference between recovered and computed stress, over that of the computed one [-].
     pressure : float
         The same for the root mean square of the mean stress in nearly incompressible triangles and tetrahedra [-].
     nu : float
-        The largest Poisson's ratio of these [-].
+        The largest Poisson's ratio of all materials [-].
     """
 
     def __init__(self, problem: Problem, step: StepResult) -> None:
         field, mesh = problem.field, problem.model.mesh
-        bends = all(material.incompatible_modes for material, _ in problem.model.materials)
+        has_modes = all(material.incompatible_modes for material, _ in problem.model.materials)
         self.elements = [
             name for name in mesh.solids
-            if elements.get(name).order == 1 and not (bends and name in BENDING_ELEMENTS)
+            if elements.get(name).order == 1 and not (has_modes and name in BENDING_ELEMENTS)
         ]  # fmt: skip
         self.energy = self.pressure = 0.0
         laws = [material for material, _ in problem.model.materials]
         nu = np.array([law.largest_nu if isinstance(law, LinearElastic) else -1.0 for law in laws])[field.owner]
         self._nearly = (nu >= SUSPICIOUS) & (problem.model.kinematics != "plane_stress")
         self.nu = float(nu.max(initial=-1.0))
-        heat, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
-        offset = problem.model.stress_offset(heat, initial, field, step.temperature)
+        thermal, initial = (step.iterations.get(key, ()) for key in ("temperature_factors", "initial_factors"))
+        offset = problem.model.stress_offset(thermal, initial, field, step.temperature)
         if not self.elements or offset is not None:  # free thermal expansion only causes round-off stresses
             return
         given = mesh, problem.model.kinematics, field
@@ -78,15 +78,14 @@ class StressScatter:
         off, energy, off_mean, mean = np.sqrt(sums)
         size = np.ptp(mesh.points, axis=0)
         strain = np.abs(step.displacement).max() / size.max()
-        stretched = strain * np.sqrt(
-            field.moduli.max() * np.prod(size)
-        )  # root of an energy, as if all cells were strained
+        # Root of the energy if the bounding box were filled with the stiffest material under this strain.
+        stretched = strain * np.sqrt(field.moduli.max() * np.prod(size))
         if energy > LENGTH_ROUND_OFF * stretched:
             self.energy = float(off / energy)
             self.pressure = float(off_mean / mean) if mean > 0.0 else 0.0
 
     def _sums(self, problem: Problem, stress: CellStress, name: str, smooth: Array) -> Array:
-        """Return integrals (4,) over the cells of an element: of both energies, and of both squared mean stresses."""
+        """Return integrals (4,) over cells: energies and squared mean stresses, of the difference and of the stress."""
         mesh, field, element = problem.model.mesh, problem.field, elements.get(name)
         xi, weights = integration_rule(element, 2)
         N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
@@ -123,7 +122,7 @@ def nonlinear_scatter_warnings(problem: Problem, state: State, step: StepResult)
     if off <= ALTERNATING**2 * whole:
         return []
     return [
-        f"{' and '.join(names)} cells lock: of a material that keeps its volume, their mean stress scatters by "
+        f"{' and '.join(names)} cells lock: in a nearly incompressible material their mean stress scatters by "
         f"{np.sqrt(off / whole):.0%} about its averages at the nodes, and forces are too large; use quadrangles "
         "or hexahedra, or quadratic elements (generate.to_quadratic)"
     ]
@@ -143,8 +142,8 @@ def scatter_warnings(problem: Problem, step: StepResult) -> list[str]:
         measure.energy > BENDING and problem.model.kinematics != "axisymmetric"
     ):  # cells at the axis scatter by this amount anyway
         return [
-            f"{names} cells are too stiff, as where thin parts bend: their stress is off by {measure.energy:.0%} (energy "
-            "norm of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "
+            f"{names} cells are too stiff, as in thin parts that bend: the error of their stress is {measure.energy:.0%} "
+            "(energy norm of the difference from stress recovered at the nodes); use hexahedra or quadrangles with "
             "LinearElastic(incompatible_modes=True), quadratic elements (generate.to_quadratic), or smaller ones"
         ]
     return []

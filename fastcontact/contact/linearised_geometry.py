@@ -1,8 +1,9 @@
 r"""Linearised contact geometry: variation of contact forces and gaps with the displacements.
 
-The rows of constraints depend on the displacements: points slide over the facets they face, and normals rotate. A point
-:math:`x` with contact force :math:`p = \lambda n` faces :math:`y(\xi) = \sum_k N_k(\xi) x_k`, with the normal n.
-For a variation of the displacements its nodal forces and its gap vary, in addition to the rows themselves, by
+The rows of constraints depend on the displacements: points slide over the facets they face, and normals rotate. A
+secondary point :math:`x`, with shape functions :math:`N_s` and contact force :math:`p = \lambda n`, faces the primary
+point :math:`y(\xi) = \sum_k N_k(\xi) y_k`, with the normal n. For a variation of the displacements its nodal forces and
+its gap vary, in addition to the rows themselves, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
           \delta p = \lambda \, \delta n, \qquad

@@ -24,7 +24,7 @@ from fastcontact.errors import ModelError
 from fastcontact.linear.multigrid.matrix import block_matrix
 from fastcontact.round_off import ROUND_OFF
 
-# Relative tolerance of the conditions on supports and right-hand sides.
+# Relative tolerance of the conditions under which supports and constraints are consistent.
 CONFLICT = 1e-9
 
 
@@ -32,7 +32,8 @@ CONFLICT = 1e-9
 class Stiffness:
     """A stiffness matrix as the sum of `parts` (n, n) [force / length].
 
-    Without multi-point constraints: the matrix of the linear solver, and the rows and columns of supports removed from it.
+    Without multi-point constraints there are two parts: the matrix of the linear solver, and the rows and columns of
+    supports that were removed from it.
     """
 
     parts: tuple[Any, ...]
@@ -65,7 +66,7 @@ class System:
         Displacement components that are prescribed.
     relations : sequence of MultiPointConstraint
     without_stiffness : ndarray of bool (n,), optional
-        Components that are free although they have no stiffness, such as those of rigid obstacles: none by default.
+        Components that are free although they have no stiffness, such as those of rigid obstacles; none by default.
 
     Attributes
     ----------
@@ -80,7 +81,7 @@ class System:
     weightless : ndarray of bool (n,)
         Unknowns without stiffness: components of rigid obstacles, motions of bodies that constraints make rigid.
     T : csr_array (n, n) or None
-        See the module; None without multi-point constraints.
+        The matrix T of ``u = T v + t``; None without multi-point constraints.
     """
 
     def __init__(
@@ -101,30 +102,31 @@ class System:
         self._constraints = ConstrainedMotion(self.fixed, relations)
         self.T = self._constraints.T if relations else None
         self._without_stiffness = without_stiffness
-        self._take(K, diagonal)
+        self._set_stiffness(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
-        """Return the system with another stiffness K (n, n), which is modified in the same way."""
+        """Return the system with another stiffness K (n, n), which is modified in place, as by the constructor."""
         system = copy.copy(self)
-        system._take(K, diagonal_of(K))
+        system._set_stiffness(K, diagonal_of(K))
         return system
 
-    def _take(self, K: bsr_array, given: Array) -> None:
-        """Set a stiffness with the diagonal `given` (n,)."""
+    def _set_stiffness(self, K: bsr_array, diagonal_of_K: Array) -> None:
+        """Set the stiffness K (n, n), given its diagonal (n,)."""
         self.free: Mask = self._constraints.free.copy()
         if self.T is None:
-            self.K = Stiffness(supports_apart(K, self.fixed, given))
+            self.K = Stiffness(supports_apart(K, self.fixed, diagonal_of_K))
             self.matrix = self.K.parts[0]
-            self.weightless: Mask = self.free & (given == 0.0)
+            self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
         else:
             self.K = Stiffness((K,))
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = diagonal_of(transformed)
-            cancelling = self.T.multiply(self.T).T @ given
-            # Excludes points that constraints only couple with each other.
-            self.free &= (cancelling > 0.0) | self._without_stiffness
-            self.weightless = self.free & (diagonal <= ROUND_OFF * cancelling)
+            # The terms of the transformed diagonal, without those between different components, which may cancel them.
+            uncancelled = self.T.multiply(self.T).T @ diagonal_of_K
+            # Excludes points without stiffness that constraints couple only with each other.
+            self.free &= (uncancelled > 0.0) | self._without_stiffness
+            self.weightless = self.free & (diagonal <= ROUND_OFF * uncancelled)
             self.matrix = supports_apart(transformed, ~self.free, diagonal)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
@@ -145,13 +147,13 @@ class System:
         return self._constraints.lift(prescribed, values)
 
     def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) of the constraints, given the multiplier of each."""
+        """Return the right-hand sides (m,) of the constraints, given the load multiplier of each."""
         return self._constraints.values(multiplier)
 
     def right(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
-        # Without constraints t only moves supports, which act on unknowns through the rows and columns removed from the
-        # matrix.
+        # Without constraints t only holds displacements of supports, which load the unknowns through the removed
+        # columns.
         return self.reduced(f - (self.K.parts[1] if self.T is None else self.K) @ t)
 
     def reduced(self, force: Array) -> Array:
@@ -192,7 +194,8 @@ class System:
     def balance(self, out: Array, round_off: Array | None = None) -> tuple[Array, float]:
         """Return the forces (n,) of supports and constraints, and the residual, the largest force on an unknown.
 
-        `out` (n,) are the internal minus all other forces [force]. Its `round_off` (n,) is not part of the residual.
+        `out` (n,) are the internal minus all other forces [force]. Up to its `round_off` (n,) it does not count as
+        residual.
         """
         residual = self.reduced(out)
         if round_off is not None:
@@ -220,7 +223,7 @@ class ConstrainedMotion:
         self.T.eliminate_zeros()
 
     def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) for the multiplier of each constraint."""
+        """Return the right-hand sides (m,) for the load multiplier of each constraint."""
         blocks = [
             np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
             for relation, factor in zip(self.relations, multiplier, strict=True)
@@ -238,8 +241,8 @@ class ConstrainedMotion:
         wrong = np.flatnonzero(off > CONFLICT * scale)
         if len(wrong):
             raise ModelError(
-                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports or relations before it by "
-                f"{off[wrong[0]]:.3g}: remove one of them"
+                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or relations stated "
+                f"before it, by {off[wrong[0]]:.3g}: remove one of them"
             )
         lift: Array = self._elimination.T @ known + self._elimination.S @ values
         return lift

@@ -16,7 +16,7 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
-# History of states that are present from the first step on.
+# Ramp of states that act in full from the first step on.
 ALWAYS: Table = ((-LARGEST, 1.0), (LARGEST, 1.0))
 
 
@@ -31,14 +31,14 @@ class InitialState:
     groups : tuple of str or None
         Groups of solid cells; None: all.
     cells : Cells
-        The same cells.
+        The cells of these groups.
     components : mapping of int to float or Varying
         By the number of the component in `COMPONENTS`: stresses [pressure], or strains with engineering shears [-].
     axes : Axes
         Axes of the components, as for materials.
     kinematics : str
     ramp : tuple
-        History.
+        Pairs of instant and multiplier.
     """
 
     kind: str
@@ -55,9 +55,10 @@ class InitialState:
         return f"the initial {self.kind} of {listed(self.groups)}"
 
     def values(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return components (n_rows, n, n_components) [pressure] or [-] along the axes of the mesh, in cells of an element.
+        """Return components (n_rows, n, n_components) [pressure] or [-] along x, y, z, in cells of the element type `name`.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points. Zero elsewhere.
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] values of the shape functions at the
+        points. Components are zero in cells of other groups.
         """
         size = 6 if self.kinematics == "3d" else 4
         inside = np.isin(rows, self.cells.rows.get(name, ()))
@@ -72,14 +73,16 @@ class InitialState:
                 turn = np.asarray(np.linalg.inv(turn).transpose(0, 2, 1))
             local = np.einsum("nij,nj->ni", turn, local)
         out = np.abs(local[:, size:]).max(initial=0.0)
-        if out > ROUND_OFF * np.abs(local).max(initial=0.0) or self._across(local):
-            raise ModelError(f"{self.name} has components along z that {self.kinematics} does not have: turn its axes")
+        if out > ROUND_OFF * np.abs(local).max(initial=0.0) or self._out_of_plane(local):
+            raise ModelError(
+                f"{self.name} has out-of-plane components, which {self.kinematics} does not have: change its axes"
+            )
         values = np.zeros((len(rows), len(N), size))
         values[inside] = local[:, :size].reshape(len(members), len(N), size)
         return values
 
-    def _across(self, values: Array) -> bool:
-        """Return whether a stress (n, 6) [pressure] acts across the plane of plane stress."""
+    def _out_of_plane(self, values: Array) -> bool:
+        """Return whether an initial stress (n, 6) [pressure] has a component zz in plane stress."""
         largest = np.abs(values).max(initial=0.0)
         plane = self.kind == "stress" and self.kinematics == "plane_stress"
         return bool(plane and np.abs(values[:, 2]).max(initial=0.0) > ROUND_OFF * largest)
@@ -124,9 +127,9 @@ class StressOffset:
     rise : ndarray (n_points,)
         Rise of the temperature [temperature].
     expansion : ndarray (n_moduli, n_components)
-        Thermal strains of a degree [1 / temperature].
+        Thermal strains per unit of temperature [1 / temperature].
     states : sequence of (float, InitialState)
-        Factors, and initial stresses and strains.
+        Initial stresses and strains, each with its factor.
     """
 
     rise: Array
@@ -136,7 +139,7 @@ class StressOffset:
     def initial(self, kind: str, name: str, rows: Indices, N: Array) -> Array | None:
         """Return the sum of initial stresses or strains (n_rows, n, n_components) [pressure] or [-]; None without any.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] the shape functions at the points.
         """
         values = [factor * state.values(name, rows, N) for factor, state in self.states if state.kind == kind]
         return np.asarray(np.sum(values, axis=0)) if values else None

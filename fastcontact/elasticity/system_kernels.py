@@ -17,19 +17,19 @@ def _near(i, indptr, indices, supported_nodes):
 
 @interpretable_kernel
 def take_out(indptr, indices, data, supported, supported_nodes, pivots, low, high, start, columns, removed, moves):
-    """Move rows and columns of supports from `data` to (start, columns, taken), compressed rows of single numbers.
+    """Move rows and columns of supports from `data` to (start, columns, removed), a matrix in compressed rows.
 
     Parameters
     ----------
     supported : ndarray of bool (n_rows, size), supported_nodes : ndarray of bool (n_rows,)
         Components with a support, and nodes with one.
-    kept : (n,)
-        Values that remain on the diagonal.
+    pivots : (n,)
+        Values that remain on the diagonal of supported components.
     low, high : int
         Block rows `low` to ``high - 1`` are processed.
     start : (n + 1,)
         Row offsets; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with the number of entries.
-    columns, taken : (n_taken,)
+    columns, removed : (n_removed,)
         Filled if it `moves` numbers.
     moves : bool
     """

@@ -1,6 +1,6 @@
 r"""Semismooth Newton method for contact with Coulomb friction, independent of the operator from forces to gaps and slips.
 
-With normal forces n, tangential ones t, gaps g and slips s, in units in which each constraint has a compliance near one,
+With normal forces n, tangential ones t, gaps g and slips s, scaled such that each constraint has a compliance near one,
 the solution is the zero of
 
 .. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
@@ -20,13 +20,14 @@ from fastcontact.arrays import Array, Mask
 
 # Residual of a solution over the largest force.
 EXACT = 1e-12
-# Newton iterations from one start, the smallest damping, and the number of steps without progress.
+# Largest number of Newton iterations, smallest damping factor, and number of undamped steps against the residual after
+# which to stop.
 PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """A solution; arrays of forces and gaps have the shape (1 + k, m), normal first.
+    """The solution, or the best iterate. Forces and gaps have the shape (1 + k, m), with normal components first.
 
     Attributes
     ----------
@@ -34,10 +35,11 @@ class Forces:
         Forces; gaps and slips.
     closed, sticking : ndarray of bool (m,)
     settled : bool
+        Whether the iteration has converged.
     residual : float
         Largest residual over the largest force.
     iterations : int
-        Newton iterations, each start counting as one.
+        Newton iterations.
     """
 
     y: Array
@@ -56,14 +58,14 @@ class Linearised(Protocol):
     ----------
     law : Law
     round_off : float
-        Error bound of gaps and slips.
+        Bound of the round-off of gaps and slips.
     """
 
     law: Law
     round_off: float
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
-        """Return forces and gaps (1 + k, m) at which the equations of a state, linearised at `y` and `gaps`, hold.
+        """Return forces and gaps (1 + k, m) that solve the equations of a contact state, linearised at `y` and `gaps`.
 
         Closed gaps and sticking slips vanish; sliding constraints have ``t = mu n d`` with the direction d of t - s, which in
         three dimensions varies with t - s.
@@ -113,7 +115,7 @@ def newton(
             and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change)) > (1 - 1e-4 * damping) * size
         ):
             damping *= 0.5
-            if damping < SHORTEST:  # at a kink no step may decrease the residual: take the full one
+            if damping < SHORTEST:  # at a kink there may be no step that decreases the residual: take the full one
                 damping, uphill = 1.0, uphill + 1
                 break
         y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)

@@ -27,14 +27,16 @@ from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
 from fastcontact.round_off import DIFFERENCES
 
-REMEDY = "Take another load a little off this one, or differences of two solutions to either side"
-# By how much constants and forces are changed, relative to what is allowed, or to the largest.
+REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
+# Increment of central differences: for constants relative to their admissible range, for forces to the largest force.
 CHANGED = 1e-3
-# Largest difference of one-sided derivatives where they are smooth, over the effect of rotating a facet by an edge.
+# A larger difference of one-sided derivatives is a kink: for forces relative to the largest one over the shortest edge,
+# for gaps absolute.
 SMOOTH = 1e-3
-# Up to this number, components are moved one by one.
+# Up to this number of components, each is moved on its own.
 FEW = 60
-# Largest error of simultaneous moves, relative to the largest number; above it points are moved one by one.
+# Largest error of the derivatives from simultaneous moves, relative to the largest of them; above it points are moved
+# one by one.
 TOGETHER = 1e-5
 
 
@@ -108,12 +110,12 @@ class MovingContact:
         return pair_surfaces(self.problem, self.state, self.load, Iterate(u.copy(), {}, {}))
 
     def at(self, u: Array) -> Sample:
-        """Return forces, gaps and pressures of surfaces paired at u (n_dofs,), at fixed displacements [length]."""
+        """Return forces, gaps and pressures for the pairing at u (n_dofs,), while displacements stay `self.u` [length]."""
         constraints, multiplier = self.constraints_at(u), self.solution.multiplier
         if len(constraints) != len(multiplier):
             raise ModelError(
-                f"contact has {len(multiplier)} constraints, and {len(constraints)} as soon as nodes move: both sides have "
-                f"nodes in common places, where results have one derivative to either side. {REMEDY}"
+                f"contact has {len(multiplier)} constraints, but {len(constraints)} as soon as nodes move: nodes of both "
+                f"sides coincide, and the one-sided derivatives differ there. {REMEDY}"
             )
         gap = constraints.gap0 + constraints.B @ self.u
         if constraints.normal_compliance is not None:
@@ -130,7 +132,7 @@ class MovingContact:
         return nodal_pressure(self.problem.pairs[self.pair], constraints.parts[self.pair], forces, self.closed)
 
     def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
-        """Return the derivative of `Sample.all`; `changed` returns the contact with the parameter changed by a number."""
+        """Return the derivative of `Sample.all`; `changed(d)` returns the contact with the parameter changed by d."""
         return np.asarray((changed(by).at(self.u).all - changed(-by).at(self.u).all) / (2.0 * by))
 
     @cached_property
@@ -149,8 +151,8 @@ class MovingContact:
     def derivatives(self) -> tuple[csr_array, csr_array]:
         """Return forward and backward derivatives (n, n_dofs) of `Sample.all` with respect to the paired configuration.
 
-        Their mean is the derivative. Where they differ by more than the effect of the step, a point lies on the line
-        between two facets.
+        Their mean is the derivative. Where they differ by more than the truncation error, a point projects onto the
+        edge between two facets.
         """
         n = len(self.u)
         size = n + len(self.active) + (len(self.problem.pairs[self.pair].secondary.points) if self.pair else 0)
@@ -159,14 +161,14 @@ class MovingContact:
         if not len(dofs):
             return csr_array((size, n)), csr_array((size, n))
         if len(dofs) > FEW:
-            owner = self._reached()
-            derivatives = self._differences(_independent_groups(dofs, owner, self.problem.model.mesh.dim), owner)
+            reached = self._reached()
+            derivatives = self._differences(_independent_groups(dofs, reached, self.problem.model.mesh.dim), reached)
             if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
                 return derivatives
         return self._differences([np.array([dof]) for dof in dofs], None)
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:
-        """Return half the difference of the two `derivatives` where points lie on the line between two facets."""
+        """Return half the difference of the two `derivatives` where points project onto an edge between two facets."""
         jump, n = csr_array(0.5 * (forward - backward)), len(self.u)
         force = float(np.abs(self.solution.multiplier).max(initial=0.0)) * DIFFERENCES / self.step
         row = np.repeat(np.arange(jump.shape[0]), np.diff(jump.indptr))
@@ -186,7 +188,7 @@ class MovingContact:
 
     @cached_property
     def _involved(self) -> csr_array:
-        """Incidence (0 or 1) of active constraints (k,) and the points (n_points,) that they involve."""
+        """Incidence matrix (k, n_points), 0 or 1, of active constraints and the points that they involve."""
         dim, B = self.problem.model.mesh.dim, csr_array(self.constraints.B[self.active])
         keep = (B.indices < self.problem.model.n_dofs) & (B.data != 0.0)
         row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))[keep]
@@ -197,7 +199,7 @@ class MovingContact:
         return _ones(pattern)
 
     def _reached(self) -> csr_array:
-        """Return the points (n_points,) on which active constraints (k,) may depend: those involved, and their neighbours."""
+        """Return the incidence (k, n_points) of active constraints and the points they may depend on, neighbours included."""
         n = self.problem.model.mesh.n_points
         near = eye_array(n, format="csr")
         for side in self._surfaces():
@@ -212,30 +214,30 @@ class MovingContact:
             moves[(self.active >= rows.start) & (self.active < rows.stop)] = 0.0
         return _ones(csr_array((self._involved * moves[:, None]) @ near))
 
-    def _differences(self, together: list[Indices], owner: csr_array | None) -> tuple[csr_array, csr_array]:
+    def _differences(self, groups: list[Indices], reached: csr_array | None) -> tuple[csr_array, csr_array]:
         base, n = self.at(self.u).all, len(self.u)
         columns: list[list[csr_array]] = [[], []]
-        for dofs in together:
+        for dofs in groups:
             shift = np.zeros(n)
             shift[dofs] = self.step
             for side, sign in enumerate((1.0, -1.0)):
                 changed = sign * (self.at(self.u + sign * shift).all - base) / self.step
                 rows = np.flatnonzero(changed)
-                if owner is None or len(dofs) == 1:
+                if reached is None or len(dofs) == 1:
                     column = np.full(len(rows), dofs[0])
                 else:
-                    column = self._owners(rows, dofs, owner)
+                    column = self._owners(rows, dofs, reached)
                 columns[side].append(csr_array((changed[rows], (rows, column)), shape=(len(base), n)))
-        forward, backward = (csr_array(sum(columns_of_pair[1:], columns_of_pair[0])) for columns_of_pair in columns)
+        forward, backward = (csr_array(sum(of_side[1:], of_side[0])) for of_side in columns)
         return forward, backward
 
-    def _owners(self, rows: Indices, dofs: Indices, owner: csr_array) -> Indices:
+    def _owners(self, rows: Indices, dofs: Indices, reached: csr_array) -> Indices:
         """Return which of the components `dofs`, moved together, has changed each of the values `rows`."""
         dim, n = self.problem.model.mesh.dim, len(self.u)
-        by_constraint = np.full(owner.shape[0], dofs[0])
+        by_constraint = np.full(reached.shape[0], dofs[0])
         by_point = np.full(self.problem.model.mesh.n_points, dofs[0])
-        moved = csr_array(owner[:, dofs // dim])
-        first = np.repeat(np.arange(owner.shape[0]), np.diff(moved.indptr))
+        moved = csr_array(reached[:, dofs // dim])
+        first = np.repeat(np.arange(reached.shape[0]), np.diff(moved.indptr))
         by_constraint[first] = dofs[moved.indices]
         for constraint in np.unique(first):
             by_point[
@@ -261,7 +263,7 @@ class MovingContact:
 
 
 def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
-    """Return groups of components of which no two affect the same constraint, or constraints of common points."""
+    """Return groups of components of which no two affect the same constraint, or constraints that share points."""
     n_points = reached.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)
     around = _ones(csr_array(reached.T @ reached))
@@ -273,7 +275,7 @@ def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Ind
         colour[point] = next(c for c in range(len(points)) if c not in used)
     groups: list[Indices] = []
     for c in range(max(colour.values(), default=-1) + 1):
-        group = np.array([p for p, c_of_node in colour.items() if c_of_node == c], np.intp)
+        group = np.array([p for p, colour_of_p in colour.items() if colour_of_p == c], np.intp)
         groups += [group * dim + axis for axis in range(dim)]
     return groups + [np.array([dof]) for dof in dofs[dofs >= n_points * dim]]
 

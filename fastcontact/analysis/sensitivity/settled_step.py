@@ -111,7 +111,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         many = "1 constraint is" if len(wrong) == 1 else f"{len(wrong)} constraints are"
         raise ModelError(
             f"{many} about to {kind}, at {named_nodes(contact.problem, nodes)}: forces or gaps are "
-            f"{shown:.1e} of the largest, less than margin = {least:g}. There results have one derivative to either side. "
+            f"{shown:.1e} of the largest, less than margin = {least:g}. The one-sided derivatives differ there. "
             f"{REMEDY}"
         )
     return min(1.0, float(near.min(initial=1.0)))

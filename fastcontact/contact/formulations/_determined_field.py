@@ -82,7 +82,7 @@ def determined(
     Parameters
     ----------
     side : Surface
-    whole : list of WholeFacets
+    fields : list of WholeFacets
         Whole facets of each block of the side.
     masses : list of ndarray (n_facets, n_nodes, n_nodes)
         Integrals of products of two shape functions over the covered part [area].

@@ -14,7 +14,7 @@ from fastcontact.linear.cholesky import triangular_kernels
 
 
 class LowerTriangle(NamedTuple):
-    """L (n, n) by columns, with row indices once per supernode; see `triangular_kernels`."""
+    """L (n, n), stored by columns, with common row indices for the columns of a supernode; see `triangular_kernels`."""
 
     start: NDArray[np.int64]
     values: Array
@@ -24,7 +24,7 @@ class LowerTriangle(NamedTuple):
 
 
 class SymmetricFactors:
-    """L and D.
+    """Factors L and D of a permuted symmetric positive definite matrix, ``P K P.T = L D L.T``.
 
     Parameters
     ----------
@@ -35,7 +35,8 @@ class SymmetricFactors:
     position : ndarray of int (n,)
         Position of each unknown in the factors.
     last : ndarray of int (m,)
-        Unknowns that are eliminated after all others: their columns of L only have rows among them.
+        Unknowns that are eliminated after all others, so that their columns of L only have entries in rows of these
+        unknowns.
     """
 
     def __init__(self, L: LowerTriangle, d: Array, position: Indices, last: Indices) -> None:
@@ -52,14 +53,14 @@ class SymmetricFactors:
 
     def solve(self, F: Array) -> Array:
         """Return ``K^-1 F`` for right-hand sides (n,) or (n, k) [force]."""
-        nothing = np.zeros(self.n, bool)
+        none_given = np.zeros(self.n, bool)
         X = np.empty((self.n, *F.shape[1:]))
         X[self._place] = F
         columns = np.ascontiguousarray(X.reshape(self.n, -1).T)
         for x in columns:
             triangular_kernels.forward(*self._L, x)
             x /= self._d
-            triangular_kernels.backward(*self._L, nothing, x)
+            triangular_kernels.backward(*self._L, none_given, x)
         return np.ascontiguousarray(columns.T).reshape(X.shape)[self._place]
 
     @on_one_blas_thread
@@ -69,6 +70,7 @@ class SymmetricFactors:
         wanted, trailing = np.full(self.n, -1), np.zeros((len(at), len(at)))
         wanted[at] = np.arange(len(at))
         triangular_kernels.block(*self._L, wanted, trailing)
+        # The last block of L D^1/2 is the Cholesky factor of the Schur complement, whose inverse is that block of K^-1.
         inverse, _ = dpotri(trailing * np.sqrt(self._d[at]), lower=True)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         order = np.searchsorted(at, self._place[self._last])

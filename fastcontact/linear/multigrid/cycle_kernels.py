@@ -31,7 +31,7 @@ def _dot(a, at, x, j, length):
 
 @kernel
 def _part(share, z, i):
-    """Return ``share z[i]``; z need not be set where the share is zero."""
+    """Return ``share * z[i]``; z need not be initialised if `share` is zero."""
     return share * z[i] if share != 0.0 else share
 
 
@@ -46,9 +46,9 @@ def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows,
 
 @parallel_kernel
 def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
-    """Fill `y` (n_rows * m,) with ``share z + factor A x``; z and y may be the same array.
+    """Fill `y` (n_rows * m,) with ``share * z + factor * A @ x``; z and y may be the same array.
 
-    The `numbers` of A come as a tuple, split or not: see `split_matrix_kernels`.
+    The `numbers` are the entries of A, as a tuple of arrays, one or two: see `split_matrix_kernels`.
     """
     n = indptr.shape[0] - 1
     if n <= ALONE:
@@ -75,10 +75,11 @@ def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
 
 @parallel_kernel
 def relax(inverse, r, first, second, d, x, rows, begin):
-    """Make one step of a Chebyshev iteration: ``d = first d + second D^-1 r`` and ``x = x + d``.
+    """Make one step of a Chebyshev iteration: ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
 
-    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be set before; with
-    `begin`, x starts from zero and need not be set either.
+    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be initialised; with
+    `begin`, x starts from zero and need not be either (Saad, Iterative Methods for Sparse Linear Systems, 2003,
+    algorithm 12.1).
     """
     n = r.shape[0] // len(rows)
     if n <= ALONE:
@@ -92,8 +93,8 @@ def relax(inverse, r, first, second, d, x, rows, begin):
 def factorise_dense(A, reciprocal):
     """Replace the lower triangle of a symmetric positive semidefinite `A` (n, n) by its Cholesky factor.
 
-    `reciprocal` (n,) receives the inverses of its diagonal; unknowns without stiffness, or that depend on earlier ones, get
-    zero and are left out of solutions.
+    `reciprocal` (n,) receives the inverses of its diagonal; for unknowns without stiffness, or linearly dependent on
+    earlier ones, it is zero, and so is their solution.
     """
     n = A.shape[0]
     largest = 0.0
@@ -133,7 +134,7 @@ def _subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
 
 @parallel_kernel
 def subtract_rows(numbers, indptr, indices, data, x, y, rows):
-    """Subtract from `y` the product with `x` of a matrix of square blocks whose rows are rows `numbers` of y, all different.
+    """Subtract ``A x`` from the block rows `numbers` of `y`, all different, for a matrix A of square blocks.
 
     `indices` number the blocks of x; `data` come as a tuple, as in `multiply`.
     """
