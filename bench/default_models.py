@@ -59,7 +59,7 @@ def named(mesh: fc.Mesh, prefix: str) -> fc.Mesh:
 
 
 def stacked_blocks(element: str, widths: tuple[float, float], cells: tuple[int, int], shift: float = 0.0) -> fc.Mesh:
-    """Return a block of height 1 on another one, in the plane or in space; L_TOP and U_BOTTOM face each other."""
+    """Return a block of height 1 on another one, in the plane or in 3D; L_TOP and U_BOTTOM face each other."""
     parts = []
     for name, width, n, x, z in (("L", widths[0], cells[0], 0.0, -1.0), ("U", widths[1], cells[1], shift, 0.0)):
         high = max(2, round(n / width))

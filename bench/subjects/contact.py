@@ -1,10 +1,11 @@
 """A cold contact step and 20 steps, in units of a linear solution L of the same mesh, solver and tolerance without contact.
 
-All three include the preparation of the linear solver (hierarchy or factors) and exclude mesh and assembly; "from_assembly"
-is a cold step relative to L with assembly in both. For L the contact is removed: supports and prescribed displacements alone
-hold both bodies. ``sphere-on-block`` is solved by multigrid, ``forma04c`` by the solver that "auto" selects, both
-node-to-segment with converged geometry. The latter is also compared with a plain factorisation of the same matrix, by
-SuperLU (minimum degree of A + A.T, symmetric mode), or by CHOLMOD if that is the solver.
+A cold step starts without an earlier solution. All three include the preparation of the linear solver (hierarchy or
+factors) and exclude mesh and assembly; "from_assembly" is a cold step relative to L with assembly in both. For L the
+contact is removed: supports and prescribed displacements alone hold both bodies. ``sphere-on-block`` is solved by
+multigrid, ``forma04c`` by the solver that "auto" selects, both node-to-segment with converged geometry. The latter is
+also compared with a plain factorisation of the same matrix, by SuperLU (minimum degree of A + A.T, symmetric mode), or
+by CHOLMOD if that is the solver.
 """
 
 import time

@@ -38,7 +38,7 @@ def contact_result(
     at : Configuration
         Configuration of the last pairing of the step.
     axis : (ndarray (dim,), ndarray (dim,)), optional
-        In space, the point of first contact [length] and the normal there [-].
+        In 3D, the point of first contact [length] and the normal there [-].
     displacement : ndarray (n_points, dim), optional
         Displacement at which gaps are evaluated, by default that of `at` [length].
     """

@@ -1,9 +1,9 @@
 """Attainable accuracy of the geometry loop: it ends where further changes are round-off.
 
-How much round-off there is depends on the condition of the stiffness and of the constraints, which nothing tells beforehand;
-the last displacements show it. An iteration that still converges, however slowly, goes on in one direction: over a window
-its displacements lie as far apart as all changes together. Round-off oscillates: they lie hardly farther apart than one
-change. So does what iterative linear solutions leave.
+The size of round-off depends on the condition of the stiffness and of the constraints, which is not known beforehand;
+it shows in the last displacements. An iteration that still converges, however slowly, goes on in one direction: over a
+window of iterations its displacements lie as far apart as all changes together. Round-off oscillates: displacements lie
+hardly farther apart than one change. The errors of iterative linear solutions oscillate as well.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
 def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
     """Return the stretch of both bounds of the contact width [-].
 
-    In space it is the square root of the area ratio of the closed nodes.
+    In 3D it is the square root of the area ratio of the closed nodes.
     """
     if not contact.active.any():
         return 1.0, 1.0

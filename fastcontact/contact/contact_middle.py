@@ -5,7 +5,7 @@ planes of symmetry that it reaches: a half or quarter model has its middle on th
 which supports hold the nodes at an end of the surface normal to the plane.
 
 In the plane, coordinates are arc lengths along the surface: a ring is unrolled. The same holds in axisymmetry where the
-surface runs along the axis rather than across it, as in a press fit of cylinders. In space they are distances from the line
+surface runs along the axis rather than across it, as in a press fit of cylinders. In 3D they are distances from the line
 through the middle along the mean normal.
 
 The half-width of a contact in the plane is that of its projection along the mean normal: half the chord of a pin in its hole,
@@ -49,7 +49,7 @@ class ContactMiddle:
     ignored : tuple of int
         Coordinates along which the model represents an infinite one.
     tangent : ndarray (dim,), optional
-        Direction along which half-widths are measured, both ways [-]; without one (in axisymmetry, in space, and on a ring
+        Direction along which half-widths are measured, both ways [-]; without one (in axisymmetry, in 3D, and on a ring
         in contact all round) half-widths are measured by coordinates.
     """
 
@@ -108,7 +108,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
 
 
 def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array) -> ContactMiddle:
-    """Return the centre on a surface in space; parallel planes of symmetry at both ends represent an infinite one."""
+    """Return the centre on a surface in 3D; parallel planes of symmetry at both ends represent an infinite one."""
     centre = weight @ points
     ends: dict[int, list[float]] = {}
     for axis, nodes in planes:

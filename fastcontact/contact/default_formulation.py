@@ -36,7 +36,7 @@ def default_formulation(dim: int, options: Mapping[str, Any]) -> tuple[str, dict
         return "mortar", dict(options), "the pair has the option 'multipliers'"
     if standard_options:
         return "mortar", dict(options), f"the pair has the option '{standard_options[0]}'"
-    why = "these are right on any two surfaces and cost little with every linear solver"
+    why = "these are accurate on any two surfaces and cost little with every linear solver"
     return "mortar", {**options, "multipliers": "dual"}, why
 
 

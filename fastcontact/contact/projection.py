@@ -179,7 +179,7 @@ def along_normals(
         [length].
     side : Surface
     coordinates : ndarray (n_points, 3)
-        Of all nodes [length].
+        Coordinates of all nodes [length].
     normals : ndarray (n_facets, k, 3)
         Unit normals of the facets at their nodes, see `smooth_normals`.
     start : Closest

@@ -143,7 +143,7 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
     points : ndarray (n, 3)
         [length].
     heights : ndarray (n,)
-        Over the closest points [length].
+        Heights of the points over their closest points [length].
     terms, directions : ndarray (n_facets, m, 3)
         Coefficients of positions [length] and of normals [-].
     triangular : ndarray of bool (n_facets,)

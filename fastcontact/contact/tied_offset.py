@@ -55,7 +55,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
 
 
 def _rotations(points: Array) -> Array:
-    """Return the displacements (n_dofs, 1), in space (n_dofs, 3) of unit rotations about the middle [length]."""
+    """Return the displacements (n_dofs, 1), in 3D (n_dofs, 3) of unit rotations about the middle [length]."""
     x = points - points.mean(axis=0)
     if points.shape[1] == 2:
         return np.column_stack([-x[:, 1], x[:, 0]]).reshape(-1, 1)

@@ -31,7 +31,7 @@ class FollowingPressure:
         self._parts = [self._part(load, name, block) for name, block in facets_of(mesh, load.group).items()]
 
     def _part(self, load: Pressure, name: str, block: Numbers) -> tuple[Numbers, Array, Array, Array]:
-        """Return facets (f, n), shape values (q, n), derivatives (q, n, k), pressure times weight (f, q)."""
+        """Return facets (f, n), shape functions (q, n), derivatives (q, n, k), pressure times weight (f, q)."""
         facets, element = outward(self._mesh, load.group, name, block), elements.get(name)
         xi, weights = quadrature.product_rule(element.linear, POINTS, POINTS)
         N = element.shape(xi)

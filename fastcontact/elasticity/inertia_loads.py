@@ -32,7 +32,7 @@ class Densities:
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
         """
         density = np.full((len(rows), len(N)), np.nan)
         number = self.number[name][rows]

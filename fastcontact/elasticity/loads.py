@@ -46,7 +46,7 @@ class DensityField(Protocol):
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the densities (n_rows, n) [mass / length^3] in cells of an element, NaN where there are none.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
         """
 
 
@@ -357,7 +357,7 @@ def axes_of(caption: str, components: Mapping[str, Any], dim: int) -> dict[int, 
 
 
 def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Array, Array]:
-    """Return positions (c, q, dim), shape values (q, n), their derivatives (q, n, cell dim) and weights (q,)."""
+    """Return positions (c, q, dim), shape functions (q, n), their derivatives (q, n, cell dim) and weights (q,)."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, _POINTS, _STRAIGHT)
     N = reference.shape(xi)
@@ -365,7 +365,7 @@ def _places(mesh: Mesh, element: str, cells: Numbers) -> tuple[Array, Array, Arr
 
 
 def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
-    """Return positions (c, q, dim) [length], shape values (q, n) [-] and volumes (c, q) [length^dim] in cells.
+    """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes (c, q) [length^dim] in cells.
 
     At the quadrature points of `cells` (c, n) of int of an element; in axisymmetry over the full circle.
     """
@@ -375,7 +375,7 @@ def cell_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tu
 
 
 def facet_points(mesh: Mesh, element: str, facets: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
-    """Return positions (f, q, dim) [length], shape values (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
+    """Return positions (f, q, dim) [length], shape functions (q, n) [-] and area vectors (f, q, dim) [length^2] of facets.
 
     At the quadrature points of `facets` (f, n) of int of an element; in axisymmetry over the full circle.
     """
@@ -403,6 +403,6 @@ def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:
     """Add the integrals of a density times the shape functions to nodal `forces` (n_points, dim) [force], in place.
 
-    `cells` (c, n) of int, shape values `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
+    `cells` (c, n) of int, shape functions `N` (q, n) [-], and `density` (c, q, dim) [force], times the volume of each point.
     """
     np.add.at(forces, cells, np.einsum("qn,cqd->cnd", N, density))

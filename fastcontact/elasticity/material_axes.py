@@ -82,7 +82,7 @@ class CylindricalAxes:
 def checked_axes(axes: Any) -> Axes:
     """Return axes given by vectors as three orthonormal ones, and functions unchanged.
 
-    Raises ModelError unless they are one vector in the plane, or two or three orthogonal ones in space.
+    Raises ModelError unless they are one vector in the plane, or two or three orthogonal ones in 3D.
     """
     if axes is None or callable(axes):
         return axes  # type: ignore[no-any-return]

@@ -130,7 +130,7 @@ class Material:
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
         """Return the constants in cells of an element, varying ones as arrays (n_rows * n,) [unit of the constant].
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
         """
 
         def at(value: Any) -> Any:

@@ -255,11 +255,11 @@ def check_law(law: Material, strain: str) -> None:
         wanted = (
             f"Model(..., strain='{law.strain}')"
             if law.strain == "finite"
-            else "strain='small', the default: plasticity of finite strains is not there"
+            else "strain='small', the default: finite-strain plasticity is not available"
         )
         raise ModelError(f"{type(law).__name__} is for {law.strain} strains: take {wanted}")
     if law.incompatible_modes and (strain == "finite" or isinstance(law, NonlinearElastic)):
-        raise ModelError("incompatible modes are there for linear bodies alone: leave incompatible_modes out")
+        raise ModelError("incompatible modes are available for linear bodies only: leave incompatible_modes out")
     if strain == "finite" and not isinstance(law, NonlinearElastic) and law.averaged:
         example = "NeoHookean(E=..., nu=...)" if isinstance(law, LinearElastic) else "a hyperelastic law"
         raise ModelError(

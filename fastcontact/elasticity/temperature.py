@@ -37,7 +37,7 @@ class Temperature:
     reference : float
         Temperature without thermal strain [temperature].
     ramp : tuple, optional
-        History of the rise over the reference.
+        Ramp of the temperature rise over the reference.
     times : tuple of float
         Instants of the history to which it belongs, if any.
     place : int

@@ -91,7 +91,7 @@ class Cells:
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
-        """Yield element, cells and shape values (n, n_nodes) [-] of their middles, then of their quadrature points."""
+        """Yield element, cells and shape functions (n, n_nodes) [-] at their middles, then at their quadrature points."""
         for name, rows in self.rows.items():
             yield name, rows, middle(name)
         for name, rows in self.rows.items():
@@ -181,7 +181,7 @@ class Varying:
     def at(self, name: str, rows: Indices, N: Array) -> Array:
         """Return the numbers (n_rows * n,) [unit of the constant] at points of cells of an element, cell by cell.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape values of the points.
+        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
         """
         assert self.cells is not None
         mesh = self.cells.mesh
@@ -230,7 +230,7 @@ def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
     """Return positions (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int.
 
-    `N` (n, n_nodes) [-] are the shape values.
+    `N` (n, n_nodes) [-] are the shape functions.
     """
     return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
 

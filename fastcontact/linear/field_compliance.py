@@ -25,7 +25,9 @@ from fastcontact.arrays import Array, Indices, Mask
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """See the module; exact constraints are represented by fields of one point without springs.
+    """Equations for the values of multiplier fields, and springs of their points, in the notation of the module.
+
+    Exact constraints are represented by fields of one point without springs.
 
     Attributes
     ----------

@@ -196,7 +196,7 @@ def _null_space(A: Array) -> Array:
 def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
     """Return rows and gaps at u = 0 that must stay >= 0 without slip: gaps, and edges of the friction cone.
 
-    A contact force lies in the cone of the rows: normal, with friction in the plane ``n + mu t`` and ``n - mu t``, in space
+    A contact force lies in the cone of the rows: normal, with friction in the plane ``n + mu t`` and ``n - mu t``, in 3D
     the pyramid with EDGES circumscribed to Coulomb's cone. Equations act in both directions.
     """
     rows, gap0 = _edges(constraints)

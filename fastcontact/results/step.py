@@ -287,7 +287,7 @@ class StepResult:
         Forces of supports, multi-point constraints and springs to the ground, zero elsewhere; axisymmetric: over the
         full circle [force].
     contact : dict of str to ContactResult
-        By contact pair.
+        Contact results by name of the pair.
     iterations : dict
         ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). With
         floating bodies, ``regularised``: their springs and the forces in them. If round-off prevents the contact

@@ -185,7 +185,9 @@ def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
     model = problem.model
     supports, along = _prescribing(model, parameter)
     if any(support.rotation is not None for support in supports):
-        raise ModelError(f"results are not linear in the rotation of '{parameter[1]}': no sensitivity by it is there")
+        raise ModelError(
+            f"results are not linear in the rotation of '{parameter[1]}': its sensitivity is not available"
+        )
     values = np.zeros(problem.shape)
     for support in supports:
         nodes = model.mesh.points_of(support.group)

@@ -65,7 +65,7 @@ class Assembled:
     index : dict of str to dict of int to int
         Point number by instance, empty for what belongs to no part, and node number.
     elements : dict of str to dict of int to Element
-        By instance and element number.
+        Elements by instance and element number.
     """
 
     content: Content

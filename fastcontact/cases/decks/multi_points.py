@@ -21,7 +21,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
     if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
-        raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in space")
+        raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in 3D")
     where = deck_mesh.made.points[nodes]
     if constraint.kind == "MEANROT":
         return [_mean_rotation(constraint, nodes, where)]

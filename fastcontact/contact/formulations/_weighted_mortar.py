@@ -373,7 +373,7 @@ class WeightedPressures(NodalField):
     tested : ndarray (m,)
         Integrals of the positive functions over the whole secondary side [area].
     nodal_areas : ndarray (m,)
-        The same of the shape functions [area].
+        Integrals of the shape functions over the whole secondary side [area].
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
         Kinds of quadratic facets: number of corners, coefficients of positive functions in shape functions, nodes.
     held : ndarray of bool (m,)

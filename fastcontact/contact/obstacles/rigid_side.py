@@ -75,7 +75,7 @@ class RigidSide:
         A point now at `positions` (n, dim) [length] and before at `before` has slid over the surface by its own displacement
         minus that of the obstacle and minus this result. The slip is the change of position on the obstacle, in the frame of
         half the rotation and of the length of the arc: zero where a point sticks, along the circle where it is at rest
-        in space.
+        in 3D.
         """
         angle = now.angle - then.angle
         if self.rotation is None or angle == 0.0:

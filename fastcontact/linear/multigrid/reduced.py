@@ -20,7 +20,7 @@ from fastcontact.linear.springs import Springs
 
 
 class Reduced:
-    """See the module.
+    """Operator of the iteration: K and springs under eliminated constraints.
 
     Parameters
     ----------

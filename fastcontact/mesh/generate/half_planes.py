@@ -175,7 +175,7 @@ def crowned_blocks(
         Distance from the origin up to which edges have their smallest length. Choose it a little wider than the contact
         [length].
     contact_size : float
-        That length [length].
+        Smallest length of edges [length].
     growth : float
         Ratio of the lengths of adjacent edges beyond, more than 1.
 

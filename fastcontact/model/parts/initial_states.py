@@ -166,7 +166,7 @@ class ModelInitialStates(ModelLoads):
         axes : sequence or callable, optional
             Axes of the components, as in `Orthotropic`: unit vectors in rows (3, 3) [-], or a function of position.
         ramp : Ramp or iterable of (float, float), optional
-            History; by default the stress acts in full from the first step.
+            Ramp of the stress, which by default acts in full from the first step.
 
         Examples
         --------
@@ -200,7 +200,7 @@ class ModelInitialStates(ModelLoads):
         axes : sequence or callable, optional
             Axes of the components: unit vectors in rows (3, 3) [-], or a function of position.
         ramp : Ramp or iterable of (float, float), optional
-            History; by default the strain acts in full from the first step.
+            Ramp of the strain, which by default acts in full from the first step.
 
         Examples
         --------

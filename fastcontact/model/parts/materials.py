@@ -62,7 +62,7 @@ class ModelMaterials(ModelBase):
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
             named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
-            raise ModelError(f"{feature} there for linear elasticity alone, not with {named}")
+            raise ModelError(f"{feature} available for linear elasticity only, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
         """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element type the row of each solid cell.

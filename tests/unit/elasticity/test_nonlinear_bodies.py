@@ -141,7 +141,7 @@ def test_initial_states_are_refused() -> None:
     model = model_with(PLASTIC)
     model.fix("BOTTOM", "xy")
     model.add_initial_stress(xx=20.0)
-    with pytest.raises(fc.ModelError, match="initial stresses and strains are there for linear elasticity alone"):
+    with pytest.raises(fc.ModelError, match="initial stresses and strains are available for linear elasticity only"):
         fc.solve(model, 1)
 
 
