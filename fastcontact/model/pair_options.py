@@ -225,12 +225,12 @@ def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
 
 
 def friction_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the history of the coefficient of friction of contact pair `name`, None if it is constant."""
+    """Return the ramp of the coefficient of friction of contact pair `name`, None if it is constant."""
     return table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
 
 
 def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the history of the clearance of contact pair `name`, None if it is constant."""
+    """Return the ramp of the clearance of contact pair `name`, None if it is constant."""
     return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
 
 

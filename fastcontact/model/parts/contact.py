@@ -78,8 +78,8 @@ class ModelContact(ModelConnections):
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,): positive for a clearance, negative for an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the opposite positions. ``clearance_ramp``: their
-              history, as pairs (instant, multiplier), by default constant. ``friction_ramp``: history of the coefficient of
-              friction, as multipliers.
+              ramp, pairs (instant, multiplier), by default constant. ``friction_ramp``: the ramp of the coefficient of
+              friction.
             - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that straight facets of curved
               sides approximate; by default with mortar alone.
             - ``excluded``: groups whose nodes carry no contact. Their tributary area carries no pressure (node-to-segment,
