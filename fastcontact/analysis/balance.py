@@ -18,7 +18,7 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
 # Forces are significant above this multiple of the round-off of other rows.
-THERE = 100.0
+SIGNIFICANT = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +141,7 @@ def _round_off(
     large displacements must not hide the residual of soft ones.
     """
     slack = SLACK * largest_force
-    noise = max(slack, THERE * SUM_ROUND_OFF * largest(row_sums))
+    noise = max(slack, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
     for part in map(np.abs, forces):
         if ((part > noise) & (part * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
             return slack, noise

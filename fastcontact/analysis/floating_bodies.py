@@ -38,7 +38,8 @@ SLACK = ROUND_OFF
 # Springs whose forces do not decrease any more count as slack below this fraction.
 STAGNANT = 1e-8
 MAX_POSITIONS = 100
-# Positions before their changes are extrapolated: parts far softer than the springs, such as a peeling layer, creep.
+# Number of positions before their changes are extrapolated: parts far softer than the springs, such as a peeling layer,
+# creep.
 PLAIN = 1
 # Weight of displacements in the choice of springs where springs were before: a rubber block pressed on another by multigrid
 # takes 142 iterations in two steps, 157 without.

@@ -46,8 +46,9 @@ PATIENCE, FALL = 12, 0.5
 HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
-# Relative error of the displacement at which iterations end. Changes that may be round-off (`scatter`), and do not decrease
-# to the fraction STAYS of the previous one, are: it is this large in slender bodies.
+# Relative error of the displacement at which iterations end. A change that is small enough to be round-off
+# (`scatter.DISPLACEMENT`, reached in slender bodies) counts as such if it exceeds the fraction STAYS of the previous
+# one.
 UNCHANGED, STAYS = 1e-10, 0.3
 
 

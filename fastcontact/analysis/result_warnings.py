@@ -30,7 +30,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Equivalent strain, and wear depth over the size of the model, beyond which linear kinematics give a warning.
 STRAIN = 0.1
-# Rotation [radian] beyond which they are: half its square is the strain that they leave out.
+# Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
 # Largest factor on the number of steps that is recommended; a larger one indicates a wrong coefficient.
 MANY_STEPS = 1000

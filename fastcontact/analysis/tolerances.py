@@ -9,9 +9,11 @@ from fastcontact.linear.protocol import LinearSolver
 # Relative residual of the first solution of a step by an iterative solver, and of later ones relative to the last change of
 # the displacement and to the last residual: more accuracy than that of the pairing is useless.
 FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
-# With friction the residual falls at least to this part of the last one: loose solutions may be what keeps that of its law.
+# With friction the tolerance falls at least to this fraction of the last one: inaccurate linear solutions may be what
+# keeps the residual of the friction law from decreasing.
 LEAST_FALL = 0.2
-# Newton iterations with friction as long as the residual is larger than the last one: errors reverse slips.
+# Largest number of Newton iterations with friction while linear solutions are still inexact: their errors reverse
+# slips.
 INEXACT_NEWTON_STEPS = 3
 
 

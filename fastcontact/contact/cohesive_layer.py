@@ -17,7 +17,8 @@ from fastcontact.contact.cohesion import Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
-# Slope of the line where the traction falls, by the stiffness of the layer: with less a beam glued by nodes does not settle.
+# Stiffness of the linearised layer where the traction falls, over that of the intact layer: with less, the iteration
+# for a beam glued by nodes does not converge.
 LEVEL = 1e-2
 
 

@@ -25,9 +25,11 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# A force independent of the gap is represented with this small slope: it vanishes at this multiple of the length of the side.
+# A force that does not depend on the gap is represented by a line of small slope, which vanishes at a gap of this
+# multiple of the length of the side.
 FAR = 1e6
-# Mean gaps beside the edge of the contact, of which places between nodes are closed, may be so much below zero, in facets.
+# Mean gaps next to the edge of the contact, where some places between nodes are closed, may be negative by up to this
+# fraction of the facet length.
 EDGE = 0.01
 
 

@@ -30,8 +30,9 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Columns of a fit are scaled by this with each degree, and its squares damped by this part of the least column: where nodes
-# leave terms undetermined, as on a strip one facet wide, those of low degree take all.
+# Factor on the columns of a fit for each degree of the polynomial, and damping of its least squares relative to the
+# smallest column: where nodes leave terms undetermined, as on a strip one facet wide, those of low degree are
+# preferred.
 LOWER, DAMPING = 0.1, 1e-5
 # Circles, spheres and cylinders are matched to (L / R)^(2 PASSES).
 PASSES = 3

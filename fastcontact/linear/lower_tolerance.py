@@ -9,7 +9,7 @@ from typing import Any
 from fastcontact.linear.protocol import LinearSolver
 
 log = logging.getLogger("fastcontact")
-# Target of the residual over its bound, and the smallest relative residual that round-off allows.
+# Target of the residual relative to its admissible value, and the smallest relative residual that round-off allows.
 LEFT, LEAST = 0.1, 1e-15
 
 

@@ -28,8 +28,8 @@ ACCEPTABLE = 1e-9
 # Edges of the cones in three dimensions, and the largest complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
 # Linearly dependent slips get this compliance, relative to that of the gaps: at nodes of several sides, or held by
-# supports on one side, tangential forces are undetermined. So do all slips of problems with a pivot below DEPENDENT.
-# Forces that make slips yield by more than JAMMED of the gaps are not balanced: the bodies jam.
+# supports on one side, tangential forces are undetermined. If a pivot is below DEPENDENT, all slips get it. If slips
+# yield to it by more than the fraction JAMMED of the gaps, forces are not balanced: the bodies jam.
 JAMMED = 1e-6
 YIELDING, DEPENDENT = (1e-11, 1e-9), 1e-8
 # Edges are degenerate for pivoting: their problem is shifted by this fraction.

@@ -35,8 +35,8 @@ STIFFEST = 100.0
 # are softer still, by its square root; otherwise Newton's method reverses a few slips repeatedly (nu = 0.4999, 161 442
 # unknowns: 588 iterations without convergence; nu = 0.499 was not affected).
 SOFTER = 0.2
-# Tolerance of the residual of the friction law over that of the linear solutions; and the tolerance after PATIENCE steps:
-# contact forces that are a small fraction of all forces are no more accurate.
+# Tolerance of the residual of the friction law over that of the linear solutions, and the looser one after PATIENCE
+# steps: contact forces that are a small fraction of all forces cannot be more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
 
 

@@ -32,8 +32,8 @@ SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
 COVERED = 0.02
 # Fractions above this multiple of the largest one count as equal to it: on curved facets they differ by a few percent.
 EQUAL = 0.9
-# Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond this multiple of one, and where
-# their integral falls below this fraction of their weight, they extrapolate more than they test.
+# Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond the first number, and where their
+# integral falls below the second fraction of their weight, they extrapolate more than they test.
 MOST, LEAST = 20.0, 0.2
 
 

@@ -34,7 +34,8 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# In 3D a body that slides leaves edges and planes of symmetry node by node; a node that is dropped earlier comes and goes.
+# In 3D a body that slides leaves edges and planes of symmetry node by node, each at this overhang in facet lengths;
+# nodes that are dropped earlier alternate between in and out.
 LEAVING = 0.5
 # Sine of the angle to a plane of symmetry above which a surface has a corner there.
 LEANING = 0.38

@@ -15,7 +15,8 @@ from fastcontact.arrays import Array
 
 # Capacity of the stack of boxes still to open; a squared distance that no facet exceeds.
 DEPTH, FAR = 64, 1e300
-# Squared distances to boxes and facets are rounded: from far away by more than the size of the places that are the same.
+# Factor for the round-off of squared distances to boxes and facets, which from far away exceeds the distances within
+# which places count as the same.
 ROUNDING = 1.0 + 1e-14
 
 

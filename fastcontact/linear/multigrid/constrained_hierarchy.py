@@ -27,7 +27,8 @@ from fastcontact.linear.springs import Springs
 # Largest eigenvalue of the finest level, over its diagonal, above which the spectrum is wide; 3 to 4 on well-shaped
 # hexahedra.
 WIDE = 6.0
-# Nodes stiffened by equations by this factor need more than the smoother, its bounds, and the coarser levels of K.
+# For nodes that equations stiffen by more than this factor, the smoother, its bounds, and the coarser levels of K do
+# not suffice.
 MUCH = 4.0
 
 

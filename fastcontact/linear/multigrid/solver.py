@@ -35,7 +35,7 @@ from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
 MAX_ITERATIONS = 1000
-# Columns of K^-1, each a solution, up to which they cost less than factors do.
+# Number of columns of K^-1, one solution each, up to which they cost less than a factorisation.
 MOST_COLUMNS = 300
 # Iterations between two calls of a monitor.
 WATCH_EVERY = 2
@@ -50,7 +50,8 @@ CHANGE = 15
 # doubled, up to LONGEST_WARM, each time that the next start is not better by STOOD.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
-# Where the smoother amplifies something, its bound of the spectrum is raised by this factor, at most so often.
+# If the smoother amplifies a vector, its bound of the spectrum is raised by the first number, at most as often as the
+# second.
 RAISE, RAISES = 1.3, 4
 
 

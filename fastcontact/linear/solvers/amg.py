@@ -38,9 +38,9 @@ from fastcontact.round_off import ROUND_OFF
 log = logging.getLogger("fastcontact")
 # Number of unknowns up to which a factorisation replaces multigrid.
 FACTORS_UP_TO = AFFORDABLE
-# Work in one load step, in iterations, from which on factors are cheaper for certain: so much, and so much for each unknown,
-# by the number of components of a displacement. In 3D a factorisation and a step by it cost 300 and 0.04 where two bodies
-# touch, three times as much in stacks with friction (measured, see bench/README.md).
+# Work in one load step, in iterations, above which a factorisation is certainly cheaper: a constant, and a number for
+# each unknown, by the number of components per node. In 3D a factorisation and a step by it cost 300 and 0.04 where two
+# bodies touch, three times as much in stacks with friction (measured, see bench/README.md).
 COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
 
 
