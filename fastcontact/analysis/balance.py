@@ -81,7 +81,7 @@ class Balance:
             return "use the direct solver"
         more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= LOOSEST else ""
         return (
-            "round-off leaves no less where moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
+            "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
             f"in the place of a stiff body{more}"
         )
 

@@ -46,9 +46,9 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     """Return the message for an active set that did not converge; `nodes` are those nearest to the constraints."""
     if isinstance(solution, FrictionalEquilibrium):
         return (
-            f"contact with friction did not settle in {solution.iterations} Newton iterations from several starts: its "
-            f"equations are {solution.residual:.1e} of the largest force off. With the coefficient of friction "
-            f"{constraints.coefficients.max():g} there may be no solution to find: use more load steps or less friction"
+            f"contact with friction did not settle in {solution.iterations} Newton iterations from several starts: the "
+            f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
+            f"{constraints.coefficients.max():g} there may be no solution: use more load steps or less friction"
         )
     count = int((solution.active != solution.wanted).sum())
     many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"

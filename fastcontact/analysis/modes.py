@@ -133,11 +133,11 @@ def _diameters(
             )
         return None
     if sectors is None:
-        raise ModelError("nodal diameters need a sector of a ring: Model.add_cyclic_symmetry tells its ends")
+        raise ModelError("nodal diameters need a sector of a ring: name its ends by Model.add_cyclic_symmetry")
     if model.force_driven.pairs:
         raise ModelError(
-            f"obstacle '{model.force_driven.pairs[0].name}' that a force drives is no part of a sector, so modes with "
-            "nodal diameters cannot have it: prescribe its motion"
+            f"obstacle '{model.force_driven.pairs[0].name}' is driven by a force but not part of a sector, so that "
+            "modes with nodal diameters cannot include it: prescribe its motion"
         )
     return sectors.diameters(nodal_diameters)
 

@@ -41,8 +41,8 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
     state = step.restart
     if state is None or state.get("format") != FORMAT:
         raise ModelError(
-            f"step {step.index} does not hold what it takes to go on from it: resume from the last step that solve "
-            "returned, or from a result file of this version of fastcontact; or start anew"
+            f"step {step.index} does not hold the data to resume from it: take the last step that solve "
+            "returned, or one from a result file of this version of fastcontact; or start anew"
         )
     with _whole(step):
         then, end = state["case"], step.load_factor

@@ -60,7 +60,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
     along = np.einsum("id,id->i", outward, normal)[paired]
     if len(along) and (along >= 0).all():
         raise ContactError(
-            f"the rigid obstacle of contact '{name}' looks the same way as '{secondary.group}', so that they cannot "
+            f"the rigid obstacle of contact '{name}' faces in the same direction as '{secondary.group}', so that they cannot "
             "touch: turn its normal or its facets round, or name another face of the body"
         )
 

@@ -150,7 +150,9 @@ class Material:
         """Return the cells of the material; ModelError if they are not known."""
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
-            raise ModelError("constants of the material depend on the position: ask the one in `materials` of a model")
+            raise ModelError(
+                "constants of the material depend on the position: take the material from the `materials` of a model"
+            )
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
@@ -254,9 +256,7 @@ class Material:
         """Return the axes (n, 3, 3) at `points` (n, dim), those of cells from `constants` [-]."""
         axes = constants.axes if constants and varying(self.axes) else self.axes
         if varying(axes):
-            raise ModelError(
-                "axes by cell are known where cells are: give the `constants_at` of the material of a model"
-            )
+            raise ModelError("axes by cell need to know the cells: give the `constants_at` of the material of a model")
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:

@@ -78,8 +78,8 @@ class FixedTemperature(TemporaryHeat):
         super().check(mesh, kinematics)
         if self.begins > -np.inf and self.ramp is None:
             raise ModelError(
-                f"{self.name} begins at {self.begins:g} without a ramp: give it one, to the next point of which it goes "
-                "from what it finds"
+                f"{self.name} begins at {self.begins:g} without a ramp: give it one; it starts from the temperature "
+                "found then, and goes on to the next point of the ramp"
             )
 
     def history(self) -> tuple[Table | None, Table]:

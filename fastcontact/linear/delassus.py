@@ -49,9 +49,9 @@ def check_rows(count: int, most: int | None = None) -> None:
     most = MOST_ROWS if most is None else most
     if count > most:
         raise ContactError(
-            f"the contact needs the full compliance of {count} constraints, {8e-9 * count**2:.1f} GB that are factorised "
-            f"again and again (at most {most} are), by the direct solver, or since they cannot be eliminated: "
-            f'use {CHEAP}, with linear_solver="amg", or a coarser or smaller secondary side'
+            f"the contact needs the full compliance of {count} constraints, a matrix of {8e-9 * count**2:.1f} GB that is "
+            f"factorised repeatedly (at most {most} constraints are accepted), since the solver is direct or since they "
+            f'cannot be eliminated: use {CHEAP}, with linear_solver="amg", or a coarser or smaller secondary side'
         )
 
 

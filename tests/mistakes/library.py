@@ -419,7 +419,7 @@ CONTACT = [
     Mistake("a penetration larger than an element", lambda: solved(blocks(changed(shift=-2.0))), fc.ContactError,
             r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
     Mistake("an obstacle that is inside out", lambda: solved(with_obstacle(1.0, (0.0, 1.0))), fc.ContactError,
-            r"the rigid obstacle of contact 'plane' looks the same way as 'TOP', so that they cannot touch: turn its normal or its facets round, or name another face of the body"),
+            r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: turn its normal or its facets round, or name another face of the body"),
     Mistake("an obstacle deep in the body", lambda: solved(with_obstacle(0.2)), fc.ContactError,
             r"contact 'plane' begins with a penetration of 0\.8 at point \d+ \[.*\], more than the length of the element there \(0\.5\): move a body apart, turn a surface that is inside out, or give an interference that is meant as clearance"),
     Mistake("a contact that is never reached", lambda: solved(blocks(changed(shift=1.0))), fc.FastcontactWarning,

@@ -49,7 +49,7 @@ def numbers(kind):
         ),
         (lambda: fc.recovery.von_mises_signed(1.0), r"not as in \(\)"),
         (lambda: fc.recovery.equivalent_strain(np.zeros((3, 5))), r"not as in \(3, 5\)"),
-        (lambda: AXES_BY_CELL.moduli_at(np.ones((4, 2)), "plane_strain"), "axes by cell are known where cells are"),
+        (lambda: AXES_BY_CELL.moduli_at(np.ones((4, 2)), "plane_strain"), "axes by cell need to know the cells"),
         (lambda: model().load_vector(5), r"argument load of Model\.load_vector"),
         (lambda: fc.normal_stress(None, 1.0), "argument contact of normal_stress"),
         (lambda: fc.StepResult(1, 1.0, *[np.zeros(1)] * 5, contact=np.zeros), "contact of a StepResult must be a dict"),

@@ -130,7 +130,7 @@ class Adjoint:
         s, info = gmres(LinearOperator((n, n), product), first, rtol=LEFT, atol=0.0, restart=SOLUTIONS, maxiter=1)
         if info:
             raise ConvergenceError(
-                f"the adjoint equations of the moving contact geometry are not solved after {self.solutions} solutions: "
+                f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "
                 "keep the pairing (Criteria(keep_pairing=True)), or take differences of two solutions"
             )
         return self._solve_transposed(right - s, multiplier)

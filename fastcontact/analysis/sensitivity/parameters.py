@@ -47,7 +47,7 @@ def check_parameter(model: Model, parameter: Label) -> None:
     kind = str(parameter[0]) if parameter else ""
     if kind == "friction":
         raise ModelError(
-            "results have no sensitivity by friction: where all sticks they do not depend on it, and where it slides they "
+            "results have no sensitivity to friction: if all nodes stick they do not depend on it, and if nodes slip they "
             "depend on all load steps. Take differences of two solutions"
         )
     if kind not in FORMS:

@@ -127,7 +127,7 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: L
         raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")
     if contact.problem.model.periodic_interfaces:
         raise ModelError(
-            "pressures of a part that repeats itself have no sensitivities: ask for a force or a displacement"
+            "pressures of periodic and cyclic models have no sensitivities: ask for a force or a displacement"
         )
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, none.multiplier

@@ -70,13 +70,13 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
             )
     if stage_of(model, step) is not model:
         raise ModelError(
-            "pretension sections or temporary supports hold what earlier load steps have found: sensitivities are those of "
-            "one step. Ask for them in the last step before the lock, or take differences of two solutions"
+            "pretension sections or temporary supports hold positions that earlier load steps have found: sensitivities are "
+            "those of one step. Ask for them in the last step before the lock, or take differences of two solutions"
         )
     if criteria.geometry_updates is not None and not criteria.keep_pairing:
         raise ModelError(
-            f"after a fixed number of geometry updates ({criteria.geometry_updates}) contact has not settled where the "
-            "bodies stand: leave out geometry_updates, or keep the pairing (keep_pairing)"
+            f"after a fixed number of geometry updates ({criteria.geometry_updates}) contact detection has not "
+            "converged: leave out geometry_updates, or keep the pairing (keep_pairing)"
         )
 
 

@@ -186,7 +186,7 @@ def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Ind
     pair = sorted((int(one[bad]), int(other[bad])), key=lambda facet: (size[component[facet]], facet))
     numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
-        f"{_described(blocks, pair[0])} of the rigid surface '{group}' looks to the other side than its neighbour facet "
+        f"{_described(blocks, pair[0])} of the rigid surface '{group}' has the opposite orientation to its neighbour facet "
         f"{numbers[pair[1]]}: turn it, so that all normals point out of the obstacle"
     )
 

@@ -318,7 +318,7 @@ NO_PARAMETERS = [
     (("g", 0), "unknown parameter 'g'"),
     (("G", 0, "12"), "the material 0 has no G, or one that varies: there is no sensitivity to it"),
     (("E", 0, "1"), "unknown component of E '1': there is none here"),
-    (("friction", "c"), "no sensitivity by friction: where all sticks"),
+    (("friction", "c"), "no sensitivity to friction: if all nodes stick"),
     (("speed", "UPPER"), "unknown group with a centrifugal force 'UPPER': there is none here"),
     (("temperature", "UPPER"), "unknown group with a temperature 'UPPER'"),
     (("pretension", "bolt"), "unknown pretension 'bolt'"),
@@ -471,6 +471,6 @@ def test_equations_that_are_not_solved_are_told(monkeypatch):
 
     monkeypatch.setattr(adjoint, "SOLUTIONS", 2)
     with pytest.raises(
-        fc.ConvergenceError, match="adjoint equations of the moving contact geometry are not solved after"
+        fc.ConvergenceError, match="adjoint equations of the moving contact geometry do not converge in"
     ):
         asked(two_blocks()())

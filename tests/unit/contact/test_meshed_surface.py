@@ -164,12 +164,14 @@ def strip(turned=()):
 
 
 def test_an_inconsistent_orientation_names_the_facet_to_turn():
-    with pytest.raises(fc.ContactError, match=r"facet 4 \(line2 near \(4.5, 0\)\) .*'STRIP' looks to the other side"):
+    with pytest.raises(
+        fc.ContactError, match=r"facet 4 \(line2 near \(4.5, 0\)\) .*'STRIP' has the opposite orientation"
+    ):
         MeshedSurface(strip(turned=(4,)), "STRIP")
     plate = shell(box((1.0, 1.0, 1.0), (2, 2, 2), "tet4"))
     cells = plate.cells["tri3"].copy()
     cells[7] = cells[7][[0, 2, 1]]
-    with pytest.raises(fc.ContactError, match=r"facet 7 \(tri3 near .* looks to the other side .*turn it"):
+    with pytest.raises(fc.ContactError, match=r"facet 7 \(tri3 near .* has the opposite orientation .*turn it"):
         MeshedSurface(plate.replace(cells={"tri3": cells}), "SHELL")
 
 

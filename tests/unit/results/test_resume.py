@@ -387,5 +387,5 @@ def test_a_damaged_state_is_no_state(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["fastcontact/restart0"][50] ^= 255
     assert open_results(path)[-1].restart is None
-    with pytest.raises(ModelError, match="does not hold what it takes to go on from it"):
+    with pytest.raises(ModelError, match="does not hold the data to resume from it"):
         resumed(path, fc.linear_ramp(2))
