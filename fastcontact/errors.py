@@ -21,7 +21,7 @@ def printable(text: str) -> str:
 
 
 class FastcontactError(Exception):
-    """Base class of every error that fastcontact raises on purpose; its message is one line."""
+    """Base class of every error that fastcontact raises deliberately; its message is one line."""
 
     def __str__(self) -> str:
         # Names and values from files may contain anything: line ends, terminal control codes, thousands of characters.

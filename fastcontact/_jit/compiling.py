@@ -1,4 +1,4 @@
-"""Notification of the user that kernels are being compiled, which may take a minute."""
+"""Tell the user that kernels are being compiled, which may take a minute."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ HELD = 2.0
 
 
 def interpenetration(problem: Problem, state: State, last: StepResult) -> list[str]:
-    """Return warnings about bodies inside of each other, and of rigid obstacles, at the end of the `last` step."""
+    """Return warnings about bodies inside each other or inside rigid obstacles, at the end of the `last` step."""
     mesh, u = problem.model.mesh, problem.displacement(state.u)
     joined = _joined(problem)
     inside = list(depths(mesh, problem.model.kinematics, mesh.points + u))

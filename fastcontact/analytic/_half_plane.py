@@ -1,8 +1,8 @@
-"""Elastic half plane under Hertz's pressure: closed-form stress and displacement.
+"""Elastic half-plane under Hertz's pressure: closed-form stress and displacement.
 
-The half plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root w =
+The half-plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root w =
 sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k) (McEwen 1949;
-Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half plane there is no point at infinity
+Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half-plane there is no point at infinity
 to measure from. Plane stress: the same with nu/(1 + nu) for nu and the same shear modulus.
 """
 

@@ -1,6 +1,6 @@
-"""Elastic half space under Hertz's axisymmetric pressure: closed-form stress and displacement; von Mises stress.
+"""Elastic half-space under Hertz's axisymmetric pressure: closed-form stress and displacement; von Mises stress.
 
-The half space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal coordinates s >=
+The half-space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal coordinates s >=
 0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational function of s and t and the
 Legendre functions of the second kind of i s, without cancellation near the axis or the surface. Huber 1904 gives the
 stresses in other coordinates; the displacement follows from Boussinesq's potentials (Johnson 1985, section 3.1).

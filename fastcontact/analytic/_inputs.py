@@ -88,7 +88,7 @@ def one_of(name: str, value: str, known: tuple[str, ...]) -> str:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Elastic constants of two bodies; a second body with `E2` None is rigid.
+    """Elastic constants of two bodies; the second is rigid if `E2` is None.
 
     Attributes
     ----------

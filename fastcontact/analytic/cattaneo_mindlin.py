@@ -208,6 +208,10 @@ def cattaneo_mindlin_line(
     tangential_force : float
         Per unit length, between 0 and f times the normal force, beyond which the bodies slide [force/length].
 
+    Returns
+    -------
+    CattaneoMindlinLine
+
     Examples
     --------
     >>> from fastcontact import analytic
@@ -249,6 +253,10 @@ def cattaneo_mindlin_sphere(
         Coulomb's coefficient f > 0.
     tangential_force : float
         Between 0 and f times the normal force, beyond which the bodies slide [force].
+
+    Returns
+    -------
+    CattaneoMindlinSphere
 
     Examples
     --------
@@ -297,9 +305,13 @@ def block_sliding(
     Parameters
     ----------
     E, nu, friction : float
-        Material [pressure], [-], and Coulomb's coefficient f >= 0.
+        Young's modulus [pressure] and Poisson's ratio [-], Coulomb's coefficient f >= 0 [-].
     height, pressure, displacement : float
         Height [length], uniform contact pressure [pressure] and sideways displacement of the top, >= 0 [length].
+
+    Returns
+    -------
+    BlockSliding
 
     Examples
     --------

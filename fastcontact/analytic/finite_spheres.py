@@ -1,6 +1,6 @@
 """Two equal elastic half-spheres pressed together as finite bodies: mesh-converged reference values.
 
-Hertz's theory takes each body for a half space with a parabolic surface. Real half spheres differ from that
+Hertz's theory takes each body for a half-space with a parabolic surface. Real half spheres differ from that
 by terms of the order a/R: at an approach of 8 % of the radius the force is 12.6 % above Hertz's.
 """
 
@@ -101,6 +101,10 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
         Of the two flat faces, between 4e-5 R and 0.08 R [length].
     R, E, nu : float
         Radius [length] and Young's modulus [pressure], by default those of FORMA04 in mm and MPa; nu is 0.3 [-].
+
+    Returns
+    -------
+    FiniteHalfSpheres
 
     Examples
     --------

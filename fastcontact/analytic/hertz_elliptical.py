@@ -137,6 +137,10 @@ def hertz_elliptical(
     force, approach, pressure_max : float
         Exactly one of them: force [force], approach [length] or largest pressure [pressure].
 
+    Returns
+    -------
+    HertzElliptical
+
     Examples
     --------
     Crossed cylinders of one radius touch as a sphere of that radius touches a plane:

@@ -18,7 +18,7 @@ from fastcontact.arrays import Array
 class HertzLine:
     """Frictionless contact of two parallel cylinders, formulas as in Johnson (1985), section 4.2(c).
 
-    Positions are x across the contact and y along the outward normal of the body: each body is the half plane y <= 0,
+    Positions are x across the contact and y along the outward normal of the body: each body is the half-plane y <= 0,
     and a point above it raises ModelError. Stress components are xx, yy, zz, xy, positive in tension; zz depends on
     Poisson's ratio, which is that of the first body unless `nu` is given. There is no `approach`: in the plane it
     depends on the shape and the supports of the bodies far from the contact.
@@ -27,8 +27,7 @@ class HertzLine:
     ----------
     bodies : Bodies
         Elastic constants.
-    kinematics : str
-        "plane_strain" or "plane_stress".
+    kinematics : {"plane_strain", "plane_stress"}
     E_star, R_effective : float
         Contact modulus [pressure] and relative radius, 1/R = 1/R1 + 1/R2 [length].
     radius, force, pressure_max : float
@@ -76,7 +75,7 @@ class HertzLine:
     def displacement(self, x: ArrayLike, y: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of body 1 or 2 at points `x` (...) [length], `y` (...) [length].
 
-        They are relative to the point (0, 0), since the displacement of a half plane is unbounded at infinity, and
+        They are relative to the point (0, 0), since the displacement of a half-plane is unbounded at infinity, and
         follow from the stresses of McEwen (1949) by integration. A rigid body raises ModelError.
         """
         E, nu = self.bodies.constants(body)
@@ -148,8 +147,12 @@ def hertz_line(
         As for `hertz_point`.
     force, radius, pressure_max : float
         Exactly one of them: force per unit length [force/length], half-width [length] or largest pressure [pressure].
-    kinematics : str
-        "plane_strain" or "plane_stress" (thin discs).
+    kinematics : {"plane_strain", "plane_stress"}
+        Plane stress is for thin discs.
+
+    Returns
+    -------
+    HertzLine
 
     Examples
     --------

@@ -19,7 +19,7 @@ class HertzPoint:
     """Frictionless contact of two spheres after Hertz (1881), see Johnson (1985), sections 3.4 and 4.2.
 
     Positions are the distance r from the axis and the height z along the outward normal of the body: each body is the
-    half space z <= 0, and a point above it raises ModelError. Stress components are rr, zz, hoop, rz, positive in
+    half-space z <= 0, and a point above it raises ModelError. Stress components are rr, zz, hoop, rz, positive in
     tension, with Poisson's ratio of the first body unless `nu` is given.
 
     Attributes
@@ -146,6 +146,10 @@ def hertz_point(
         Radii, not both infinite; infinity is a plane [length].
     force, approach, radius, pressure_max : float
         Exactly one of them: force [force], approach [length], contact radius [length] or largest pressure [pressure].
+
+    Returns
+    -------
+    HertzPoint
 
     Examples
     --------

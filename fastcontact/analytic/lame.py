@@ -1,4 +1,4 @@
-"""Thick cylinders and hollow spheres under pressure, and press fits of two of them (Lame 1852)."""
+"""Thick cylinders and hollow spheres under pressure, and press fits of two of them (Lamé 1852)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.errors import ModelError
 class LameShell:
     """A thick cylinder or a hollow sphere under pressure on its bore and its rim.
 
-    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lame 1852; Timoshenko
+    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lamé 1852; Timoshenko
     and Goodier 1970, articles 28 and 136). Radii outside the body raise ModelError.
 
     Attributes
@@ -26,9 +26,9 @@ class LameShell:
     inner_pressure, outer_pressure : float
         Pressures on them [pressure].
     E, nu : float
-        Material [pressure], [-].
-    kinematics : str
-        "plane_strain", "plane_stress" (also a cylinder with free ends) or "sphere".
+        Young's modulus [pressure] and Poisson's ratio [-].
+    kinematics : {"plane_strain", "plane_stress", "sphere"}
+        Plane stress is also for a cylinder with free ends.
     """
 
     inner_radius: float
@@ -113,12 +113,16 @@ def thick_cylinder(
     outer_pressure: float = 0.0,
     kinematics: str = "plane_strain",
 ) -> LameShell:
-    """Return a thick cylinder under pressure (Lame 1852).
+    """Return a thick cylinder under pressure (Lamé 1852).
 
     Parameters
     ----------
     E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure, kinematics
         As the attributes of `LameShell`; "plane_strain" or "plane_stress".
+
+    Returns
+    -------
+    LameShell
 
     Examples
     --------
@@ -140,7 +144,7 @@ def thick_sphere(
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
 ) -> LameShell:
-    """Return a hollow sphere under pressure (Lame 1852); parameters as for `thick_cylinder`.
+    """Return a hollow sphere under pressure (Lamé 1852); parameters as for `thick_cylinder`.
 
     Examples
     --------
@@ -189,18 +193,22 @@ def press_fit_cylinders(
     inner_radius: float = 0.0,
     kinematics: str = "plane_strain",
 ) -> PressFit:
-    """Return the frictionless press fit of two concentric cylinders (Lame 1852; Timoshenko 1956, article 41).
+    """Return the frictionless press fit of two concentric cylinders (Lamé 1852; Timoshenko 1956, article 41).
 
     Parameters
     ----------
     E_inner, nu_inner, E_outer, nu_outer : float
-        Materials [pressure], [-].
+        Young's moduli [pressure] and Poisson's ratios [-].
     inner_radius, interface_radius, outer_radius : float
         Radii, increasing; `inner_radius` 0 is a solid shaft [length].
     interference : float
         Radius of the shaft minus that of the hole [length].
-    kinematics : str
-        "plane_strain" or "plane_stress"; the latter also holds for long cylinders with free ends.
+    kinematics : {"plane_strain", "plane_stress"}
+        Plane stress also holds for long cylinders with free ends.
+
+    Returns
+    -------
+    PressFit
 
     Examples
     --------
@@ -225,7 +233,7 @@ def press_fit_spheres(
     interference: float,
     inner_radius: float = 0.0,
 ) -> PressFit:
-    """Return the press fit of two concentric hollow spheres (Lame 1852); parameters as for `press_fit_cylinders`.
+    """Return the press fit of two concentric hollow spheres (Lamé 1852); parameters as for `press_fit_cylinders`.
 
     Examples
     --------

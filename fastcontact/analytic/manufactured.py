@@ -37,10 +37,10 @@ class HertzBox:
     ----------
     hertz : HertzLine or HertzPoint
         The contact that defines the field.
-    kinematics : str
-        "plane_strain", "plane_stress", "axisymmetric" (x is the distance from the axis) or "3d".
+    kinematics : {"plane_strain", "plane_stress", "axisymmetric", "3d"}
+        In axisymmetry x is the distance from the axis.
     E, nu, width, height : float
-        Material [pressure], [-], and size of the box [length].
+        Young's modulus [pressure] and Poisson's ratio [-], size of the box [length].
     """
 
     hertz: HertzLine | HertzPoint
@@ -155,6 +155,10 @@ def hertz_box(
         As the attributes of `HertzBox`.
     radius, pressure_max : float
         Contact radius, less than `width` [length], and pressure at the centre [pressure].
+
+    Returns
+    -------
+    HertzBox
 
     Examples
     --------

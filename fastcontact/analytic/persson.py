@@ -97,13 +97,16 @@ def persson_pin(
     Parameters
     ----------
     E, nu : float
-        Material of both [pressure], [-]; in plane stress `nu` has no effect.
+        Young's modulus [pressure] and Poisson's ratio [-] of both bodies; in plane stress `nu` has no effect.
     R, clearance : float
         Radius of the hole, and that less the radius of the pin, >= 0 [length].
     force, contact_angle : float
         Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
-    kinematics : str
-        "plane_stress" or "plane_strain".
+    kinematics : {"plane_stress", "plane_strain"}
+
+    Returns
+    -------
+    PerssonPin
 
     Examples
     --------

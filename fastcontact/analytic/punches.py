@@ -1,4 +1,4 @@
-"""Rigid punches: on an elastic half space flat, cone, paraboloid, any power; flat on a half plane, and how far it sticks."""
+"""Rigid punches: on an elastic half-space flat, cone, paraboloid, any power; flat on a half-plane, and how far it sticks."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from fastcontact.errors import ModelError
 
 @dataclass(frozen=True)
 class FlatPunch:
-    """Flat-ended rigid cylinder on a half space (Boussinesq 1885; Sneddon 1946; Johnson 1985, section 3.4).
+    """Flat-ended rigid cylinder on a half-space (Boussinesq 1885; Sneddon 1946; Johnson 1985, section 3.4).
 
     Attributes
     ----------
     E_star, radius : float
-        E/(1 - nu^2) of the half space [pressure], and radius of the punch [length].
+        E/(1 - nu^2) of the half-space [pressure], and radius of the punch [length].
     approach, force : float
         Indentation [length] and force [force].
     bonded : bool
-        The punch sticks to the half space.
+        The punch sticks to the half-space.
     """
 
     E_star: float
@@ -65,14 +65,14 @@ class FlatPunch:
 
 @dataclass(frozen=True)
 class PowerLawPunch:
-    """Rigid punch of the profile A r^n on a half space (Galin 1946; Sneddon 1965).
+    """Rigid punch of the profile A r^n on a half-space (Galin 1946; Sneddon 1965).
 
     n = 1 is a cone, n = 2 a paraboloid; the flat punch is the limit of large n.
 
     Attributes
     ----------
     E_star, coefficient, exponent : float
-        E/(1 - nu^2) of the half space [pressure]; A [length^(1 - n)] and n of the profile.
+        E/(1 - nu^2) of the half-space [pressure]; A [length^(1 - n)] and n of the profile.
     radius, approach, force : float
         Contact radius a [length], indentation of the tip [length] and force [force].
     """
@@ -172,16 +172,20 @@ def flat_punch(
     approach: float | None = None,
     bonded: bool = False,
 ) -> FlatPunch:
-    """Return the contact of a flat rigid cylinder with a half space, F = 2 E* a delta (Johnson 1985, section 3.4).
+    """Return the contact of a flat rigid cylinder with a half-space, F = 2 E* a delta (Johnson 1985, section 3.4).
 
     Parameters
     ----------
     E, nu, radius : float
-        Half space [pressure], [-], and radius of the punch [length].
+        Young's modulus [pressure] and Poisson's ratio [-] of the half-space, radius of the punch [length].
     force, approach : float
         Exactly one of them: force [force] or indentation [length].
     bonded : bool
         The punch sticks; the force is larger by `bonded_stiffness_ratio`.
+
+    Returns
+    -------
+    FlatPunch
 
     Examples
     --------
@@ -208,16 +212,20 @@ def power_law_punch(
     approach: float | None = None,
     radius: float | None = None,
 ) -> PowerLawPunch:
-    """Return the contact of a rigid punch A r^n with a half space (Galin 1946; Sneddon 1965).
+    """Return the contact of a rigid punch A r^n with a half-space (Galin 1946; Sneddon 1965).
 
     Parameters
     ----------
     E, nu : float
-        Half space [pressure], [-].
+        Young's modulus [pressure] and Poisson's ratio [-] of the half-space.
     coefficient, exponent : float
         A > 0 [length^(1 - n)] and n > 0.
     force, approach, radius : float
         Exactly one of them: force [force], indentation [length] or contact radius [length].
+
+    Returns
+    -------
+    PowerLawPunch
 
     Examples
     --------
@@ -238,7 +246,7 @@ def cone_punch(
     approach: float | None = None,
     radius: float | None = None,
 ) -> PowerLawPunch:
-    """Return the contact of a rigid cone with a half space (Love 1939; Sneddon 1965).
+    """Return the contact of a rigid cone with a half-space (Love 1939; Sneddon 1965).
 
     Parameters
     ----------
@@ -249,6 +257,10 @@ def cone_punch(
         angles.
     slope : float, optional
         Tangent of this angle, instead of `slope_angle`, as in `obstacles.cone` [-].
+
+    Returns
+    -------
+    PowerLawPunch
 
     Examples
     --------
@@ -272,7 +284,7 @@ def paraboloid_punch(
     approach: float | None = None,
     radius: float | None = None,
 ) -> PowerLawPunch:
-    """Return the contact of a rigid paraboloid r^2/(2 R) with a half space: Hertz's (Sneddon 1965).
+    """Return the contact of a rigid paraboloid r^2/(2 R) with a half-space: Hertz's (Sneddon 1965).
 
     Parameters
     ----------
@@ -280,6 +292,10 @@ def paraboloid_punch(
         As for `power_law_punch`.
     R : float
         Radius of curvature [length].
+
+    Returns
+    -------
+    PowerLawPunch
 
     Examples
     --------
@@ -296,14 +312,14 @@ def paraboloid_punch(
 
 @dataclass(frozen=True)
 class FlatPunch2D:
-    """Flat rigid punch on a half plane in plane strain (Muskhelishvili 1949; Johnson 1985, section 2.8).
+    """Flat rigid punch on a half-plane in plane strain (Muskhelishvili 1949; Johnson 1985, section 2.8).
 
     Attributes
     ----------
     nu, half_width, force : float
-        Poisson ratio of the half plane [-], half-width a of the punch [length], force per unit length [force/length].
+        Poisson ratio of the half-plane [-], half-width a of the punch [length], force per unit length [force/length].
     bonded : bool
-        The punch sticks to the half plane.
+        The punch sticks to the half-plane.
     """
 
     nu: float
@@ -325,7 +341,7 @@ class FlatPunch2D:
         return amplitude * np.cos(phase)
 
     def shear(self, x: ArrayLike) -> Array:
-        """Return the shear traction (...) [pressure] along x on the half plane at `x` (...) [length] (Johnson, eq. 2.69).
+        """Return the shear traction (...) [pressure] along x on the half-plane at `x` (...) [length] (Johnson, eq. 2.69).
 
         It acts outward on the surface; it is zero unless the punch is bonded.
         """
@@ -346,14 +362,18 @@ class FlatPunch2D:
 
 
 def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = False) -> FlatPunch2D:
-    """Return the tractions under a flat rigid punch on a half plane in plane strain.
+    """Return the tractions under a flat rigid punch on a half-plane in plane strain.
 
-    There is no indentation: in a half plane it depends on distant supports.
+    There is no indentation: in a half-plane it depends on distant supports.
 
     Parameters
     ----------
     nu, half_width, force, bonded
         As the attributes of `FlatPunch2D`; a punch that is not bonded is frictionless.
+
+    Returns
+    -------
+    FlatPunch2D
 
     Examples
     --------
@@ -376,7 +396,7 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
     Parameters
     ----------
     nu, friction : float
-        Poisson ratio of the half plane and Coulomb's coefficient f > 0 [-].
+        Poisson ratio of the half-plane and Coulomb's coefficient f > 0 [-].
 
     Examples
     --------

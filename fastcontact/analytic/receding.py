@@ -1,4 +1,4 @@
-"""Elastic layer pressed on a half plane, without friction or weight: the contact recedes at once."""
+"""Elastic layer pressed on a half-plane, without friction or weight: the contact recedes as soon as a load acts."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
 _TERMS = 80  # terms of the Chebyshev series: errors of half-width and pressure below 1e-6 in the range below
-_LARGEST_RATIO = 100.0  # largest ratio of the moduli: beyond, the contact is so wide that the layer is a beam
+_LARGEST_RATIO = 100.0  # largest ratio of the moduli: beyond it, contact is so wide that the layer acts as a beam
 _LARGEST_LOAD = 10.0  # largest half-width of the load over thickness
 
 
 @dataclass(frozen=True)
 class RecedingLayer:
-    """Contact of a layer under a strip load with a half plane (Keer, Dundurs and Tsai 1972).
+    """Contact of a layer under a strip load with a half-plane (Keer, Dundurs and Tsai 1972).
 
     The contact width does not depend on the force.
 
@@ -46,7 +46,7 @@ class RecedingLayer:
 
     @property
     def pressure_max(self) -> float:
-        """Pressure at the middle [pressure]."""
+        """Largest pressure, at the middle of the contact [pressure]."""
         return float(self.pressure(0.0))
 
     def pressure(self, x: ArrayLike) -> Array:
@@ -58,11 +58,11 @@ class RecedingLayer:
         return -2.0 * terms / np.maximum(np.sin(theta), 1e-300)
 
 
-def _layer(xi: Array) -> tuple[Array, Array]:
+def _compliances(xi: Array) -> tuple[Array, Array]:
     """Return A - 1 and 1 - S at wave numbers xi (thickness 1).
 
-    A and S are the normal compliances of the layer's faces, over those of a half plane, under pressures on
-    both faces that bend it (A) or squeeze it (S), in Fourier space: S = (cosh xi - 1)/(sinh xi + xi) and
+    A and S are the normal compliances of the layer's faces in Fourier space, relative to those of a half-plane, under
+    pressures on both faces that bend it (A) or squeeze it (S): S = (cosh xi - 1)/(sinh xi + xi) and
     A = (cosh xi + 1)/(sinh xi - xi).
     """
     cubic = xi**3 / 6.0 * (1.0 + xi**2 / 20.0 * (1.0 + xi**2 / 42.0 * (1.0 + xi**2 / 72.0 * (1.0 + xi**2 / 110.0))))
@@ -71,7 +71,7 @@ def _layer(xi: Array) -> tuple[Array, Array]:
 
 
 def _wave_numbers(panels: int) -> tuple[Array, Array]:
-    """Return points and weights on (0, 40); at the upper end all compliances are those of a half plane."""
+    """Return points and weights on (0, 40); above 40 all compliances are those of a half-plane."""
     points, weights = np.polynomial.legendre.leggauss(12)
     width = 40.0 / panels
     start = width * np.arange(panels)[:, None]
@@ -85,7 +85,7 @@ def _series(c: float, ratio: float, a: float) -> Array:
     carries the force: Gauss-Chebyshev rule of the first kind (Erdogan and Gupta 1972), folded by symmetry.
     """
     xi, weight = _wave_numbers(20 + int(5 * max(c, a)))
-    bend, squeeze = _layer(xi)
+    bend, squeeze = _compliances(xi)
     half = _TERMS // 2
     theta = (np.arange(half) + 0.5) * math.pi / _TERMS
     t, x = np.cos(theta), np.cos(np.arange(1, half) * math.pi / _TERMS)
@@ -103,7 +103,7 @@ def _series(c: float, ratio: float, a: float) -> Array:
     return coefficients
 
 
-def _edge(c: float, ratio: float, a: float) -> float:
+def _edge_singularity(c: float, ratio: float, a: float) -> float:
     """Return the strength of the pressure's singularity at the edge of the trial contact of half-width c.
 
     Positive where the contact is too narrow, negative where it is too wide.
@@ -122,7 +122,7 @@ def receding_layer(
     load_half_width: float = 0.0,
     kinematics: str = "plane_strain",
 ) -> RecedingLayer:
-    """Return the contact of a layer (1) with a half plane (2) under a strip load on the layer's top.
+    """Return the contact of a layer (1) with a half-plane (2) under a strip load on the layer's top.
 
     The singular integral equation of Keer, Dundurs and Tsai (1972), solved by a Chebyshev series to a
     relative 1e-6 or better.
@@ -130,15 +130,23 @@ def receding_layer(
     Parameters
     ----------
     E1, nu1 : float
-        Layer [pressure], [-].
-    E2, nu2 : float
-        Half plane; `E2` None is rigid [pressure], [-].
+        Young's modulus [pressure] and Poisson's ratio [-] of the layer.
+    E2, nu2 : float, optional
+        Those of the half-plane; without `E2` it is rigid.
     thickness, force : float
         Thickness of the layer [length], and force per unit length [force/length].
     load_half_width : float
         Half-width of the uniform load, at most ten thicknesses; 0 is a line force [length].
-    kinematics : str
-        "plane_strain" or "plane_stress".
+    kinematics : {"plane_strain", "plane_stress"}
+
+    Returns
+    -------
+    RecedingLayer
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or the layer is more than 100 times stiffer than the half-plane.
 
     Examples
     --------
@@ -153,7 +161,7 @@ def receding_layer(
     a = not_negative("load_half_width", load_half_width) / h
     ratio = _modulus_ratio(bodies, kinematics)
     if ratio > _LARGEST_RATIO:
-        raise ModelError(f"the layer is {ratio:g} times stiffer than the half plane: the limit is {_LARGEST_RATIO:g}")
+        raise ModelError(f"the layer is {ratio:g} times stiffer than the half-plane: the limit is {_LARGEST_RATIO:g}")
     if a > _LARGEST_LOAD:
         raise ModelError(f"load_half_width is {a:g} thicknesses: the limit is {_LARGEST_LOAD:g}")
     c = _half_width(ratio, a)
@@ -161,7 +169,7 @@ def receding_layer(
 
 
 def _modulus_ratio(bodies: Bodies, kinematics: str) -> float:
-    """Return E1'/E2' of the plane moduli, 0 for a rigid half plane."""
+    """Return E1'/E2' of the plane moduli, 0 for a rigid half-plane."""
     if bodies.E2 is None:
         return 0.0
     strain = kinematics == "plane_strain"
@@ -170,10 +178,10 @@ def _modulus_ratio(bodies: Bodies, kinematics: str) -> float:
 
 
 def _half_width(ratio: float, a: float) -> float:
-    """Return the c over thickness for which the pressure is not singular at the edge."""
+    """Return the half-width c, relative to the thickness, for which the pressure is not singular at the edge."""
     from scipy.optimize import brentq
 
     high = 1.0  # the contact of a soft layer under a line force has 0.86
-    while _edge(high, ratio, a) > 0.0:
+    while _edge_singularity(high, ratio, a) > 0.0:
         high *= 1.3
-    return float(brentq(_edge, high / 1.3, high, args=(ratio, a), xtol=1e-13))
+    return float(brentq(_edge_singularity, high / 1.3, high, args=(ratio, a), xtol=1e-13))

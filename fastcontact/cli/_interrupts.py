@@ -1,4 +1,4 @@
-"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are repeated if Python loses the exception.
+"""Handle Ctrl-C, SIGTERM and SIGHUP, which are repeated if Python loses the exception.
 
 SIGTERM, sent by schedulers, and SIGHUP, sent by a closing terminal, are handled like Ctrl-C: by default they would leave
 incomplete files.

@@ -1,4 +1,4 @@
-"""Common parts of the commands on result files: the step, the contact pair, the case stored in the file."""
+"""What the commands that read result files share: choice of step and contact pair, the case stored in the file."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ def chosen_step(results: Any, number: int) -> Any:
     if number == -1:
         return results[-1]
     if not 1 <= number <= len(results):
-        raise CaseError(f"there is no step {number} in '{results.path}': it holds the steps 1 to {len(results)}")
+        raise CaseError(f"there is no step {number} in '{results.path}': it holds steps 1 to {len(results)}")
     return results[number - 1]
 
 
 def chosen_contact(options: argparse.Namespace, step: Any) -> str:
-    """Return the name of the contact pair in the options, by default the first one, with a hint at the others.
+    """Return the name of the contact pair in the options, by default the first one; then print the names of the others.
 
     Raises CaseError if there is no contact pair, or none of this name.
     """
@@ -45,7 +45,10 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
     name, *others = step.contact
     if others and not options.quiet:
         listed = ", ".join(f"'{other}'" for other in others)
-        say(f"contact '{name}', the first of {len(step.contact)}; also there: {listed} (--contact NAME)", error=True)
+        say(
+            f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)",
+            error=True,
+        )
     return str(name)
 
 
@@ -68,7 +71,7 @@ def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:
 def pressure_curves(
     theories: Mapping[str, Any], contact: Any, *, approach: float | None = None, load: float = 1.0
 ) -> dict[str, Any]:
-    """Return curves to compare with the pressure of a contact, by legend: theory at equal approach and at equal force.
+    """Return theories to compare with the pressure of a contact, by label of the legend: at equal approach and equal force.
 
     Parameters
     ----------
@@ -76,12 +79,15 @@ def pressure_curves(
         Theories of the pair in the form of `Case.theories`.
     contact : ContactResult
     approach : float, optional
-        Approach given in the case, reached at a multiplier of 1 [length]; None if the theory is given otherwise.
+        Approach in the case, at load multiplier 1 [length]; None if the theory has a force or no load.
     load : float
         Multiplier of the loads at this step [-].
 
-    The result is empty without a theory whose pressure can be drawn; that of a flat punch is infinite. For finite half
-    spheres Hertz's pressure is drawn.
+    Returns
+    -------
+    dict
+        Empty without a theory whose pressure can be drawn; that of a flat punch is infinite. For finite half-spheres it
+        contains Hertz's theory.
     """
     theory: Any = theories.get("theory")
     theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
@@ -103,9 +109,10 @@ def drawn(theory: Any) -> PressureCurve:
 def compared(
     name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
 ) -> dict[str, Any]:
-    """Return a theory, by legend, at the approach and at the force of a contact, if these are known.
+    """Return a theory at the approach and at the force of a contact, as far as these are known, by label of the legend.
 
-    The model represents a `share` of the contact [-]; `approach` is that at a multiplier `load` of 1.
+    The model represents a `share` of the contact [-]; `approach` is reached at load multiplier 1, and `load` is that of
+    the step.
     """
     curves, force = {}, float(np.linalg.norm(contact.force)) / share
     if approach is not None and load == 1.0:
@@ -118,7 +125,7 @@ def compared(
 
 
 def law(theories: Mapping[str, Any]) -> Any:
-    """Return the law of force and radius of a contact over its approach, from zero on; None if there is none."""
+    """Return the theory if it gives force and radius as functions of the approach; otherwise None."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     return theory if hasattr(theory, "at_approach") else None

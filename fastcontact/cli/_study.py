@@ -61,7 +61,7 @@ def stopped(options: argparse.Namespace) -> str:
     """Return the message after an interruption."""
     if options.store:
         return f"stopped; the same command continues where it stopped, with the runs in {options.store}"
-    return "stopped; with --store DIR the same command would go on where it stopped"
+    return "stopped; with --store DIR the same command would continue where it stopped"
 
 
 def report(

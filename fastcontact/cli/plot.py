@@ -30,7 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--map", action="store_true", help="pressure and shear (or --field contact_slip) over the contact (3D)"
     )
     kinds.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
-    kinds.add_argument("--animate", metavar="FILE", help="a moving picture over the load steps: .gif, with ffmpeg .mp4")
+    kinds.add_argument("--animate", metavar="FILE", help="an animation over the load steps: .gif, with ffmpeg .mp4")
     kinds.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
     parser.add_argument(
         "--field", metavar="NAME", default="von_mises",
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
     check_outputs([options.file], [options.animate], [options.png])
     if options.phases is not None and not options.animate:
-        raise CaseError("--phases N are those of a moving picture: name it with --animate FILE")
+        raise CaseError("--phases N are those of an animation: name its file with --animate FILE")
     if options.png and options.animate:
         raise CaseError("--animate FILE names the file to write: leave out --png")
     plane = _plane(options.section) if options.section else None

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from fastcontact.results.writer import ResultWriter
 
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
-# Cell field of the estimated error.
-ERROR = "error"
-# Number of mesh points from which steps are written while the next one is computed; smaller ones take no time.
+# Name of the cell field of the estimated error.
+ERROR_FIELD = "error"
+# Number of mesh points from which a step is written in the background while the next one is solved.
 LARGE = 30_000
 
 
@@ -50,7 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--nodal-diameters", metavar="N[,N...]",
-        help="modes of the whole ring of a sector with these nodal diameters, such as 0,1,2, or all; shapes are the ring's",
+        help="nodal diameters of the modes of a cyclic sector, such as 0,1,2, or all; mode shapes are those of the full ring",
     )  # fmt: skip
     parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
     parser.add_argument(
@@ -71,16 +71,16 @@ def run(options: argparse.Namespace) -> int:
         _set_threads(options.threads)
     output = Path(options.output or f"{case_path(options.case).stem}.vtkhdf")
     check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
-    with warnings_shown() as early:
+    with warnings_shown() as setup_warnings:
         case = read_case(options.case)
     read = time.perf_counter()
     with in_file(case_path(options.case)):
         case.model.check(case.ramp)  # an invalid model must not replace existing results
-        early += _checked_study(case)
+        setup_warnings += _checked_study(case)
     with warnings_shown() as caught:
-        caught += early
-        n_done, earlier, last, steps = _solved(options, case, output)
-    texts = list(dict.fromkeys([*earlier, *caught]))
+        caught += setup_warnings
+        n_done, stored_warnings, last, steps = _solved(options, case, output)
+    texts = list(dict.fromkeys([*stored_warnings, *caught]))
     computed = _modes(options, case, last)
     timings = {"read": read - started, "solve": time.perf_counter() - read, "cpu": time.process_time()}
     numbers = summary.summarise(case, last, steps, timings, texts, computed)
@@ -123,8 +123,8 @@ def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
 
     computed = modes(case.model, last, **{"linear_solver": options.linear or case.linear_solver, **arguments})
     if options.modes:
-        shapes, of = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
-        with ResultWriter(options.modes, of, case_text=case.text) as writer:
+        shapes, shape_model = (computed, case.model) if computed.twins is None else (computed.whole_ring(),) * 2
+        with ResultWriter(options.modes, shape_model, case_text=case.text) as writer:
             for mode in shapes:
                 writer.write(mode)
     return computed
@@ -137,7 +137,7 @@ def _diameters(text: str | None) -> dict[str, Any]:
     try:
         return {"nodal_diameters": text if text == "all" else [int(number) for number in text.split(",")]}
     except ValueError:
-        raise CaseError(f"--nodal-diameters {text}: write whole numbers with commas between them, or all") from None
+        raise CaseError(f"--nodal-diameters {text}: write integers separated by commas, or all") from None
 
 
 def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
@@ -148,7 +148,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
     from fastcontact.cases.summary import of_step
     from fastcontact.results.writer import ResultWriter
 
-    fields, large = (ERROR,) if options.estimate_error else (), case.model.mesh.n_points >= LARGE
+    fields, large = (ERROR_FIELD,) if options.estimate_error else (), case.model.mesh.n_points >= LARGE
     with ResultWriter(
         output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume, background=large
     ) as writer:
@@ -205,8 +205,8 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
     others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
     if others:
         warn(
-            f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file stay, also at load factor "
-            f"{others[0]:g}, which is not in the case; without --resume all are solved anew"
+            f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file are kept, also that at "
+            f"load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
         )
 
 
@@ -223,14 +223,14 @@ def _written(output: Path, done: int, total: int, others: list[str]) -> str:
     if done == total:
         nothing = f"{output} was complete with {total} steps, nothing was left to solve"
         return "; wrote ".join([nothing, ", ".join(others)] if others else [nothing])
-    after = f" (went on after step {done})" if done else ""
+    after = f" (resumed after step {done})" if done else ""
     return f"wrote {', '.join([f'{output}{after}', *others])}"
 
 
 def _estimated(model: Any, step: Any) -> Any:
     from fastcontact.studies.error_estimate import estimate_error
 
-    return dataclasses.replace(step, cell_fields={ERROR: estimate_error(model, step).cells})
+    return dataclasses.replace(step, cell_fields={ERROR_FIELD: estimate_error(model, step).cells})
 
 
 def _set_threads(count: int) -> None:

@@ -107,7 +107,7 @@ class Conductance:
         h = np.broadcast_to(h, gap.shape) if h.ndim == 0 else h
         if h.shape != gap.shape or not (np.isfinite(h).all() and (h >= 0.0).all()):
             raise ContactError(
-                f"the conductance of contact '{self.name}' must return a number from zero on for each pressure and gap, "
+                f"the conductance of contact '{self.name}' must return a nonnegative number for each pressure and gap, "
                 f"shape {gap.shape}, not shape {h.shape}{'' if h.shape != gap.shape else f', least {h.min():g}'}"
             )
         return h

@@ -88,7 +88,7 @@ def _add_block(flat, at_upper, at_lower, upper, lower, block):
 
 @inlined_kernel
 def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling, shear, g):
-    """Add the block of two nodes for Lame's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
+    """Add the block of two nodes for Lamé's constants: K_ij = lambda g_ij + mu g_ji + mu g_kk delta_ij.
 
     `pair` is whether the nodes differ; the order of g is xx, yy, zz, xy, xz, yz, yx, zx, zy.
     """
@@ -104,7 +104,7 @@ def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling,
 
 @kernel
 def _add_isotropic(g, coupling, shear, slots, c, inside, flat):
-    """Add the blocks of a cell for Lame's constants, given the integrals of `_integrate_products`."""
+    """Add the blocks of a cell for Lamé's constants, given the integrals of `_integrate_products`."""
     for b in range(g.shape[1]):
         for a in range(b + 1):
             products = (
@@ -135,7 +135,7 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
 
 @kernel
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
-    """Add the blocks of a linear tetrahedron for Lame's constants: its gradients (4, 3) are constant.
+    """Add the blocks of a linear tetrahedron for Lamé's constants: its gradients (4, 3) are constant.
 
     `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
     take half the time of `_integrate_products` and `_add_isotropic`.
@@ -173,7 +173,7 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
     Returns the number of the first cell with a Jacobian that is not positive, or -1. The products of gradients are
     integrated first, and multiplied with the moduli of the cell at the end. Where ``isotropic`` (n_materials,) holds, these
-    are Lame's constants, ``D[0, 1]`` and ``D[3, 3]``.
+    are Lamé's constants, ``D[0, 1]`` and ``D[3, 3]``.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))

@@ -23,7 +23,7 @@ class CylindricalAxes:
     """Material axes around a line: 1 radial, 2 tangential, 3 along the line.
 
     In the plane, the line crosses the plane at `origin`. In axisymmetry, the line must be the axis: ``direction=(0, 1,
-    0)``. ModelError if a vector does not have three components, or the direction is zero.
+    0)``.
 
     Parameters
     ----------
@@ -31,6 +31,11 @@ class CylindricalAxes:
         A point of the line [length].
     direction : (float, float, float)
         Along the line, of any length [-].
+
+    Raises
+    ------
+    ModelError
+        If a vector does not have three components, or the direction is zero.
 
     Examples
     --------

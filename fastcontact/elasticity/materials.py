@@ -332,8 +332,6 @@ else:
 class LinearElastic(Material):
     """Isotropic linear elasticity.
 
-    ModelError if a constant is outside its range.
-
     Parameters
     ----------
     E : float, callable or ndarray (n,)
@@ -358,6 +356,11 @@ class LinearElastic(Material):
         Assembly then costs three times and stress recovery ten times as much.
     conductivity : float, callable or ndarray (n,), optional
         Thermal conductivity [power / (length temperature)], positive; like E.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
 
     Examples
     --------

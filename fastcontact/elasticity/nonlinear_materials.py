@@ -58,8 +58,6 @@ class NonlinearElastic(LinearElastic):
 class ElasticPlastic(NonlinearElastic):
     """Von Mises plasticity with associated flow, for small strains (Simo and Hughes, 1998, chapter 3).
 
-    ModelError if a constant is outside its range.
-
     Parameters
     ----------
     E, nu : float
@@ -78,6 +76,11 @@ class ElasticPlastic(NonlinearElastic):
         preserves the volume.
     density, expansion, conductivity : float, optional
         As of `LinearElastic`.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
 
     Examples
     --------
@@ -102,7 +105,7 @@ class ElasticPlastic(NonlinearElastic):
         object.__setattr__(self, "hardening", self._table())
 
     def _table(self) -> tuple[tuple[float, float], ...]:
-        """Return the hardening table from zero on; ModelError if it is not one."""
+        """Return the hardening table, starting at zero plastic strain; ModelError if it is not one."""
         try:
             rows = np.array([[float(value) for value in row] for row in self.hardening]).reshape(-1, 2)
         except (TypeError, ValueError, OverflowError):
@@ -112,7 +115,9 @@ class ElasticPlastic(NonlinearElastic):
         if not len(rows) or rows[0, 0] > 0.0:
             rows = np.vstack([[0.0, float(self.yield_stress)], rows])
         if not (np.isfinite(rows).all() and (np.diff(rows[:, 0]) > 0.0).all() and (rows[:, 1] > 0.0).all()):
-            raise ModelError("hardening must have ascending plastic strains, from zero on, and positive yield stresses")
+            raise ModelError(
+                "hardening must have ascending plastic strains that are not negative, and positive yield stresses"
+            )
         if rows[0, 0] < 0.0 or not math.isclose(rows[0, 1], self.yield_stress):
             raise ModelError(
                 f"hardening begins with the yield stress {rows[0, 1]:g} at the plastic strain {rows[0, 0]:g}, where "
@@ -150,8 +155,6 @@ class Hyperelastic(NonlinearElastic):
 class NeoHookean(Hyperelastic):
     """Neo-Hookean hyperelasticity, ``mu / 2 (J^(-2/3) tr C - 3) + K (J - 1)^2 / 2`` (Bonet and Wood, 2008, section 6.5).
 
-    ModelError if a constant is outside its range.
-
     Parameters
     ----------
     E, nu : float
@@ -159,6 +162,11 @@ class NeoHookean(Hyperelastic):
         nu)).
     volumetric, density, expansion, conductivity
         As of `LinearElastic`: from nu = 0.49 on the dilatation is projected, so that elements do not lock.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
 
     Examples
     --------
@@ -234,8 +242,6 @@ class Polynomial(OwnConstants):
 class MooneyRivlin(Polynomial):
     """Mooney-Rivlin hyperelasticity (Mooney, 1940; Rivlin, 1948): C10 (I1 - 3) + C01 (I2 - 3) + K (J - 1)^2 / 2.
 
-    ModelError if a constant is outside its range.
-
     Parameters
     ----------
     C10, C01 : float
@@ -244,6 +250,11 @@ class MooneyRivlin(Polynomial):
         Bulk modulus K [pressure].
     volumetric, density, expansion, conductivity
         As of `NeoHookean`.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
 
     Examples
     --------
@@ -261,8 +272,6 @@ class MooneyRivlin(Polynomial):
 class Yeoh(Polynomial):
     """Yeoh hyperelasticity (Yeoh, 1993): C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + K (J - 1)^2 / 2.
 
-    ModelError if a constant is outside its range.
-
     Parameters
     ----------
     C10, C20, C30 : float
@@ -271,6 +280,11 @@ class Yeoh(Polynomial):
         Bulk modulus K [pressure].
     volumetric, density, expansion, conductivity
         As of `NeoHookean`.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
 
     Examples
     --------
@@ -289,8 +303,6 @@ class Yeoh(Polynomial):
 class Ogden(OwnConstants):
     """Ogden hyperelasticity (Ogden, 1972): the sum of ``2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3)``, l isochoric.
 
-    ModelError if a constant is outside its range.
-
     Parameters
     ----------
     mu : float or sequence of float
@@ -301,6 +313,11 @@ class Ogden(OwnConstants):
         Bulk modulus K of ``K (J - 1)^2 / 2`` [pressure].
     volumetric, density, expansion, conductivity
         As of `NeoHookean`.
+
+    Raises
+    ------
+    ModelError
+        If a constant is outside its range.
 
     Examples
     --------

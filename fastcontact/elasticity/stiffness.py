@@ -98,8 +98,6 @@ def stiffness(
 ) -> bsr_array:
     """Assemble the stiffness matrix of the solid cells.
 
-    MeshError if a cell is degenerate or turned inside out.
-
     Parameters
     ----------
     mesh : Mesh
@@ -120,6 +118,11 @@ def stiffness(
     -------
     bsr_array (n_points * dim, n_points * dim)
         Symmetric, blocks of dim x dim [force / length].
+
+    Raises
+    ------
+    MeshError
+        If a cell is degenerate or turned inside out.
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))

@@ -35,6 +35,10 @@ def from_meshio(mesh: Any) -> Mesh:
     ----------
     mesh : meshio.Mesh
 
+    Returns
+    -------
+    Mesh
+
     Raises
     ------
     MeshError
@@ -68,6 +72,10 @@ def from_pyvista(grid: Any) -> Mesh:
     Parameters
     ----------
     grid : pyvista.UnstructuredGrid, or another data set that PyVista can cast to one
+
+    Returns
+    -------
+    Mesh
 
     Raises
     ------

@@ -64,6 +64,11 @@ class Mesh:
     point_groups : mapping of str to array_like (n,)
         Point numbers of each named group of points.
 
+    Raises
+    ------
+    MeshError
+        If an array has the wrong shape, a number is not finite, or an index is out of range.
+
     Examples
     --------
     >>> mesh = Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, point_groups={"origin": [0]})
@@ -252,6 +257,8 @@ class Mesh:
     ) -> Mesh:
         """Return the mesh with a new group of facets of its solids, selected by position; missing facets are added as cells.
 
+        For groups of points use ``with_groups(points={name: np.flatnonzero(...)})``.
+
         Parameters
         ----------
         name : str
@@ -265,10 +272,11 @@ class Mesh:
             Group of the solid cells to which the facets belong, by default all. It distinguishes coinciding faces of
             two bodies.
 
-        ``with_groups(points={name: np.flatnonzero(...)})`` adds groups of points.
-
-        MeshError if there is no such facet, a point group has this name, `of` holds no solid cells, or `where` returns an
-        array of another type or shape.
+        Raises
+        ------
+        MeshError
+            If there is no such facet, a point group has this name, `of` holds no solid cells, or `where` returns an
+            array of another type or shape.
 
         Examples
         --------

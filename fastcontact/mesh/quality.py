@@ -106,7 +106,7 @@ def check_cells(mesh: Mesh) -> None:
             (
                 inverted,
                 "inverted",
-                "turn it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
+                "reorient it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
             ),
         ):
             if bad.any():

@@ -211,8 +211,6 @@ class OrderedLine:
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
     """Return the ordered nodes and the abscissa of a line group, like code_aster's NOEUD_ORDO and ABSC_CURV.
 
-    MeshError if the group holds no lines, branches, is closed or disconnected, or `start` is not one of its ends.
-
     Parameters
     ----------
     mesh : Mesh
@@ -220,6 +218,15 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
         A group of line cells that form one open line.
     start : str or int, optional
         The end to start from: a group with one point, or a point number; by default the end nearest to x = 0.
+
+    Returns
+    -------
+    OrderedLine
+
+    Raises
+    ------
+    MeshError
+        If the group holds no lines, branches, is closed or disconnected, or `start` is not one of its ends.
 
     Examples
     --------

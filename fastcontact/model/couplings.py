@@ -131,7 +131,10 @@ def coupling(
     weighting : (str, float or None)
         Weighting of a distributing coupling by the distance from the reference point; see `Spread`.
 
-    MeshError, ModelError if there are no such groups, or they cannot be coupled.
+    Raises
+    ------
+    MeshError, ModelError
+        If there are no such groups, or they cannot be coupled.
     """
     name = f"the coupling of '{names[0]}' with '{names[1]}'"
     check_known("kind of coupling", kind, KINDS, ModelError)

@@ -74,7 +74,10 @@ def periodic(
     ramp : Table, optional
         History of the jump.
 
-    ModelError if the nodes of the ends do not lie upon each other.
+    Raises
+    ------
+    ModelError
+        If the nodes of the ends do not coincide after the translation.
     """
     name = f"the periodicity of '{ends[0]}' and '{ends[1]}'"
     first, second = (mesh.points_of(end).astype(np.intp) for end in ends)
@@ -109,7 +112,10 @@ def cyclic(
     origin, direction : sequence of float
         A point of the axis (dim,) [length] and its direction (3,) [-].
 
-    ModelError if the ends do not lie upon each other after the turn, as nodes or as surfaces.
+    Raises
+    ------
+    ModelError
+        If the ends do not coincide after the rotation, as nodes or as surfaces.
     """
     name = f"the cyclic symmetry of '{ends[0]}' and '{ends[1]}'"
     first, second = (mesh.points_of(end).astype(np.intp) for end in ends)
@@ -131,7 +137,7 @@ def cyclic(
                 return [MultiPointConstraint(name, _without_zeros(rows_of))], None
     raise ModelError(
         f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
-        f"nearest node of '{ends[1]}', and the groups are not facets that lie upon each other: check axis and sectors"
+        f"nearest node of '{ends[1]}', and the groups are not facets that coincide then: check axis and sectors"
     )
 
 

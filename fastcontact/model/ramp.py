@@ -86,14 +86,17 @@ def table_value(table: Table, instant: float) -> float:
 class Ramp:
     """Instants and a piecewise linear load function.
 
-    ModelError if the instants or the table do not ascend, or an instant lies outside the table.
-
     Parameters
     ----------
     instants : sequence or array of float
         Ascending load factors (pseudo-times) at the ends of the steps.
     table : sequence of (float, float)
         Points (instant, multiplier of the loads) of the function, with ascending instants.
+
+    Raises
+    ------
+    ModelError
+        If the instants or the table do not ascend, or an instant lies outside the table.
 
     Examples
     --------
@@ -141,7 +144,10 @@ History = Ramp | Iterable[Iterable[float]] | None
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     """Return a ramp of equal steps from zero load to full load at `end`.
 
-    ModelError if `steps` is not an integer from 1 to a million or `end` is not positive.
+    Raises
+    ------
+    ModelError
+        If `steps` is not an integer from 1 to a million or `end` is not positive.
 
     Examples
     --------

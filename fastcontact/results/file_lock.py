@@ -42,13 +42,17 @@ class PathLock:
     """Exclusive right to write one path, through a locked file next to it; viewers may lock the result file itself.
 
     The operating system releases the lock at the end of its process, so that no lock is left over, and its file is
-    removed with the last reference at the latest. Raises FileError if another writer, in this or another process, holds
-    the path.
+    removed with the last reference at the latest.
 
     Attributes
     ----------
     release : callable
         Releases the lock; a second call does nothing.
+
+    Raises
+    ------
+    FileError
+        If another writer, in this or another process, holds the path.
     """
 
     def __init__(self, target: Path) -> None:

@@ -41,6 +41,8 @@ def by_largest_von_mises(
 ) -> tuple[Array, MaterialStress | None]:
     """Return the nodal stress (n_points, n_components), and that of each side of material interfaces [pressure].
 
+    At interfaces the nodal stress is that of the side with the largest von Mises stress.
+
     Parameters
     ----------
     sides : MaterialSides
@@ -49,8 +51,6 @@ def by_largest_von_mises(
     at_places : ndarray (n_places, n_components)
         Stress at the slots of `sides` [pressure].
     n_points : int
-
-    At interfaces the nodal stress is that of the side with the largest von Mises stress.
     """
     stress = at_places[:n_points].copy() if len(sides.points) else at_places
     if not len(sides.points):

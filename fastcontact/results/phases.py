@@ -1,4 +1,4 @@
-"""One period of a vibration as steps, for moving pictures and result files."""
+"""One period of a vibration as steps, for animations and result files."""
 
 from __future__ import annotations
 

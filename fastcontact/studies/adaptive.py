@@ -27,7 +27,7 @@ from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 
-# Fraction of the error whose cells are refined: a larger fraction makes fewer, larger steps (Doerfler, 1996).
+# Cells that contribute this fraction of the error are refined; a larger one needs fewer, larger meshes (Dörfler, 1996).
 BULK = 0.7
 # If refinement converges, differences shrink by at least this factor from round to round.
 SHRINKING = 3.0
@@ -48,7 +48,7 @@ def adaptive_study(
 ) -> AdaptiveStudy:
     """Refine the mesh of a case adaptively until a quantity is accurate enough.
 
-    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it with its influence on
+    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it by its influence on
     the quantity, and divides the cells with the largest contributions in four. The error of the quantity is estimated
     from its changes.
 
@@ -62,8 +62,10 @@ def adaptive_study(
     tolerance : float
         Target relative error [-].
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or those of the case. max_dofs, max_rounds : int Limits at which
-        the refinement stops.
+        By default the last of ``study.combinations``, or those of the case.
+    max_dofs, max_rounds : int
+        Limits at which the refinement stops: no new mesh after one with more than 60 % of `max_dofs`, since the next may
+        exceed it.
     on_round : callable, optional
         Called with every `Round`.
     progress : bool
@@ -75,8 +77,10 @@ def adaptive_study(
 
     Raises
     ------
-    CaseError, FastcontactError
-        If the case, a name or a number is wrong, or a mesh could not be solved.
+    CaseError
+        If the case, a name or a number is invalid.
+    FastcontactError
+        If the case could not be solved on one of the meshes.
 
     Examples
     --------
@@ -87,14 +91,14 @@ def adaptive_study(
     case = _checked(case, tolerance)
     chosen = settings(case)
     quantities.check_names(case, [quantity, *chosen.quantities])
-    member = one_combination(chosen, element, formulation)
-    forest, curves = _first_mesh(case, chosen, member)
+    combination = one_combination(chosen, element, formulation)
+    forest, curves = _first_mesh(case, chosen, combination)
     rounds: list[Round] = []
     with StatusLine(80, progress) as line:
         while True:
             started = time.perf_counter()
             linear, leaf = forest.mesh()
-            solved = _case_on(linear, curves, case, chosen, member)
+            solved = _case_on(linear, curves, case, chosen, combination)
             last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
             rounds.append(this)
             if on_round is not None:
@@ -105,7 +109,7 @@ def adaptive_study(
                 break
             forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
-        **of_case(case), combination=str(member), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
+        **of_case(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
         case=solved, last=last, error=error)  # fmt: skip
 
 
@@ -118,21 +122,21 @@ def _checked(case: Case | str | Path, tolerance: float) -> Case:
     return case
 
 
-def _first_mesh(case: Case, chosen: Settings, member: Combination) -> tuple[Forest, list[Any]]:
+def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
     """Return the first mesh, of divisible linear cells, and the curves of its boundary."""
     mesh = case.mesh
-    if chosen.by_shape and member.element is not None:
-        mesh = make_mesh(recipe(chosen, member.element, 0), None)
+    if chosen.by_shape and combination.element is not None:
+        mesh = make_mesh(recipe(chosen, combination.element, 0), None)
     curves = list(chosen.curves) if chosen.curves is not None else circles(mesh)
     return Forest(linearised(mesh), curves), curves
 
 
-def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, member: Combination) -> Case:
+def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, combination: Combination) -> Case:
     """Return the case on another mesh of linear cells, which become quadratic if the element is."""
-    element = member.element
+    element = combination.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
-    return build_case(case_data(chosen, member), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
+    return build_case(case_data(chosen, combination), name=case.name, folder=case.folder, text=case.text, mesh=mesh)
 
 
 def _solved(
@@ -178,7 +182,8 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
     """Return the contribution (n_solids,) of each cell to the error of a quantity, up to a common factor.
 
     The error of a functional is at most the sum over all cells of the solution's error times that of the dual solution, the
-    solution under a load where the quantity is measured (Becker and Rannacher, 2001). For a force that is the solution.
+    solution under a load where the quantity is measured (Becker and Rannacher, 2001). For a force the dual solution is
+    proportional to the solution itself.
     For a value at a point the dual stress falls with the distance d like that under a point force, d^(1 - dim) with dim = 3
     in axisymmetry, too (Boussinesq, 1885; Flamant, 1892), and its error in a cell of size h like h d^-dim.
     """

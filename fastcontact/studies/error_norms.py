@@ -115,6 +115,10 @@ def error_against(
         Temperature rise at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
         strains of the model are included in full.
 
+    Returns
+    -------
+    ErrorNorms
+
     Raises
     ------
     MeshError, ModelError

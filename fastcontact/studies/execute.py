@@ -153,7 +153,7 @@ def _run_rest(
 def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
     """Run in `count` processes of this machine; a run that kills its worker is retried once on its own, then reported."""
     if _imports_its_script():
-        # The script calls the study outside of "if __name__ == '__main__'"; the parent process reports the error.
+        # The script calls the study outside "if __name__ == '__main__'"; the parent process reports the error.
         raise SystemExit(1)
     left = list(rest)
     try:

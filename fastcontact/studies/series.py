@@ -110,19 +110,19 @@ class Series:
     theory, reference : dict of str to float
         Theory at equal approach, and mesh-converged solution if the case names one, by quantity.
     equal_force, equal_force_spread : dict of str to float
-        Theory at the limit of the force, and its change over the error bar of the force, by quantity.
+        Theory at the limit of the force, and its variation within the error bar of the force, by quantity.
     quantities : tuple of str
         Quantities that are fitted if there are enough levels.
     limits : dict of str to Limit
         Limits by quantity; empty with fewer than three levels.
     exact_theory : bool
         Whether the theory describes exactly the bodies of the model, so that there is no model error.
+    compared : str
+        Condition of the comparison with theory: "at equal approach" or "under the given load".
     share : float
         Modelled fraction of the theory's contact [-].
     asked : tuple of str
         Requested quantities, which tables, figures and sentences show before the standard ones.
-    compared : str
-        Condition of the comparison with theory: "at equal approach" or "under the given load".
     """
 
     combination: Combination
@@ -194,6 +194,6 @@ class Series:
         return split(self.values(quantity)[-1], dataclasses.replace(limit, uncertainty=error_bar), theory)
 
     def mesh_error(self, quantity: str) -> float:
-        """Return the error of the finest mesh [-], relative to the theory, or to the limit without a theory."""
+        """Return the error of the finest mesh [-], relative to the theory, or to the limit if there is no theory."""
         split = self.split(quantity)
         return split.mesh if split else self.errors(quantity)[-1]

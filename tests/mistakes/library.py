@@ -169,7 +169,7 @@ MESH = [
             lambda: fc.Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2]]}, {"A": [1]}), fc.MeshError,
             r"cell group 'A' contains cell 1, but there are 1 \(0-based\)"),
     Mistake("an inverted cell", lambda: of_square(cells=turned), fc.MeshError,
-            r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: turn it with mesh, count = fastcontact\.topology\.oriented\(mesh\), or refine if it is curved"),
+            r"cell 2 \(quad4 at \(0\.75, 0\.25\), area -0\.25\) is inverted, one of 1 such cells: reorient it with mesh, count = fastcontact\.topology\.oriented\(mesh\), or refine if it is curved"),
     Mistake("a folded cell", lambda: of_square(moved(4, (0.9, 0.9))), fc.MeshError, r"cell 3 .* is inverted"),
     Mistake("a folded 3D mesh with reoriented cells", lambda: topology.oriented(folded_box()), fc.MeshError,
             r"cells \d+ and \d+ lie on the same side of the facet between them, near \(.*\), one of \d+ such pairs: the mesh is folded there; move its nodes or remesh"),

@@ -191,7 +191,7 @@ def _excluded_nodes(
 
 
 def _obstacle(mesh: fc.Mesh, zone: Entry, supports: Sequence[Support]) -> HalfSpace:
-    """Return the half space behind a flat master surface without a solid that stands still."""
+    """Return the half-space behind a flat master surface without a solid that stands still."""
     nodes, slave = (nodes_of(mesh, {"GROUP_MA": zone[side]}) for side in ("master", "slave"))
     for axis in "xyz"[: mesh.dim]:
         holding = [s for s in supports if s.component == axis and not callable(s.value) and s.value == 0.0]

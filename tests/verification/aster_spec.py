@@ -101,7 +101,7 @@ def problem(path: Path, number: int) -> Problem:
     masters = [nodes_of(mesh, {"GROUP_MA": zone["master"]}) for zone in run["contact"]["zones"]]
     obstacles = np.setdiff1d(np.concatenate(masters), solid)
     for support in supports:
-        if np.isin(support.nodes, obstacles).all():  # `add_zone` turns these into half spaces that stand still
+        if np.isin(support.nodes, obstacles).all():  # `add_zone` turns these into half-spaces that stand still
             continue
         model.prescribe(support.group, ramp=support.history, **{support.component: support.value})
     for load in run["loads"]:

@@ -1,6 +1,6 @@
 """Two equal cylinders in plane strain, pressed and loaded tangentially: partial slip, reversal, residual tractions.
 
-The bodies mirror each other, so pressure and shear are not coupled, and Cattaneo's solution is exact for half planes.
+The bodies mirror each other, so pressure and shear are not coupled, and Cattaneo's solution is exact for half-planes.
 """
 
 from functools import cache

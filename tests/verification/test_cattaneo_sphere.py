@@ -91,7 +91,7 @@ def measured_radii(instant):
 
 
 def on_half_space(x, z):
-    """Displacement along x of the surface of a half space, beyond the traction sqrt(1 - r^2/a^2) along x within r < a.
+    """Displacement along x of the surface of a half-space, beyond the traction sqrt(1 - r^2/a^2) along x within r < a.
 
     Cerruti's point load (Johnson 1985, eq. 3.75), summed. Returns also the force.
     """
@@ -106,7 +106,7 @@ def on_half_space(x, z):
 
 @cache
 def excess_compliance():
-    """How much more than a half space each body gives under a tangential force, from a solution without contact."""
+    """How much more than a half-space each body gives under a tangential force, from a solution without contact."""
     mesh = half_spheres()
     model = held(mesh)
     model.fix("FAR_UPPER", "xyz")
@@ -141,7 +141,7 @@ def test_stick_radius(instant):
 
 @pytest.mark.parametrize("instant", first_of(1, [2, 3, 4]))
 def test_tangential_displacement(instant):
-    """Of distant points of two half spaces: less what the bodies, which are none, give more than those."""
+    """Of distant points of two half-spaces: less what the bodies, which are none, give more than those."""
     drawn = DRAW * np.interp(instant, *np.transpose(ALONG))
     found = drawn - 2 * excess_compliance() * forces(instant)[1]
     assert found == pytest.approx(theory(instant).tangential_displacement, abs=0.01 * theory(2).tangential_displacement)

@@ -235,7 +235,7 @@ def test_a_case_file_and_the_command_line_ask_for_nodal_diameters(tmp_path, caps
     assert main(["run", str(path), "-o", str(out), "--modes", str(shapes), "--nodal-diameters", "0,3"]) == 0
     assert len(fc.open_results(shapes)) == 4
     assert main(["run", str(path), "-o", str(out), "--nodal-diameters", "0;3"]) == 1
-    assert "whole numbers with commas" in capsys.readouterr().err
+    assert "integers separated by commas" in capsys.readouterr().err
     gif = tmp_path / "mode.gif"
     args = ["plot", str(shapes), "--step", "2", "--scale", "0.1", "--field", "displacement"]
     assert main([*args, "--animate", str(gif), "--phases", "3"]) == 0

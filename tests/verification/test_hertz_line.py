@@ -45,7 +45,7 @@ def against_hertz(element, formulation, size):
     ("tri6", "continuous", 0.1, 5e-3),
 ])  # fmt: skip
 def test_a_rigid_cylinder_on_a_block_is_hertz_at_equal_force(element, formulation, size, bound):
-    """What is left of quadratic elements, 4e-4, is the block of 20 half-widths that stands for a half plane."""
+    """What is left of quadratic elements, 4e-4, is the block of 20 half-widths that stands for a half-plane."""
     assert max(against_hertz(element, formulation, size)) < bound
 
 

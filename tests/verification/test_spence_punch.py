@@ -1,4 +1,4 @@
-"""A rigid flat punch on a half plane with friction (Spence 1973): the stick zone does not depend on the load.
+"""A rigid flat punch on a half-plane with friction (Spence 1973): the stick zone does not depend on the load.
 
 The stick zone is that of solutions by boundary elements in which shear changes the pressure; the formula of the
 literature, which leaves that out, is up to half as large again.

@@ -158,7 +158,7 @@ REFUSED = {
     "needs 'centre'": {"rotation": {"angle": 1.0}},
     "in the plane it is about z": {"rotation": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)}},
     "did you mean 'centre'": {"rotation": {"angle": 1.0, "center": (0.0, 0.0)}},
-    "what its axis moves by": {"rotation": {"angle": 1.0, "centre": (0.0, 0.0)}, "normal": 1.0},
+    "give the displacement of its axis": {"rotation": {"angle": 1.0, "centre": (0.0, 0.0)}, "normal": 1.0},
 }
 
 

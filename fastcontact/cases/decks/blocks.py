@@ -345,7 +345,7 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
         raise block.refuse(f"'{shown}' is not a file name") from None
     if not inside:
         raise block.refuse(
-            f"'{shown}' is outside of the folder of the deck: refused, copy the file below '{source.folder}'"
+            f"'{shown}' is outside the folder of the deck: refused, copy the file below '{source.folder}'"
         )
     if not there:
         raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")

@@ -1,4 +1,4 @@
-"""Building of a model and a ramp from the content of a deck."""
+"""Build a model and a ramp from the content of a deck."""
 
 from __future__ import annotations
 

@@ -83,8 +83,11 @@ class Deck:
             Step k of the deck ends at load factor k. Displacements are along the global axes; reactions are the forces
             of supports, without those of equations and couplings; forces of plane models are for the whole thickness.
 
-        Errors and warnings are those of `fastcontact.solve`. If the deck requests NLGEOM but small strains are used, a
-        FastcontactWarning states the largest strain and rotation, whose squares linear kinematics neglect.
+        Warns
+        -----
+        FastcontactWarning
+            If the deck requests NLGEOM but small strains are used: it states the largest strain and rotation, whose
+            squares linear kinematics neglect. Other warnings, and errors, are those of `fastcontact.solve`.
         """
         steps: list[StepResult] = []
         for step in self.solve_steps(**options):

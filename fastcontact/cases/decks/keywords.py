@@ -132,10 +132,10 @@ OUTPUT = (
     "PREPRINT", "PRINT", "RESTART", "SECTION FILE", "SECTION PRINT", "TIME POINTS", "CONTROLS",
 )  # fmt: skip
 # Reasons why other keywords of the format are refused.
-LINEAR = "is outside of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
-STATIC = "is outside of fastcontact (quasi-static: *STATIC, steady heat, and *FREQUENCY behind them)"
-SOLIDS = "is outside of fastcontact (solid elements only)"
-HEAT = "is outside of fastcontact (steady conduction of heat, without radiation)"
+LINEAR = "is outside the scope of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
+STATIC = "is outside the scope of fastcontact (quasi-static: *STATIC, steady heat, and *FREQUENCY behind them)"
+SOLIDS = "is outside the scope of fastcontact (solid elements only)"
+HEAT = "is outside the scope of fastcontact (steady conduction of heat, without radiation)"
 NOT_YET = "is not supported"
 REFUSED = {
     **dict.fromkeys(

@@ -29,7 +29,9 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
         known = ", ".join(content.orientations).lower() or "none"
         raise location.refuse(f"orientation '{name}' is not defined; orientations: {known}")
     if axes.distribution and location.keyword != "SOLID SECTION":
-        raise location.refuse(f"orientation '{name}' is one of cells, by a distribution: no use outside of sections")
+        raise location.refuse(
+            f"orientation '{name}' is one of cells, by a distribution: it can be used in sections only"
+        )
     return axes
 
 

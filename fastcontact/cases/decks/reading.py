@@ -1,4 +1,4 @@
-"""Reading of the blocks of a deck into its content, with a check of the context of each keyword."""
+"""Read the blocks of a deck into its content, and check that each keyword is in its place."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 from fastcontact.cases.decks.keywords import OUTPUT, checked, spelled
 
-IN_LAYERS = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
+# Damage keywords, which are supported for cohesive layers only.
+COHESIVE_DAMAGE = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
 
 
 @dataclass
@@ -40,9 +41,9 @@ class Reader:
                 raise block.refuse("belongs below *MATERIAL")
             read(content, self.material, block)
             return
-        if self.material is not None and keyword in IN_LAYERS:
+        if self.material is not None and keyword in COHESIVE_DAMAGE:
             name = self.material.name
-            raise block.refuse(f"material '{name}': damage of bodies is outside of fastcontact, that of layers is not")
+            raise block.refuse(f"material '{name}': damage is supported for cohesive layers only, not in bodies")
         self.material = None
         if known.place == "interaction":
             if self.interaction is None:
@@ -53,7 +54,7 @@ class Reader:
         if known.place == "part":
             self._not_in_step(block)
             if self.instance is not None:
-                raise block.refuse("is not supported inside of an instance: put it into the part or the assembly")
+                raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
             read(content, self.part or self.content.root, block)
         elif known.place == "model":
             if keyword != "AMPLITUDE":
@@ -76,7 +77,7 @@ class Reader:
 
     def _not_in_part(self, block: Block) -> None:
         if self.part is not None or self.instance is not None:
-            raise block.refuse("is supported for the whole assembly only, not inside of a part or instance")
+            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
 
     def _heading(self, block: Block) -> None:
         self.content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
@@ -122,7 +123,7 @@ class Reader:
 
     def _step(self, block: Block) -> None:
         if self.step is not None:
-            raise block.refuse("the step before has no *END STEP")
+            raise block.refuse("the previous step has no *END STEP")
         self._not_in_part(block)
         self.step = stepping.new_step(self.content, block)
 

@@ -37,7 +37,7 @@ def _direction(side: str) -> float:
 @typed(ContactError)
 @dataclass(frozen=True)
 class HalfSpace:
-    """The half space behind a plane.
+    """The half-space behind a plane.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Reference solver: pyamg's smoothed aggregation as preconditioner of SciPy's conjugate gradients.
 
-Simple and slow on purpose. It serves to check our multigrid, "amg", and to compare with it: everything here except the choice
-of pivots is pyamg's and SciPy's. Equations are eliminated, ``u = T v + t``, and each set of equations gets its own hierarchy
-for the matrix ``T.T K T``.
+Deliberately simple and slow. It serves to check our multigrid, "amg", and to compare with it: everything here except
+the choice of pivots is pyamg's and SciPy's. Equations are eliminated, ``u = T v + t``, and each set of equations gets
+its own hierarchy for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Conversion of Gmsh files of versions that meshio does not read."""
+"""Convert Gmsh files of versions that meshio does not read."""
 
 from __future__ import annotations
 

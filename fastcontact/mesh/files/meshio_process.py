@@ -1,4 +1,4 @@
-"""Reading of mesh files by meshio in a child process, with limits of memory and computing time.
+"""Read mesh files with meshio in a child process, with limits of memory and computing time.
 
 meshio allocates whatever a file announces, and several of its readers do not terminate on a truncated file. Here only
 the child process is ended, and the file is refused with the reason. Windows has no such limits: there only the elapsed

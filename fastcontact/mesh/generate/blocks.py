@@ -50,6 +50,10 @@ def block(
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> from fastcontact import generate
@@ -112,6 +116,10 @@ def block_on_block(
     distortion : float
         How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> from fastcontact import generate
@@ -168,6 +176,10 @@ def cylinder_on_block(
         Longest edges far from the contact, R/10 by default [length].
     contact_size : float, optional
         Edges along the surfaces at the contact, R/100 by default [length].
+
+    Returns
+    -------
+    Mesh
 
     Examples
     --------

@@ -57,6 +57,10 @@ def box(
     name : str
         Name of the solid group.
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> mesh = box((2.0, 1.0, 1.0), (2, 1, 1), "wedge6")

@@ -1,4 +1,4 @@
-"""Cutting of a mesh along a group of internal facets, as for the pretension section of a bolt."""
+"""Cut a mesh along a group of internal facets, for example at the pretension section of a bolt."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     ----------
     mesh : Mesh
     group : str
-        Facets between solids, through a whole body: the cut ends at its surface.
+        Facets between solid cells that divide a body completely: the edge of the cut lies on the surface of the body.
     normal : sequence of float (dim,), optional
         Direction to the side that gets the new nodes [-]. By default the normal of the plane fitted to the facets,
         with its largest component positive.
@@ -57,16 +57,16 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     direction = _direction(mesh, group, points, normal)
     beyond = _cells_beyond(mesh, group, section, points, direction)
-    new = np.full(mesh.n_points, -1, np.int32)
-    new[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
-    return _opened(mesh, group, section, facets, beyond, new)
+    new_node = np.full(mesh.n_points, -1, np.int32)
+    new_node[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
+    return _opened(mesh, group, section, facets, beyond, new_node)
 
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
-    """Return the unit vector (dim,) across a section."""
+    """Return the unit normal (dim,) of a section."""
     if normal is None:
-        places = mesh.points[points] - mesh.points[points].mean(axis=0)
-        across = np.linalg.svd(places, full_matrices=True)[2][-1]
+        positions = mesh.points[points] - mesh.points[points].mean(axis=0)
+        across = np.linalg.svd(positions, full_matrices=True)[2][-1]
         return np.asarray(across * np.sign(across[np.argmax(np.abs(across))]))
     vector = np.asarray(normal, float)
     length = np.linalg.norm(vector)
@@ -75,7 +75,7 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
     return np.asarray(vector / length)
 
 
-def _sides(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
+def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
     """Yield the facets of all solids that have touched points: element, row and nodes."""
     for name, block in mesh.solids.items():
         rows = np.flatnonzero(touched[block].any(axis=1))
@@ -92,13 +92,13 @@ def _cells_beyond(
     touched[points] = True
     number: dict[tuple[str, int], int] = {}
     owners: dict[Facet, list[int]] = {}
-    for name, row, facet in _sides(mesh, touched):
+    for name, row, facet in _facets_at(mesh, touched):
         owners.setdefault(facet, []).append(number.setdefault((name, row), len(number)))
     if any(len(owners.get(facet, ())) != 2 for facet in section):
         wrong = sum(len(owners.get(facet, ())) != 2 for facet in section)
         raise MeshError(
             f"{wrong} of {len(section)} facets of '{group}' do not lie between two solids that share their nodes: a cut "
-            "needs facets inside of a body"
+            "needs facets inside a body"
         )
     joined = np.array([pair for facet, pair in owners.items() if len(pair) == 2 and facet not in section], int)
     joined = joined.reshape(-1, 2)
@@ -126,23 +126,28 @@ def _sides_of_parts(
             if side.setdefault(number, beyond) != beyond:
                 where = mesh.points[list(facet)].mean(axis=0)
                 raise MeshError(
-                    f"the facets of '{group}' do not cut through: the cells on both sides are joined beside them (near "
-                    f"{where}); let the group reach through the whole body, and across its normal {direction}"
+                    f"the facets of '{group}' do not divide the body: the cells on both sides are still connected (near "
+                    f"{where}); extend the group to the surface of the body, with a normal across it (now {direction})"
                 )
     return side
 
 
 def _opened(
-    mesh: Mesh, group: str, section: set[Facet], facets: dict[str, Numbers], beyond: dict[str, list[int]], new: Numbers
+    mesh: Mesh,
+    group: str,
+    section: set[Facet],
+    facets: dict[str, Numbers],
+    beyond: dict[str, list[int]],
+    new_node: Numbers,
 ) -> Mesh:
-    """Return the mesh with the `new` nodes (n_points,), -1 where there are none, in the cells beyond the section."""
+    """Return the mesh with each `new_node` (n_points,), -1 where there is none, in the cells beyond the section."""
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
-    moved = [_with_nodes(cells, name, np.array(rows), new) for name, rows in beyond.items()]
+    moved = [_with_nodes(cells, name, np.array(rows), new_node) for name, rows in beyond.items()]
     outer = {facet for sides in moved for facet in sides} - section
     for name, block in mesh.facets.items():
-        rows = np.flatnonzero((new[block] >= 0).any(axis=1))
+        rows = np.flatnonzero((new_node[block] >= 0).any(axis=1))
         follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
-        _with_nodes(cells, name, np.array(follow, int), new)
+        _with_nodes(cells, name, np.array(follow, int), new_node)
     groups = {}
     starts = starts_of({name: range(len(block) + len(facets.get(name, ()))) for name, block in cells.items()})
     for named, members in mesh.cell_groups.items():
@@ -152,19 +157,20 @@ def _opened(
         [starts[name] + len(cells[name]) + np.arange(len(block)) for name, block in facets.items()]
     )
     for name, block in facets.items():
-        cells[name] = np.concatenate([cells[name], new[block]])
-    old = np.flatnonzero(new >= 0)
+        cells[name] = np.concatenate([cells[name], new_node[block]])
+    old = np.flatnonzero(new_node >= 0)
     point_groups = {
-        name: np.concatenate([members, new[members[new[members] >= 0]]]) for name, members in mesh.point_groups.items()
+        name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
+        for name, members in mesh.point_groups.items()
     }
     return Mesh(np.concatenate([mesh.points, mesh.points[old]]), cells, groups, point_groups)
 
 
-def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new: Numbers) -> list[Facet]:
+def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new_node: Numbers) -> list[Facet]:
     """Replace the nodes of some cells of an element by the new ones, in place; return the old facets of solid cells."""
     if not len(rows):
         return []
     block = cells[name][rows]
     sides = [frozenset(block[i, list(f)].tolist()) for f in elements.get(name).facets for i in range(len(rows))]
-    cells[name][rows] = np.where(new[block] >= 0, new[block], block)
+    cells[name][rows] = np.where(new_node[block] >= 0, new_node[block], block)
     return sides

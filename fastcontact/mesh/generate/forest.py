@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
 CORNERS = {"line2": 2, "tri3": 3, "quad4": 4}
-# Children of a cell by its corners 0.., then the middles of its edges, then (quadrangles) its centre.
+# Nodes of the children of a cell: its corners come first, then the middles of its edges, then (quadrangles) its centre.
 RED = {
     "line2": [[0, 2], [2, 1]],
     "tri3": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]],
@@ -37,7 +37,7 @@ GREEN: dict[tuple[str, int], dict[str, list[list[int]]]] = {
 
 @dataclass(eq=False)
 class _Leaves:
-    """Leaves of one kind: corners (n, k), and the cell of the initial mesh from which each descends."""
+    """Leaves of one element type: corners (n, k), and the cell of the initial mesh from which each descends."""
 
     corners: AnyArray
     root: AnyArray
@@ -47,14 +47,17 @@ class _Leaves:
 class Forest:
     """A mesh that can be refined locally any number of times.
 
-        MeshError if a cell is of another type, or the group of a curve has no facet on the curve.
-
     Parameters
     ----------
     mesh : Mesh
-        Two-dimensional: line2, tri3, quad4.
-    curves : iterable of Curve
+        Two-dimensional mesh of line2, tri3 and quad4 cells.
+    curves : iterable of Curve, optional
         Exact shapes of the boundary: new points of facets on a curve are moved onto it.
+
+    Raises
+    ------
+    MeshError
+        If a cell is of another type, or the group of a curve has no facet on the curve.
 
     Examples
     --------
@@ -72,7 +75,7 @@ class Forest:
                     f"{len(block)} cells of {name} cannot be refined locally: use `linearised` on a mesh of triangles and "
                     "quadrangles, and `to_quadratic` after refinement"
                 )
-        self.first, self.curves = mesh, list(curves)
+        self.initial, self.curves = mesh, list(curves)
         self.points = mesh.points
         self._leaves = {
             name: _Leaves(block.astype(np.int64), mesh.offsets[name] + np.arange(len(block)))
@@ -99,7 +102,8 @@ class Forest:
         Parameters
         ----------
         marked : ndarray of bool (n_leaves,)
-            By element type as in `solids`; leaves of one type in the order of the origins of `mesh()`.
+            Whether to divide each leaf. Leaves are ordered by element type as in `solids`, with the numbers that `mesh`
+            returns.
         """
         starts = np.cumsum([0, *(len(self._leaves[name].corners) for name in self.solids)])
         marks = {name: marked[a:b] for name, a, b in zip(self.solids, starts[:-1], starts[1:], strict=True)}
@@ -138,7 +142,7 @@ class Forest:
         self._middle = np.concatenate([self._middle, numbers])[order]
 
     def _quarter(self, name: str, mask: Mask) -> None:
-        """Divide the marked leaves of one kind."""
+        """Divide the marked leaves of one element type, quadrangles and triangles in four, lines in two."""
         leaves = self._leaves[name]
         parents = leaves.corners[mask]
         keys = edges_of(name, parents)
@@ -170,6 +174,7 @@ class Forest:
         return np.asarray(twice.any(axis=1) | ((count > 1) & ~opposite))
 
     def _halve_lines(self) -> None:
+        """Divide the lines whose edge is divided, until there are none."""
         if "line2" not in self._leaves:
             return
         while True:
@@ -197,13 +202,13 @@ class Forest:
             first += len(leaves.corners) if name != "line2" else 0
         cells_by = {kind: np.concatenate(parts) for kind, parts in blocks.items()}
         root = np.concatenate([np.concatenate(roots[kind]) for kind in cells_by])
-        groups = {group: np.flatnonzero(np.isin(root, members)) for group, members in self.first.cell_groups.items()}
+        groups = {group: np.flatnonzero(np.isin(root, members)) for group, members in self.initial.cell_groups.items()}
         mesh = Mesh(self.points, cells_by, groups, self._groups)
         check_cells(mesh)
         return mesh, np.concatenate([np.concatenate(owners[kind]) for kind in mesh.solids])
 
     def _fitted(self, name: str, corners: AnyArray) -> list[tuple[str, AnyArray, AnyArray]]:
-        """Return kinds, cells and their leaves: undivided, or divided (green) if their edges are."""
+        """Return element type, cells and leaf of each cell: leaves with divided edges are divided (green), others are not."""
         if name == "line2":
             return [(name, corners, np.arange(len(corners)))]
         middles = self._middles(edges_of(name, corners))

@@ -1,4 +1,4 @@
-"""Blocks that represent half planes and half spaces: under an indenter, under a flat punch, crowned against each other."""
+"""Blocks that represent half-planes and half-spaces: under an indenter, under a flat punch, crowned against each other."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def graded_block(
 ) -> Mesh:
     """Block under an indenter: x >= 0, and y >= 0 in three dimensions, its top at height 0, finest at the origin.
 
-    It represents a half plane or half space in contact with a rigid obstacle: with a width and depth of 8 contact
+    It represents a half-plane or half-space in contact with a rigid obstacle: with a width and depth of 8 contact
     radii the error of the pressure is a few thousandths. The height is the last coordinate, as for obstacles. Groups
     of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three
     dimensions, SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
@@ -58,6 +58,10 @@ def graded_block(
         Longest edges far from the contact, width/4 by default [length].
     growth : float
         Increase of the edges over the distance beyond, until they reach `size`.
+
+    Returns
+    -------
+    Mesh
 
     Examples
     --------
@@ -108,7 +112,7 @@ def punched_block(
 ) -> Mesh:
     """Block under a flat punch, the half x >= 0, its top at y = 0, finest at the punch's edge.
 
-    A grid line passes through the edge. The body represents a half plane or half space: its finite size changes the
+    A grid line passes through the edge. The body represents a half-plane or half-space: its finite size changes the
     results by about `punch_radius` over `extent`, in plane problems by twice as much. Groups of cells: BLOCK, TOP,
     PUNCHED (the top under the punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points: POLE (the origin) and EDGE.
 
@@ -124,6 +128,10 @@ def punched_block(
         Edges at the punch's edge and below the whole top, punch_radius/200 by default [length].
     growth : float
         Ratio of the lengths of adjacent edges away from the punch's edge, more than 1.
+
+    Returns
+    -------
+    Mesh
 
     Examples
     --------
@@ -158,7 +166,7 @@ def crowned_blocks(
 ) -> Mesh:
     """Two blocks above each other whose facing sides are parabolas of radius R that touch at the origin.
 
-    Both represent half planes. They include x < 0, for tangential loads, and mirror each other, so that nodes match
+    Both represent half-planes. They include x < 0, for tangential loads, and mirror each other, so that nodes match
     and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER, CONT_UPPER (their
     facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of points: POLE_LOWER,
     POLE_UPPER (two points at the origin).
@@ -178,6 +186,10 @@ def crowned_blocks(
         Smallest length of edges [length].
     growth : float
         Ratio of the lengths of adjacent edges beyond, more than 1.
+
+    Returns
+    -------
+    Mesh
 
     Examples
     --------

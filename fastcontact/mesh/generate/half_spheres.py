@@ -67,6 +67,10 @@ def half_spheres(
         Quadrangles only: segments of the radial line M-C at the contact C and at M, in geometric progression
         between; by default `segments` of them, graded as much as the arc [length].
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> mesh = half_spheres("quad4", segments=4, arc_sizes=(2.0, 5.0))
@@ -101,6 +105,10 @@ def quarter_disc(
         As for `half_spheres`.
     body : {"lower", "upper"}
         The body to generate.
+
+    Returns
+    -------
+    Mesh
 
     Examples
     --------

@@ -43,7 +43,9 @@ class Circle:
     Parameters
     ----------
     centre : (float, float)
-        Centre [length]. radius : float Greater than 0 [length].
+        Centre [length].
+    radius : float
+        Greater than 0 [length].
     group : str, optional
         Group of facets that lie on it; by default all outer facets whose ends lie on it.
 
@@ -78,10 +80,8 @@ class Circle:
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
     """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
 
-    A mid node lies half-way between the ends of its edge, or on the curve if the edge belongs to a facet of the
-    curve's group and both ends lie on the curve. Points keep their numbers; mid nodes follow, then centre nodes.
-    MeshError if a cell is quadratic already, `centre_nodes` is given for a 3D mesh, the group of a curve has no edge
-    on the curve, or a curved side makes the Jacobian of a cell nonpositive at a quadrature point.
+    A mid node lies half-way between the ends of its edge, or on the curve if the edge belongs to a facet of the curve's
+    group and both ends lie on the curve. Points keep their numbers; mid nodes follow, then centre nodes.
 
     Parameters
     ----------
@@ -91,6 +91,16 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
         Exact shapes of the boundary, for example `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        If a cell is quadratic already, `centre_nodes` is given for a 3D mesh, the group of a curve has no edge on the
+        curve, or a curved side makes the Jacobian of a cell nonpositive at a quadrature point.
 
     Examples
     --------

@@ -72,8 +72,7 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     New points are interpolated by the shape functions of the parent cell, or lie on a curve if they belong to a facet
     of the curve's group with all nodes on the curve. Points keep their numbers. Cell groups contain the children of
     their cells; a new point belongs to every point group that holds all nodes of its edge (or, inside a cell, of the
-    cell). MeshError if a cell is of another type, the group of a curve has no facet on the curve, or a curved side
-    makes a child invalid.
+    cell).
 
     Parameters
     ----------
@@ -81,6 +80,16 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
         Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
     curves : iterable of Curve
         Exact shapes of the boundary, for example `Circle`; see also `circles`.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        If a cell is of another type, the group of a curve has no facet on the curve, or a curved side makes a child
+        invalid.
 
     Examples
     --------

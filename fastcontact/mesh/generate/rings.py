@@ -40,6 +40,10 @@ def rings(
     divisions_inner, divisions_outer : (int, int)
         Cells along the radius and around the quarter; those around may differ.
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> sorted(rings("quad4").cell_groups)[:4]

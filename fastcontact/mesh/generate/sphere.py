@@ -64,6 +64,10 @@ def sphere_on_block(
         Increase of the edge length per distance beyond, until it reaches `size`. It limits the accuracy that a smaller
         `contact_size` can reach.
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> mesh = sphere_on_block("tet4", contact_size=5.0)
@@ -104,6 +108,10 @@ def sphere_octant(
     ----------
     element, R, size, contact_size, contact_radius, growth
         As for `sphere_on_block`.
+
+    Returns
+    -------
+    Mesh
 
     Examples
     --------

@@ -34,6 +34,10 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
         New name by old name. Names that a mapping lacks are kept; None removes the group. Groups that get the same
         name are united.
 
+    Returns
+    -------
+    Mesh
+
     Examples
     --------
     >>> from fastcontact import generate
@@ -56,8 +60,6 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
     """Return the mirror image; cells and facets keep their orientation.
 
-    MeshError if the mesh has no such axis.
-
     Parameters
     ----------
     mesh : Mesh
@@ -67,6 +69,15 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
         Position of the mirror plane on that axis [length].
     rename : mapping or callable, optional
         New names of groups, as in `renamed`.
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        If the mesh has no such axis.
 
     Examples
     --------
@@ -87,8 +98,6 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
 def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
     """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
 
-    MeshError if a number is out of range, or a 3D mesh is to be rotated.
-
     Parameters
     ----------
     mesh : Mesh
@@ -98,6 +107,15 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
         Factor, greater than 0.
     rotate : float
         Angle, counter-clockwise [degrees].
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        If a number is out of range, or a 3D mesh is to be rotated.
 
     Examples
     --------
@@ -125,7 +143,10 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 def union(*meshes: Mesh) -> Mesh:
     """Return the union of several meshes: no points are merged, and groups of the same name are united.
 
-    MeshError if there is no mesh or the dimensions differ.
+    Raises
+    ------
+    MeshError
+        If there is no mesh or the dimensions differ.
 
     Examples
     --------
@@ -177,14 +198,22 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     """Return the mesh with points closer than `tolerance` merged into the first of them.
 
-    All close points are merged, also where two bodies only touch; chains of close points become one. MeshError if two
-    nodes of one cell would coincide, since the tolerance exceeds the length of an edge.
+    All close points are merged, also where two bodies only touch; chains of close points become one.
 
     Parameters
     ----------
     mesh : Mesh
     tolerance : float
         Largest distance of points to merge, at least 0 [length].
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    MeshError
+        If two nodes of one cell would coincide, since the tolerance exceeds the length of an edge.
 
     Examples
     --------

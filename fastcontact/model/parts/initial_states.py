@@ -41,15 +41,16 @@ class ModelInitialStates(ModelLoads):
     ) -> None:
         """Prescribe the temperature of groups of solid cells, whose materials expand by their `expansion`.
 
-        Temperatures are nodal: cells beside a group have a gradient where they share nodes with it. Several temperatures add
-        up by their rise above the reference.
+        Temperatures are nodal: cells adjacent to a group have a temperature gradient where they share nodes with it. If
+        several temperatures act, their rises above the references are added.
 
         Parameters
         ----------
         value : float, callable or ndarray (n_points,) or (n_instants, n_points)
-            A number, a function from reference positions (n, dim) [length] to temperatures (n,), one for each point of the
-            mesh, or that at several instants [temperature].
+            A number, a function from reference positions (n, dim) [length] to temperatures (n,), nodal values, or nodal
+            values at several instants [temperature].
         groups : str or sequence of str, optional
+            By default all solid cells.
         reference : float
             Temperature without thermal strain [temperature].
         times : sequence of float (n_instants,), optional
@@ -69,7 +70,7 @@ class ModelInitialStates(ModelLoads):
         checked = checked_value(value)
         if times is not None:
             if ramp is not None:
-                raise ModelError("a temperature has either times of its instants or a ramp, not both")
+                raise ModelError("give either times or ramp for a temperature, not both")
             if not isinstance(checked, np.ndarray) or checked.ndim != 2:
                 raise ModelError("a temperature with times must be an array (n_instants, n_points)")
             temperatures = histories(names, checked, reference, times)
@@ -102,10 +103,11 @@ class ModelInitialStates(ModelLoads):
         field : str
             Name of the field.
         groups : str or sequence of str, optional
+            By default all solid cells.
         reference : float
             Temperature without thermal strain [temperature].
         instant : float, optional
-            The only time of the file to use.
+            Use only this time of the file.
         times : sequence of float (n_instants,), optional
             Load factors of the instants, between which temperatures are interpolated linearly [-]; by default the times of
             the file.
@@ -130,7 +132,7 @@ class ModelInitialStates(ModelLoads):
         values = np.where(np.isfinite(values), values, reference)
         if len(values) == 1:
             if times is not None:
-                raise ModelError(f"field '{field}' has one instant, so it has no times: give it a ramp")
+                raise ModelError(f"field '{field}' has a single instant: give ramp instead of times")
             self.add_temperature(values[0], names, reference=reference, ramp=ramp)
             return
         if ramp is not None:
@@ -155,12 +157,13 @@ class ModelInitialStates(ModelLoads):
     ) -> None:
         """Prescribe an initial stress in groups of solid cells, by default all.
 
-        Its part that is not in equilibrium deforms the bodies. In axisymmetry x, y, z stand for radius, axis and
+        The part of it that is not in equilibrium deforms the bodies. In axisymmetry x, y, z stand for radius, axis and
         circumference.
 
         Parameters
         ----------
         groups : str or sequence of str, optional
+            By default all solid cells.
         xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
             Components, by default zero; numbers, functions or arrays like E of `LinearElastic` [pressure].
         axes : sequence or callable, optional
@@ -195,6 +198,7 @@ class ModelInitialStates(ModelLoads):
         Parameters
         ----------
         groups : str or sequence of str, optional
+            By default all solid cells.
         xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
             Components, as in `add_initial_stress`; xy, yz and xz are engineering shears, twice those of the tensor [-].
         axes : sequence or callable, optional
@@ -233,7 +237,7 @@ class ModelInitialStates(ModelLoads):
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
-        """Return the temperature rise (n_points,) of thermal expansion [temperature]; None without it.
+        """Return the temperature rise (n_points,) that causes thermal expansion [temperature]; None without it.
 
         `temperature_factors` and `temperature` (n_points,) [temperature] are those of `stress_offset`.
         """
@@ -258,7 +262,7 @@ class ModelInitialStates(ModelLoads):
         return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
 
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return by history the nodal forces (n_points, dim) of thermal strains at multiplier 1 [force].
+        """Return the nodal forces (n_points, dim) of thermal strains at multiplier 1, by history [force].
 
         ModelError if a heated material has no coefficient of expansion.
         """

@@ -82,7 +82,7 @@ class ModelSupports(ModelContact):
             Outward displacement along the mean normal of the facets at each node, for groups of facets [length].
         axes : sequence or callable, optional
             Directions (k, 3) [-] of x, y and z, as unit vectors in rows or a function like those of materials; in the plane
-            a single vector of two numbers will do. ``axes=fc.CylindricalAxes()``: radial, circumferential and axial.
+            a single vector of two numbers suffices. ``axes=fc.CylindricalAxes()``: radial, circumferential and axial.
         rotation : mapping, optional
             Rigid rotation of the group about an axis, exact for any angle: ``angle`` at multiplier 1 [radian]; ``centre``,
             a point of the axis (dim,) [length]; in 3D ``axis``, its direction; ``ramp``, a history of its own. All
@@ -107,17 +107,17 @@ class ModelSupports(ModelContact):
         """
         if rotation is not None:
             if axes is not None or normal is not None:
-                raise ModelError(f"the support of '{group}' turns: give what its axis moves by as x, y, z")
+                raise ModelError(f"the support of '{group}' rotates: give the displacement of its axis as x, y, z")
             turned = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
             self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *turned)
             return
         if axes is not None:
             if normal is not None:
-                raise ModelError(f"the support of '{group}' is along its normals or along axes: name one of them")
+                raise ModelError(f"the support of '{group}' acts along its normals or along axes: give one of them")
             self._along_axes(group, components, axes, ramp)
             return
         if normal is not None:
-            name = f"the displacement normal prescribed on '{group}'"
+            name = f"the normal displacement prescribed on '{group}'"
             check_value(name, normal)
             nodes, directions = normals_of(self.mesh, group)
             values = evaluated(normal, self.mesh.points[nodes], name)
@@ -143,7 +143,7 @@ class ModelSupports(ModelContact):
             check_value(caption, value)
             direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > SINGLE_PRECISION:
-                raise ModelError(f"{name}: its axes leave the plane, where nothing moves")
+                raise ModelError(f"{name}: its axes have components out of the plane of the model")
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
             table = table_of(ramp, f"the ramp of {caption}")
             values = evaluated(value, places, caption)
@@ -165,7 +165,7 @@ class ModelSupports(ModelContact):
             self.supports.append(support)
 
     def prescribed(self) -> tuple[Mask, Array]:
-        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at ramp value 1."""
+        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at multiplier 1."""
         fixed, by_ramp = self.prescribed_by_ramp()
         return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
 
@@ -200,7 +200,7 @@ class ModelSupports(ModelContact):
         )
 
     def _hold_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:
-        """Add the symmetry at the axis of an axisymmetric model to the supports, and refuse contradicting ones."""
+        """Fix the radial displacement at the axis of an axisymmetric model; raise ModelError if a support contradicts it."""
         axis = self.axis_nodes
         for values in by_ramp.values():
             off = axis[np.abs(values[axis, 0]) > SINGLE_PRECISION * np.abs(values).max()]

@@ -1,4 +1,4 @@
-"""The deformed shape over the load steps as a moving picture."""
+"""Animation of the deformed shape over the load steps."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ RESOLUTION = 90
 
 @dataclass(frozen=True)
 class MovingPicture:
-    """A moving picture in a file, which notebooks show.
+    """An animation in a file, which notebooks show.
 
     Attributes
     ----------
@@ -143,7 +143,7 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
 
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise FastcontactError(f"'{path}' has a suffix that no moving picture has: use {', '.join(SUFFIXES)}")
+        raise FastcontactError(f"'{path}' does not have a suffix of animations: use {', '.join(SUFFIXES)}")
     if suffix == ".gif":
         return PillowWriter(fps=pictures_per_second)
     if not FFMpegWriter.isAvailable():

@@ -50,6 +50,10 @@ def axis_stress(
     title, units, ax
         As in `pressure_profile`.
 
+    Returns
+    -------
+    matplotlib Axes
+
     Raises
     ------
     FastcontactError

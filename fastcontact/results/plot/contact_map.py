@@ -19,7 +19,7 @@ from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 
-# The part of the surface that is drawn reaches so far beyond the closed one, in its own half widths.
+# Margin of the drawn part of the surface around the closed part, relative to the half-width of the latter.
 MARGIN = 0.15
 # Smallest length of the mean of the facets' normals for which a surface is drawn in projection along it.
 LEAST_MEAN = 0.3
@@ -60,8 +60,16 @@ def contact_map(
         As in `pressure_profile`.
     axes : matplotlib Axes, two with friction, optional
 
-    Returns a tuple of Axes, of the pressure and, with friction, of the shear or slip. FastcontactError if the mesh is
-    not three-dimensional, does not contain the contact surface, or if the closed part of it goes around a body.
+    Returns
+    -------
+    tuple of matplotlib Axes
+        Axes of the pressure and, with friction, of the shear or slip.
+
+    Raises
+    ------
+    FastcontactError
+        If the mesh is not three-dimensional, does not contain the contact surface, or if the closed part of it goes
+        around a body.
 
     Examples
     --------

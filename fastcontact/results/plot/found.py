@@ -30,6 +30,10 @@ def contacts(
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
 
+    Returns
+    -------
+    matplotlib Axes
+
     Examples
     --------
     >>> import fastcontact as fc

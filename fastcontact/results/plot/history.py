@@ -50,6 +50,10 @@ def history(
         As in `pressure_profile`.
     axes : two matplotlib Axes, optional
 
+    Returns
+    -------
+    tuple of matplotlib Axes
+
     Examples
     --------
     >>> import fastcontact as fc
@@ -82,7 +86,7 @@ def history(
     if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
     upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
-    upper.set_title(title or f"Contact '{pair}' over the load", fontsize="medium")
+    upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
     along = labelled("approach", units, "length") if approach else "load factor"
     round_contact = contacts[-1].measured_from_axis or contacts[-1].coordinates.shape[1] == 3
     size = "contact radius" if round_contact else "half-width of the contact"
@@ -125,6 +129,10 @@ def contact_zones(
     title, units, ax
         As in `pressure_profile`.
 
+    Returns
+    -------
+    matplotlib Axes
+
     Raises
     ------
     FastcontactError
@@ -165,6 +173,6 @@ def contact_zones(
     start = "axis" if contacts[-1].measured_from_axis else "middle of the contact"
     distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
-    axes.set_title(title or f"Contact '{pair}' over the load", pad=16, fontsize="medium")
+    axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)  # below: points are everywhere
     return axes

@@ -39,7 +39,7 @@ def pressure_profile(
     theory : object of `analytic`, or one with ``pressure(r)``, ``pressure_max`` and ``radius``, optional
         E.g. `analytic.hertz_point`.
     other_theories : mapping of str to such an object, optional
-        Further curves by legend.
+        Further curves by label of the legend.
     stress : ndarray (m,), optional
         Normal stress at the contact nodes (compression negative), drawn with the opposite sign [pressure]; see
         `normal_stress`.
@@ -48,6 +48,10 @@ def pressure_profile(
         Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model, if
         any; see `UNITS`.
     ax : matplotlib Axes, optional
+
+    Returns
+    -------
+    matplotlib Axes
 
     Examples
     --------
@@ -104,7 +108,7 @@ def _largest(curve: PressureCurve, units: Units) -> str:
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
-    """Return the curves of theories, by legend."""
+    """Return the curves of theories, by label of the legend."""
     for theory_given in (theory, *others.values()):
         if theory_given is not None and not is_dataclass(theory_given) and pressure_curve(theory_given) is None:
             raise FastcontactError(

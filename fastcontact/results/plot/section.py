@@ -70,6 +70,10 @@ def section(
         Half the width of the part to draw, around the largest value [length].
     ax : matplotlib Axes, optional
 
+    Returns
+    -------
+    matplotlib Axes
+
     Raises
     ------
     FastcontactError

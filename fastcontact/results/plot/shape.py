@@ -86,6 +86,10 @@ def deformed_shape(
     ax : matplotlib Axes, optional
         In 3D with ``projection="3d"``.
 
+    Returns
+    -------
+    matplotlib Axes
+
     Examples
     --------
     >>> import fastcontact as fc

@@ -1,4 +1,4 @@
-"""Rigid punches on half spaces and half planes: tables, integrals, displacements due to the pressure."""
+"""Rigid punches on half-spaces and half-planes: tables, integrals, displacements due to the pressure."""
 
 import itertools
 import json

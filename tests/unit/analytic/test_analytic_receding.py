@@ -17,7 +17,7 @@ REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/receding_lay
 
 
 def layer(ratio, load, **more):
-    """Layer of modulus `ratio` times that of the half plane, plane stress for plain moduli."""
+    """Layer of modulus `ratio` times that of the half-plane, plane stress for plain moduli."""
     half_plane = {"E2": 1.0 / ratio} if ratio else {}
     unit = {"E1": 1.0, "nu1": 0.0, "thickness": 1.0, "force": 1.0, **half_plane, **more}
     return receding_layer(**unit, load_half_width=load)

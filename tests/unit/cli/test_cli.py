@@ -460,7 +460,7 @@ def test_the_contact_that_was_taken_is_told_where_there_are_two(tmp_path, capsys
     with fc.ResultWriter(path, case) as out:
         fc.solve(case, 1, on_step=out.write)
     capsys.readouterr()
-    hint = "contact 'hertz', the first of 2; also there: 'ceiling'"
+    hint = "contact 'hertz', the first of 2; others: 'ceiling'"
     assert main(["profile", str(path)]) == 0
     assert hint in capsys.readouterr().err
     assert main(["profile", str(path), "--contact", "hertz"]) == 0

@@ -280,7 +280,7 @@ def test_no_traceback_is_printed(command, when, tmp_path):
     assert "Traceback" not in said
     assert "Exception ignored" not in said
     assert said.startswith(
-        ("interrupted\n", "error: stopped; with --store DIR the same command would go on where it stopped")
+        ("interrupted\n", "error: stopped; with --store DIR the same command would continue where it stopped")
     )
 
 

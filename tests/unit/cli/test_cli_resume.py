@@ -84,7 +84,7 @@ def test_an_interrupted_run_goes_on_and_a_complete_one_stays(whole, path, capsys
     summary = path.with_name("summary.json")
     assert main(["run", str(case), "-o", str(path), "--resume", "--json", str(summary)]) == 0
     captured = capsys.readouterr()
-    assert f"wrote {path} (went on after step 2), {summary}" in captured.out
+    assert f"wrote {path} (resumed after step 2), {summary}" in captured.out
     assert captured.err.count(DOUBT) == 1
     assert_same(path, steps)
     before = path.read_bytes()
@@ -101,7 +101,7 @@ def test_a_resumed_run_tells_that_its_steps_are_others(whole, path, capsys, tmp_
     other = tmp_path / "other.toml"
     other.write_text(case.read_text().replace(f"steps = {STEPS}", f"steps = {STEPS + 1}"))
     assert main(["run", str(other), "-o", str(path), "--resume"]) == 0
-    assert f"holds {STEPS} steps, the case now has {STEPS + 1}: those in the file stay" in capsys.readouterr().err
+    assert f"holds {STEPS} steps, the case now has {STEPS + 1}: those in the file are kept" in capsys.readouterr().err
 
 
 def test_without_resume_a_run_begins_anew(whole, begun, path):

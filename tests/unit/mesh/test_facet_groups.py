@@ -88,7 +88,7 @@ def test_a_group_by_place_uses_the_facets_that_are_there():
             lambda m: fc.generate.cut(
                 m.with_facet_group("A", lambda x: at(1.0)(x) & (x[:, 0] < 0.6), between=True), "A"
             ),
-            "facets of 'A' do not cut through",
+            "facets of 'A' do not divide the body",
         ),
         (
             lambda m: fc.generate.cut(m.with_facet_group("A", at(1.0), between=True), "A", normal=(0.0, 0.0)),

@@ -199,7 +199,7 @@ def test_a_support_that_contradicts_a_normal_one_is_told():
     model.fix("LEFT", "x")
     model.fix("BOTTOM", "y")
     model.prescribe("BOTTOM", normal=0.1)
-    with pytest.raises(fc.ModelError, match="the displacement normal prescribed on 'BOTTOM' contradicts the supports"):
+    with pytest.raises(fc.ModelError, match="the normal displacement prescribed on 'BOTTOM' contradicts the supports"):
         last(model)
 
 
@@ -282,7 +282,7 @@ def test_a_ring_held_round_about_is_lames():
     [
         (lambda m: m.fix("LEFT", "x", axes=(0.0, 0.0)), "the axes of the support of 'LEFT'"),
         (lambda m: m.prescribe("LEFT", normal=0.0, axes=(1.0, 1.0)), "along its normals or along axes"),
-        (lambda m: m.fix("LEFT", "x", axes=((0.0, 1.0, 1.0), (1.0, 0.0, 0.0))), "its axes leave the plane"),
+        (lambda m: m.fix("LEFT", "x", axes=((0.0, 1.0, 1.0), (1.0, 0.0, 0.0))), "components out of the plane"),
         (lambda m: m.fix("BOTTOM", "x", axes=fc.CylindricalAxes()), "a node at .* lies on the line"),
         (lambda m: m.fix("NOWHERE", "x", axes=(1.0, 1.0)), "unknown group 'NOWHERE'"),
     ],

@@ -50,8 +50,8 @@ def test_included_files_stand_in_place_with_their_own_lines(tmp_path):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ("/etc/os-release", "outside of the folder"), ("../x.inc", "outside of the folder"), ("none.inc", "not found"),
-        ("a.inp", "includes itself"), ("link.inc", "outside of the folder"), ("x\0y", "not a file name"),
+        ("/etc/os-release", "outside the folder"), ("../x.inc", "outside the folder"), ("none.inc", "not found"),
+        ("a.inp", "includes itself"), ("link.inc", "outside the folder"), ("x\0y", "not a file name"),
     ],
 )  # fmt: skip
 def test_files_elsewhere_are_not_read(tmp_path, given, said):

@@ -118,5 +118,5 @@ def test_sides_that_are_apart_are_refused(tmp_path):
 
 def test_damage_of_a_material_is_none_of_a_layer(tmp_path):
     text = WHOLE.replace("200000., 0.\n", "200000., 0.\n*Damage Initiation, criterion=QUADS\n1., 2., 2.\n")
-    with pytest.raises(fc.CaseError, match="material 'steel': damage of bodies is outside"):
+    with pytest.raises(fc.CaseError, match="material 'steel': damage is supported for cohesive layers only"):
         deck_of(tmp_path, text)

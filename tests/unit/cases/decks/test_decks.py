@@ -42,7 +42,7 @@ def test_two_cubes_are_a_bar(tmp_path):
         ("17, 18\n*Nset, nset=bottom", "17\n*Nset, nset=bottom", "2, 11, 12", "has 7 nodes, 8 are needed"),
         ("200000., 0.\n", "200000., O.3\n", "200000.", "'O.3' is not a number"),
         ("200000., 0.\n", "200000., 0.5\n", "200000.", "material 'steel': Poisson's ratio"),
-        ("200000., 0.\n", "200000., 0.\n*Creep\n1., 0.\n", "*Creep", r"material 'steel': \*CREEP is outside of fastcontact"),
+        ("200000., 0.\n", "200000., 0.\n*Creep\n1., 0.\n", "*Creep", r"material 'steel': \*CREEP is outside the scope"),
         ("200000., 0.\n", "200000., 0.\n*Plastic, hardening=combined\n1., 0.\n", "*Plastic",
          "HARDENING=COMBINED is not supported"),
         ("200000., 0.\n", "200000., 0.\n*Plastic\n1., 0.1\n", "1., 0.1", "the first plastic strain"),

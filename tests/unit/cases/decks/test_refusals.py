@@ -109,7 +109,7 @@ PARTS = {
         "an instance has at most two data lines: a translation and a rotation",
     ),
     "part twice": (in_parts(parts="*Part, name=P\n*End Part\n*Part, name=p\n"), "part 'p' is defined twice"),
-    "nodes in an instance": (in_parts("*Node\n1, 0., 0., 0.\n"), r"\*NODE: is not supported inside of an instance"),
+    "nodes in an instance": (in_parts("*Node\n1, 0., 0., 0.\n"), r"\*NODE: is not supported inside an instance"),
     "supports in an instance": (
         in_parts("*Boundary\ntop, 1\n"),
         "is supported for the whole assembly only, not inside",
