@@ -14,7 +14,14 @@ from fastcontact.results.xmgrace import Curve
 SPACES = ("analytic", "generate", "obstacles", "plot", "recovery", "topology")
 ARRAYS = ("ArrayLike", "ndarray", "Sequence", "Array", "Value", "Constant", "Table", "Mapping", "dict", "tuple")
 # Of numbers among them, in words of the annotation: names and objects have neither masks nor imaginary parts.
-WITHOUT_NUMBERS = ("Sequence[str]", "Iterable[str]", "Sequence[StepResult]", "Mapping[str, str]", "dict[str, str]")
+WITHOUT_NUMBERS = (
+    "Sequence[str]",
+    "Iterable[str]",
+    "Sequence[StepResult]",
+    "Sequence[Axes]",
+    "Mapping[str, str]",
+    "dict[str, str]",
+)
 # What the package itself makes and hands over; `ResultWriter.write` refuses masks in them.
 RESULTS = (
     "ContactResultants", "ContactResult", "Deck", "ErrorEstimate", "FoundContacts", "Modes", "OrderedLine", "Sensitivities",

@@ -119,6 +119,7 @@ def test_a_spun_disc_and_its_block_turned_by_a_right_angle():
     assert turned.contact["disc"].torque == pytest.approx(upright.contact["disc"].torque, rel=1e-6)
 
 
+@pytest.mark.filterwarnings("ignore:.*begins with a penetration")  # which presses it
 def test_a_disc_that_rolls_hardly_needs_a_torque():
     """Rolling, places of the disc and of the block meet without sliding, but for what pressure strains the block along it.
 

@@ -17,7 +17,7 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def told(monkeypatch):
     """What a process that has compiled nothing yet says when two kernels are compiled, given its error output."""
-    monkeypatch.setattr(compiling, "_told", False)
+    monkeypatch.setattr(compiling, "_reported", False)
     monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
     monkeypatch.setattr(compiling.log, "handlers", [])  # those of other tests may be closed
     monkeypatch.setattr(compiling.log, "propagate", False)

@@ -431,8 +431,8 @@ def test_pages_tell_the_limits_of_meshio():
     """Both pages that tell them: memory, and seconds for each megabyte."""
     docs = Path(__file__).parents[4] / "docs" / "reference"
     gib, times = meshio_process.MEMORY >> 30, meshio_process.MEMORY_PER_BYTE
-    assert f"at most {gib} GiB and {times} bytes for each of their own" in (docs / "promises.md").read_text("utf-8")
+    assert f"at most {gib} GiB plus {times} times its size" in (docs / "promises.md").read_text("utf-8")
     told = " ".join((docs / "io.md").read_text("utf-8").split())
-    assert f"may take {gib} GiB and {times} times the size of the file of memory" in told
+    assert f"memory is limited to {gib} GiB plus {times} times the size of the file" in told
     each = meshio_process.SECONDS_PER_BYTE * 1e6
-    assert f"and {meshio_process.SECONDS:g} s and {each:g} s for each megabyte of computing time" in told
+    assert f"its CPU time to {meshio_process.SECONDS:g} s plus {each:g} s per megabyte" in told
