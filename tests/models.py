@@ -17,6 +17,14 @@ def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
     return model
 
 
+def members(mesh):
+    """Groups of cells as (element, row) pairs, which do not depend on the order of the elements."""
+    return {
+        group: {(name, row) for name, rows in mesh.split(numbers).items() for row in rows.tolist()}
+        for group, numbers in mesh.cell_groups.items()
+    }
+
+
 class DenseCompliance:
     """A compliance of contact given by its matrix."""
 

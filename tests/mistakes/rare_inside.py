@@ -2,7 +2,6 @@
 # ruff: noqa: E501 (messages stay in one piece)
 
 import errno
-import os
 import re
 import sys
 from dataclasses import replace
@@ -13,6 +12,7 @@ import h5py
 import meshio
 import numpy as np
 from library import blocks, lifted, solved
+from rare_files import refusing
 from scipy.sparse import bsr_array, csr_array
 
 import fastcontact as fc
@@ -42,13 +42,6 @@ from fastcontact.studies.settings import Combination, settings
 from fastcontact.studies.sweep import parameter_sweep
 
 REPEATED = re.escape(str(pivot_order.RepeatedError()))
-
-
-def refusing(number):
-    def refuse(*_, **__):
-        raise OSError(number, os.strerror(number))
-
-    return refuse
 
 
 def pair_of(size):

@@ -1,8 +1,10 @@
-"""Two non-matching blocks, for tests of linear solvers under contact."""
+"""A box and two non-matching blocks, for tests of linear solvers under contact."""
 
 import numpy as np
 
 import fastcontact as fc
+from fastcontact.elasticity.constrained_system import supports_apart
+from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 
 
 def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=0.01, **options):
@@ -22,3 +24,12 @@ def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=
     model.prescribe("U_ZMAX", x=along if friction else 0.0, y=0.0, z=-0.01)
     model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", friction=friction, **options)
     return model
+
+
+def box():
+    """Return a stiffness (n, n) with entries near one, its modes, and which unknowns are fixed."""
+    mesh = fc.generate.box((1.0, 1.1, 0.9), (7, 6, 5))
+    moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
+    K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
+    fixed = np.repeat(mesh.points[:, 1] == 0, 3)
+    return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed

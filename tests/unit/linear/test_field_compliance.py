@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from models import elastic_model
 from pairwise import first_of
-from pressed_blocks import pressed
+from pressed_blocks import box, pressed
 from scipy.sparse import csr_array
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.contact.multiplier_field import Projection
-from fastcontact.elasticity.constrained_system import supports_apart
-from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.linear import choice
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.solvers.amg import Amg
@@ -32,14 +30,6 @@ def along_a_line(m=10, per_node=3, seed=0):
     areas = 0.1 + 0.1 * rng.random(len(at))
     mass = splu(csr_array(P.T @ (areas[:, None] * P)).tocsc())
     return Projection(csr_array(P), areas, RHO, mass)
-
-
-def box():
-    mesh = fc.generate.box((1.0, 1.1, 0.9), (7, 6, 5))
-    moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
-    K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
-    fixed = np.repeat(mesh.points[:, 1] == 0, 3)
-    return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed
 
 
 def rows_at_points(projection, fixed, seed=1):

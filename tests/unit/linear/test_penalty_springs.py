@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from models import elastic_model
 from pairwise import first_of
-from pressed_blocks import pressed
+from pressed_blocks import box, pressed
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 import fastcontact as fc
@@ -23,15 +23,6 @@ pytestmark = pytest.mark.each_value
 
 # Of the diagonal of K, at its softest end and at its stiffest: the springs here are from 1e-6 to 1e8 times as stiff.
 SOFTNESS = {"soft": (1e2, 1e6), "stiff": (1e-8, 1e-2), "mixed": (1e-8, 1e6)}
-
-
-def box():
-    """Return a stiffness (n, n) with entries near one, its modes, and which unknowns are fixed."""
-    mesh = fc.generate.box((1.0, 1.1, 0.9), (7, 6, 5))
-    moduli = np.asarray([fc.LinearElastic(E=10.0, nu=0.3).moduli("3d")])
-    K = stiffness(mesh, "3d", moduli, {"hex8": np.zeros(len(mesh.cells["hex8"]), np.int64)})
-    fixed = np.repeat(mesh.points[:, 1] == 0, 3)
-    return supports_apart(K, fixed)[0], np.where(fixed[:, None], 0.0, rigid_modes(mesh.points, "3d")), fixed
 
 
 def equations(fixed, m=12, seed=1):

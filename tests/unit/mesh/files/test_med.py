@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from models import members
 
 from fastcontact.errors import FastcontactWarning, FileError, MeshError
 from fastcontact.mesh import elements
@@ -22,14 +23,6 @@ from fastcontact.results.step import ContactResult, StepResult
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
 FLAT = {name: element for name, element in elements.ELEMENTS.items() if element.dim <= 2}
-
-
-def members(mesh):
-    """Groups of cells as (element, row) pairs, which do not depend on the order of the elements."""
-    return {
-        group: {(name, row) for name, rows in mesh.split(numbers).items() for row in rows.tolist()}
-        for group, numbers in mesh.cell_groups.items()
-    }
 
 
 def assert_same(found, mesh):

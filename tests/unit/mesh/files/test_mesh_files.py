@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from models import members
 from pairwise import first_of
 
 from fastcontact import topology
@@ -27,13 +28,6 @@ def reading(request):
     """Let meshio read in this process, but where a test listens to what the one that it starts says."""
     if "capfd" not in request.fixturenames:
         request.getfixturevalue("meshio_here")
-
-
-def members(mesh):
-    return {
-        group: {(name, row) for name, rows in mesh.split(numbers).items() for row in rows.tolist()}
-        for group, numbers in mesh.cell_groups.items()
-    }
 
 
 def assert_same(found, mesh):
