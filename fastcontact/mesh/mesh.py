@@ -108,7 +108,8 @@ class Mesh:
         if conn.ndim != 2 or conn.shape[1] != element.n_nodes:
             raise MeshError(f"cells of {name} must have shape (n_cells, {element.n_nodes}), not {conn.shape}")
         if conn.size and (conn.min() < 0 or conn.max() >= n_points):
-            raise MeshError(f"a cell of {name} refers to point {conn.max()}, but there are {n_points} points (0-based)")
+            wrong = min(conn.min(), 0) or conn.max()
+            raise MeshError(f"a cell of {name} refers to point {wrong}, but there are {n_points} points (0-based)")
         return conn
 
     @staticmethod
@@ -117,7 +118,8 @@ class Mesh:
         for name, members in groups.items():
             numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
             if len(numbers) and (numbers[0] < 0 or numbers[-1] >= count):
-                raise MeshError(f"{kind} group '{name}' contains {kind} {numbers[-1]}, but there are {count} (0-based)")
+                wrong = min(numbers[0], 0) or numbers[-1]
+                raise MeshError(f"{kind} group '{name}' contains {kind} {wrong}, but there are {count} (0-based)")
             numbers.setflags(write=False)
             checked[name] = numbers
         return MappingProxyType(checked)
