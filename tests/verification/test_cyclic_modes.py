@@ -210,7 +210,7 @@ def test_what_is_refused():
         fc.modes(model_of(part), nodal_diameters=0)
     plate = fc.obstacles.HalfSpace((0.0, 3.0), (0.0, -1.0))
     model.add_obstacle("plate", secondary="RING OUTSIDE", obstacle=plate, force={"y": -1.0})
-    with pytest.raises(fc.ModelError, match="'plate' that a force drives"):
+    with pytest.raises(fc.ModelError, match="'plate' is driven by a force"):
         fc.modes(model, nodal_diameters=0)
     with pytest.raises(fc.ModelError, match="shapes of the whole ring need"):
         fc.modes(model_of(part), n=1).whole_ring()

@@ -187,5 +187,5 @@ def test_coincident_facets_are_told_apart_by_their_body(element):
     assert (inner.points[inner.points_of("IN"), 1] == 0.5).all()
     with pytest.raises(fc.MeshError, match="no facet of 'B' on the outside"):
         mesh.with_facet_group("ONE", lambda x: x[:, 1] < 1e-9, of="B")
-    with pytest.raises(fc.MeshError, match=r"'A (TOP|YMAX)', which holds no solid"):
+    with pytest.raises(fc.MeshError, match=r"'A (TOP|YMAX)', which has no solid"):
         mesh.with_facet_group("ONE", at, of="A TOP" if element == "tri6" else "A YMAX")

@@ -217,7 +217,7 @@ def test_initial_states_in_a_case_file(tmp_path):
             r"initial_stress\[0\]: the initial stress of all solid cells names no component",
         ),
         ("[[initial_stress]]\nyz = 1.0", "plane_strain", "has the component yz, which plane_strain does not have"),
-        ("[[initial_stress]]\nzz = 1.0", "plane_stress", "has components along z that plane_stress does not have"),
+        ("[[initial_stress]]\nzz = 1.0", "plane_stress", "has out-of-plane components, which plane_stress does not have"),
         (
             "[[initial_stress]]\ngroups = 'TOP'\nxx = 1.0",
             "plane_stress",
@@ -226,7 +226,7 @@ def test_initial_states_in_a_case_file(tmp_path):
         (
             "[[initial_strain]]\nxx = 1.0\naxes = [[1, 0, 1], [0, 1, 0]]",
             "plane_strain",
-            "that plane_strain does not have",
+            "which plane_strain does not have",
         ),
         (
             "[[initial_strain]]\nxx = nan",

@@ -21,7 +21,7 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError, unknown
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
-from fastcontact.model.parts.base import Support
+from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.pretension import Pretension, PretensionForce
 from fastcontact.model.ramp import combined, multiplier
 
@@ -170,8 +170,8 @@ def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[in
     group, only = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
     kinds = ("normal", "x", "y", "z") if only is None else (str(parameter[2]),)
-    names = [f"the displacement {kind} prescribed on '{group}'" for kind in kinds]
-    wanted = {*(name for name in names if "normal" in name.split()[2]), *(f"{name} along axes" for name in names)}
+    names = {kind: displacement_name(kind, group) for kind in kinds}
+    wanted = {names.get("normal"), *(f"{name} along axes" for name in names.values())}
     along = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
     if not (supports or along):
         known = list(dict.fromkeys(s.group for s in model.supports))

@@ -32,6 +32,11 @@ from fastcontact.model.units import named_units
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
+def displacement_name(kind: str, group: str) -> str:
+    """Return the name of a prescribed displacement, ``"x"``, ``"y"``, ``"z"`` or ``"normal"``; result files depend on it."""
+    return f"the displacement {kind} prescribed on '{group}'"
+
+
 @dataclass(frozen=True)
 class Support:
     """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
@@ -50,7 +55,7 @@ class Support:
     @property
     def name(self) -> str:
         """Component and group, for messages."""
-        return f"the displacement {'xyz'[self.component]} prescribed on '{self.group}'"
+        return displacement_name("xyz"[self.component], self.group)
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
         """Return the displacements (n,) of `points` (n, dim) at multiplier 1, by history [length]."""

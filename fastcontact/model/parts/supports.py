@@ -20,7 +20,7 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError
 from fastcontact.model.obstacle_rotation import rotation_of
-from fastcontact.model.parts.base import Support
+from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.parts.contact import ModelContact
 from fastcontact.model.ramp import History, PartHistory, Table, table_of
 from fastcontact.model.relation_rows import NORMAL, along, normals_of
@@ -117,7 +117,7 @@ class ModelSupports(ModelContact):
             self._along_axes(group, components, axes, ramp)
             return
         if normal is not None:
-            name = f"the normal displacement prescribed on '{group}'"
+            name = displacement_name("normal", group)
             check_value(name, normal)
             nodes, directions = normals_of(self.mesh, group)
             values = evaluated(normal, self.mesh.points[nodes], name)
@@ -139,7 +139,7 @@ class ModelSupports(ModelContact):
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
         for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
-            caption = f"the displacement {'xyz'[axis]} prescribed on '{group}'"
+            caption = displacement_name("xyz"[axis], group)
             check_value(caption, value)
             direction = frame[:, axis]
             if dim == 2 and np.abs(direction[:, 2]).max() > SINGLE_PRECISION:

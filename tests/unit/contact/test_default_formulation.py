@@ -107,6 +107,6 @@ def test_the_choice_is_seen_in_the_log(caplog):
     with caplog.at_level(logging.INFO, "fastcontact"):
         model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
     assert caplog.messages == [
-        "contact 'pair': mortar with dual multipliers, since these are right on any two surfaces and cost little with "
+        "contact 'pair': mortar with dual multipliers, since these are accurate on any two surfaces and cost little with "
         "every linear solver"
     ]

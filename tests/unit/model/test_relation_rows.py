@@ -199,7 +199,7 @@ def test_a_support_that_contradicts_a_normal_one_is_told():
     model.fix("LEFT", "x")
     model.fix("BOTTOM", "y")
     model.prescribe("BOTTOM", normal=0.1)
-    with pytest.raises(fc.ModelError, match="the normal displacement prescribed on 'BOTTOM' contradicts the supports"):
+    with pytest.raises(fc.ModelError, match="the displacement normal prescribed on 'BOTTOM' contradicts the supports"):
         last(model)
 
 
