@@ -217,7 +217,11 @@ def test_initial_states_in_a_case_file(tmp_path):
             r"initial_stress\[0\]: the initial stress of all solid cells names no component",
         ),
         ("[[initial_stress]]\nyz = 1.0", "plane_strain", "has the component yz, which plane_strain does not have"),
-        ("[[initial_stress]]\nzz = 1.0", "plane_stress", "has out-of-plane components, which plane_stress does not have"),
+        (
+            "[[initial_stress]]\nzz = 1.0",
+            "plane_stress",
+            "has out-of-plane components, which plane_stress does not have",
+        ),
         (
             "[[initial_stress]]\ngroups = 'TOP'\nxx = 1.0",
             "plane_stress",

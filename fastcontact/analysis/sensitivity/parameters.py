@@ -170,7 +170,7 @@ def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[in
     group, only = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
     kinds = ("normal", "x", "y", "z") if only is None else (str(parameter[2]),)
-    names = {kind: displacement_name(kind, group) for kind in kinds}
+    names = {kind: displacement_name(kind, str(group)) for kind in kinds}
     wanted = {names.get("normal"), *(f"{name} along axes" for name in names.values())}
     along = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
     if not (supports or along):
