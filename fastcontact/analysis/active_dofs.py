@@ -212,7 +212,7 @@ def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Ar
 
     B, gap0 = on_unknowns(constraints.B, constraints.gap0)
     slip0 = constraints.slip0 if constraints.slip0 is not None else np.zeros((len(constraints.tangents), 1))
-    slips = [reduced - T @ start for T, reduced in zip(constraints.tangents, slip0, strict=True)]
+    slips = [slip - T @ start for T, slip in zip(constraints.tangents, slip0, strict=True)]
     pairs = [on_unknowns(T, slip) for T, slip in zip(constraints.tangents, slips, strict=True)]
     tangents = tuple(T for T, _ in pairs)
     return replace(

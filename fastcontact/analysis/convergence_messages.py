@@ -93,7 +93,9 @@ def limit_load(problem: Problem, state: State) -> str:
     """Return an addition to the message of a failed load step after `state` if bodies yield; otherwise empty."""
     if problem.bodies is None or problem.bodies.finite:
         return ""
-    strain = max(float(history[..., PLASTIC_STRAIN].max(initial=0.0)) for history in state.history.values())
+    strain = max(
+        (float(of_cells[..., PLASTIC_STRAIN].max(initial=0.0)) for of_cells in state.history.values()), default=0.0
+    )
     if not strain:
         return ""
     beyond = (

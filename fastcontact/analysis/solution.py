@@ -96,7 +96,7 @@ class Path:
     traction : ndarray (m, dim)
         Tangential forces [force].
     closing : ndarray (m, dim)
-        What is not to count as slip where all of the gap closes [length].
+        Slip that closing the whole gap would add, and that does not count [length].
     parts : int
         Number of increments.
     """
@@ -114,13 +114,17 @@ class Path:
 
     def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
         """Return the forces (1 + k, r) of constraints `rows` (r,) along tangents (m, dim)."""
-        along = [(self.traction[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
-        return np.vstack([self.normal[rows], *along])
+        return _components(self.normal, self.traction, directions, rows)
 
     def closed(self, directions: tuple[Array, ...], rows: Indices) -> Array:
         """Return gaps and `closing` (1 + k, r) of constraints `rows` (r,) along tangents (m, dim) [length]."""
-        along = [(self.closing[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
-        return np.vstack([self.gap[rows], *along])
+        return _components(self.gap, self.closing, directions, rows)
+
+
+def _components(normal: Array, vectors: Array, directions: tuple[Array, ...], rows: Indices) -> Array:
+    """Return the values `normal` (m,) of some rows (r,), and the components of vectors (m, dim), as (1 + k, r)."""
+    along = [(vectors[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
+    return np.vstack([normal[rows], *along])
 
 
 @dataclass(frozen=True, eq=False)

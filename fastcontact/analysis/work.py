@@ -259,5 +259,5 @@ def _added(pair: Formulation, at: Configuration, contact: ContactResult) -> Arra
     """Return the contribution of clearances and wear to the gaps (n_nodes,) of the secondary nodes [length]."""
     if pair.options.clearance is None and at.worn is None:
         return np.zeros(len(contact.gap))
-    open = pair.nodal_gap(at, with_clearance=False)[0]
-    return np.subtract(contact.gap, open, out=np.zeros_like(open), where=np.isfinite(open) & np.isfinite(contact.gap))
+    bare = pair.nodal_gap(at, with_clearance=False)[0]
+    return np.subtract(contact.gap, bare, out=np.zeros_like(bare), where=np.isfinite(bare) & np.isfinite(contact.gap))

@@ -24,7 +24,7 @@ from fastcontact.contact.constraints import Constraints
 
 
 def along(
-    lag: Array, begin: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
+    lag: Array, closing: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
 ) -> tuple[Forces, tuple[Array, Array, Array]]:
     """Return the forces at the end of a step, and `Slid.slip` along tangents (k, m), `work` and `normal` there.
 
@@ -32,8 +32,8 @@ def along(
     ----------
     lag : ndarray (1 + k, m)
         Gaps and slips at the beginning minus those at the end under the forces of the beginning [length].
-    begin : ndarray (1 + k, m)
-        Gaps at the beginning, and what slips at the end contain for closing them, see `Path.closed` [length].
+    closing : ndarray (1 + k, m)
+        Gaps at the beginning, and the slips that closing them would add, see `Path.closed` [length].
     y : ndarray (1 + k, m)
         Forces at the beginning [force].
     parts : int
@@ -41,8 +41,9 @@ def along(
         Function of additional gaps and slips, initially closed constraints and initial forces that returns the forces.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
-    gap, closing = begin[0], np.where(begin[0] > 0.0, begin[1:], 0.0)
-    lag = lag + np.vstack([np.zeros_like(gap), closing])
+    gap = closing[0]
+    added = np.where(gap > 0.0, closing[1:], 0.0)
+    lag = lag + np.vstack([np.zeros_like(gap), added])
     for part in range(1, parts + 1):
         beside = (1.0 - part / parts) * lag
         beside[1:] -= slip
@@ -51,7 +52,7 @@ def along(
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
         whole = slip + forces.gaps[1:]
         left = np.divide(np.maximum(forces.gaps[0], 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
-        slip = whole - left * closing
+        slip = whole - left * added
         y, closed = forces.y, forces.closed
         iterations += forces.iterations
         settled &= forces.settled

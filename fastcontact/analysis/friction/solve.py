@@ -105,8 +105,8 @@ def _eliminated(
             cone = solved(constraints, closed, accuracy, forces)
         else:
             y = path.forces(constraints.directions, np.arange(len(constraints)))
-            begin = path.closed(constraints.directions, np.arange(len(constraints)))
-            cone, before = along(_lag(loaded, constraints, path, y), begin, y, path.parts, beside)
+            closing = path.closed(constraints.directions, np.arange(len(constraints)))
+            cone, before = along(_lag(loaded, constraints, path, y), closing, y, path.parts, beside)
     except ConvergenceError:
         return None
     return FrictionalEquilibrium(
@@ -150,7 +150,7 @@ def _among(
         begin, closing = path.forces(constraints.directions, rows), path.closed(constraints.directions, rows)
     if Q is not None:
         F = np.asarray(Q @ (Q @ F).T)
-        free, begin, closing = ((Q @ C.ravel()).reshape(free.shape) for C in (free, begin, closing))
+        free, begin, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, begin, closing))
         start = None if start is None else (Q @ start.ravel()).reshape(free.shape)
     if len(still):
         moved = idle_slips & constraints.moved_past(rows, Q)
@@ -173,7 +173,10 @@ def _among(
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
-    full, gaps = np.zeros((1 + k, m)), at_rest + np.stack([C @ u for C in (constraints.B, *constraints.tangents)])
+    full, gaps = (
+        np.zeros((1 + k, m)),
+        at_rest + np.stack([matrix @ u for matrix in (constraints.B, *constraints.tangents)]),
+    )
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking

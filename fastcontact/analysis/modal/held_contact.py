@@ -121,7 +121,7 @@ def _conditions(
     owners, n = pair.secondary.points[node].astype(np.intp), len(node)
     areas = np.ones(n) if areas is None else areas
     along = part.directions if tied is None else tied.directions
-    directions = [np.asarray(moments @ component) for component in along]
+    directions = [np.asarray(moments @ tangent) for tangent in along]
     if tied is not None:
         yield Conditions(tied.rows[0], owners, areas)
         if directions:
@@ -141,7 +141,7 @@ def _conditions(
     )
     if part.tangents:
         tested = csr_array(moments[stuck])
-        rows, give = [tested @ component for component in part.tangents], _compliance(tested, part.tangential_softness)
+        rows, give = [tested @ T for T in part.tangents], _compliance(tested, part.tangential_softness)
         yield _along(directions, rows, stuck, owners, areas, give)
 
 
