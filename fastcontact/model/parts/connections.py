@@ -187,8 +187,9 @@ class ModelConnections(ModelInitialStates):
     ) -> None:
         """Model one period of a periodic structure: both ends have the same displacement.
 
-        Rigid translations stay free and need supports. Contact should be open at the ends: of two nodes that represent one
-        point only the sum of the forces follows from the gap, and pressures of their neighbours may oscillate.
+        Rigid translations stay free and need supports. If contact is closed at the ends, two nodes that represent one point
+        share one constraint. In continuous contact only the sum of their forces follows from the gap, and the pressures of
+        neighbouring nodes may oscillate.
 
         Parameters
         ----------

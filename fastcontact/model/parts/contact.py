@@ -72,9 +72,8 @@ class ModelContact(ModelConnections):
               side are closed from the beginning and stay so (no separation), with frictionless sliding.
               ``"bilateral_once_closed"``: no separation of nodes that are closed at the end of a load step.
               ``"tied"``: neither separation nor sliding; the sides are paired once, in the reference configuration,
-              and their relative displacement is zero, also across initial gaps, which are kept (a rotation then
-              strains by its angle times the gap). ``"gap_only"``: gaps are evaluated, negative where the sides
-              penetrate, without forces.
+              and their relative displacement is zero. An initial gap is kept and acts as a rigid arm that rotates with
+              the primary facet. ``"gap_only"``: gaps are evaluated, negative where the sides penetrate, without forces.
             - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
               side to lengths (n,): positive for a clearance, negative for an interference, as of a press fit [length].
               ``clearance_primary``: the same on the primary side, at the opposite positions. ``clearance_ramp``: their
