@@ -54,7 +54,7 @@ class Conduction:
     def matrix(self) -> csr_array:
         """Return the conduction matrix (n_points, n_points): integrals of ``grad N_a . k . grad N_b`` [power / temperature].
 
-        Quadrature is exact for constant conductivities on straight cells.
+        Quadrature is exact for constant conductivities on cells that are affine images of the reference cell.
         """
         pattern = sparsity(self.mesh)
         values = np.zeros(len(pattern.indices))
