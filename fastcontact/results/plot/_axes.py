@@ -116,6 +116,11 @@ def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
 
 
+def outer_legend(ax: Any, columns: int) -> None:
+    """Add a legend below the label of the abscissa, where it cannot hide data."""
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize=8, columnspacing=1.0)
+
+
 def legend_below(points: Array) -> float:
     """Return the position of the legend, in heights of such axes: half an inch below for the label of the axis."""
     width, height = np.ptp(points, axis=0)
