@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -49,8 +49,8 @@ class Temperature:
     reference: float
     ramp: Table | None = None
     # For a history by instants, set by `histories`: the instants, and the index of this one.
-    times: tuple[float, ...] = ()
-    place: int = 0
+    times: tuple[float, ...] = field(default=(), init=False)
+    place: int = field(default=0, init=False)
 
     @property
     def name(self) -> str:
@@ -113,8 +113,14 @@ def histories(
         If there are not as many times as instants, or they do not ascend.
     """
     instants = checked_times(times, len(values))
-    hats = [tuple((other, float(other == time)) for other in instants) for time in instants]
-    return [Temperature(groups, values[k], reference, hat, instants, k) for k, hat in enumerate(hats)]
+    temperatures = []
+    for k, time in enumerate(instants):
+        hat = tuple((other, float(other == time)) for other in instants)
+        temperature = Temperature(groups, values[k], reference, hat)
+        object.__setattr__(temperature, "times", instants)
+        object.__setattr__(temperature, "place", k)
+        temperatures.append(temperature)
+    return temperatures
 
 
 def checked_times(times: Sequence[float], count: int) -> tuple[float, ...]:

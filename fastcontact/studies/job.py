@@ -29,6 +29,7 @@ from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_options import SHARED_OPTIONS
+from fastcontact.model.fingerprint import digest_of_mesh
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh, recipe
@@ -109,10 +110,8 @@ class Job(Run):
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
         inputs["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
-        hashed = hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode())
-        if self.base is not None:
-            hashed.update(_fingerprint(self.base))
-        return hashed.hexdigest()[:32]
+        inputs["mesh"] = None if self.base is None else digest_of_mesh(self.base)
+        return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
     def solved(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""
@@ -144,14 +143,6 @@ def job_of(
         label=label, name=case.name, marks=marks, size=size,
         data=data, pair=chosen.pair, recipe=mesh, base=base, folder=case.folder,
     )  # fmt: skip
-
-
-def _fingerprint(mesh: Mesh) -> bytes:
-    digest = hashlib.sha256(np.ascontiguousarray(mesh.points).tobytes())
-    for block in (mesh.cells, mesh.cell_groups, mesh.point_groups):
-        for name, numbers in block.items():
-            digest.update(name.encode() + np.ascontiguousarray(numbers).tobytes())
-    return digest.digest()
 
 
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
