@@ -55,7 +55,7 @@ def shaded(ax: Any, points: Array, triangles: AnyArray, values: Array, colours: 
     """Fill triangles (m, 3) of int between `points` (n, 2) by linear interpolation of `values` (n,); others as in `fill`."""
     from matplotlib.tri import Triangulation
 
-    mesh = Triangulation(*points.T, triangles)
+    mesh = Triangulation(points[:, 0], points[:, 1], triangles)
     return ax.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=ends[0], vmax=ends[1])
 
 
