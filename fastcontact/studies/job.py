@@ -151,14 +151,12 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     Options that another formulation does not have are dropped.
     """
     data = copy.deepcopy({key: value for key, value in settings.data.items() if key != "study"})
-    formulation = combination.formulation
-    named = data.get("contact", {})
-    for name, entry in named.items() if formulation and isinstance(named, dict) else ():
-        _exchange(entry, str(formulation), settings, settings.formulations[name])
-    if formulation and (named == "auto" or "contacts" in data):
-        _exchange(data.setdefault("contacts", {}), str(formulation), settings, settings.own.formulation or "")
-    for name, entry in data.get("obstacle", {}).items() if formulation else ():
-        _exchange(entry, str(formulation), settings, settings.formulations[name])
+    formulation, pairs = combination.formulation, data.get("contact", {})
+    if formulation:
+        if pairs == "auto" or "contacts" in data:
+            _exchange(data.setdefault("contacts", {}), formulation, settings, settings.own.formulation or "")
+        for name, entry in {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}.items():
+            _exchange(entry, formulation, settings, settings.formulations[name])
     if settings.load_steps is not None:
         data["ramp"] = ramp_of(data.get("ramp", {}), settings.load_steps)
     return data
