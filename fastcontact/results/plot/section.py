@@ -13,22 +13,12 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import (
-    UNKNOWN,
-    Axes,
-    Units,
-    bar_beside,
-    legend_below,
-    mark,
-    new_axes,
-    part_shown,
-    placed,
-    size_around,
-)
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, mark, new_axes, placed
 from fastcontact.results.plot.fields import Field, field_of
+from fastcontact.results.plot.framing import framed, part_shown, size_around
 from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import shaded
-from fastcontact.results.plot.shape import framed, scaled
+from fastcontact.results.plot.shape import scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
@@ -113,9 +103,8 @@ def section(
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
     state = f"{step.instant}, displacements x {scale:g}"
-    below, bar = (legend_below(points), bar_beside(points)) if ax is None else (-0.14, 0.8)
     labels = labels or ("along the section", "across it")
-    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, below, bar, labels)
+    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
