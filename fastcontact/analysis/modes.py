@@ -168,7 +168,7 @@ class _Vibration:
         model = model if sectors is None else without_ends(model, sectors)
         held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
         contact = held_contact(model, step, held, hold_sliding)
-        slides = step is not None and any((own.active & ~own.sticking).any() for own in step.contact.values())
+        slides = step is not None and any((pair.active & ~pair.sticking).any() for pair in step.contact.values())
         further = held_contact(model, step, held, True) if slides and not hold_sliding else []
         return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M), further)
 
@@ -176,10 +176,10 @@ class _Vibration:
         """Warn of eigenvalues (n,) next to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
         low = vectors[:, np.abs(values) < self.shift]
         moved = [
-            np.abs(own.rows @ low) > SLIDES * (abs(own.rows) @ np.abs(low)).max(initial=0.0)
-            for own in self.with_sliding
+            np.abs(held.rows @ low) > SLIDES * (abs(held.rows) @ np.abs(low)).max(initial=0.0)
+            for held in self.with_sliding
         ]
-        if low.shape[1] and (count := int(np.any([own.any(axis=0) for own in moved], axis=0).sum())):
+        if low.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in moved], axis=0).sum())):
             warn(
                 f"{count} of {len(values)} modes have frequencies next to zero (the lowest {_frequencies(values)[0]:.3g}), "
                 "since nodes that slide in this step are free along the surface: hold_sliding=True holds them, as friction "

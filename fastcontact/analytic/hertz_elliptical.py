@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one
+from fastcontact.analytic._power_laws import by_power_laws
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -94,20 +95,14 @@ def _solve(bodies: Bodies, R_x: float, R_y: float, name: str, value: float) -> H
     E_star, R_mean = bodies.E_star, math.sqrt(R_x * R_y)
     k = _ratio_of_axes(max(R_x, R_y) / min(R_x, R_y))
     integrals = math.sqrt(elliprd(0.0, 1.0, k**2) * elliprd(0.0, k**2, 1.0)) / 3.0
-    # Quantities for a unit force; all scale with powers of the force.
-    mean = (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals) ** (1.0 / 3.0)
-    pressure = 1.5 / (math.pi * mean**2)
-    approach = pressure * mean * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
-    force = {
-        "force": lambda: value,
-        "approach": lambda: (value / approach) ** 1.5,
-        "pressure_max": lambda: (value / pressure) ** 3,
-    }[name]()
-    scale = force ** (1.0 / 3.0)
-    long, short = scale * mean / math.sqrt(k), scale * mean * math.sqrt(k)
-    derived = {"approach": approach * scale**2, "force": force, "pressure_max": pressure * scale}
-    axes = (long, short) if R_x >= R_y else (short, long)
-    return HertzElliptical(bodies, E_star, R_x, R_y, *axes, **{**derived, name: value})
+    stiffness = 1.0 / (0.75 * R_mean / E_star * 4.0 / math.pi * k**1.5 * integrals)
+    pressure = 1.5 * stiffness / math.pi
+    approach = pressure * math.sqrt(k) * float(ellipkm1(k**2)) / E_star
+    laws = {"mean": (1.0, 1.0), "approach": (approach, 2.0), "force": (stiffness, 3.0), "pressure_max": (pressure, 1.0)}
+    values = by_power_laws(laws, name, value)
+    mean = values.pop("mean")
+    axes = (mean / math.sqrt(k), mean * math.sqrt(k))
+    return HertzElliptical(bodies, E_star, R_x, R_y, *(axes if R_x >= R_y else axes[::-1]), **values)
 
 
 def hertz_elliptical(

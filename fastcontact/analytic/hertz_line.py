@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from fastcontact.analytic import _half_plane
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
 from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, plane_kinematics, poisson
+from fastcontact.analytic._power_laws import by_power_laws
 from fastcontact.arrays import Array
 
 
@@ -113,17 +114,8 @@ class HertzLine:
 def _solve(bodies: Bodies, kinematics: str, R: float, name: str, value: float) -> HertzLine:
     """Return the contact in which the quantity called `name` has the given value."""
     E_star = bodies.E_star if kinematics == "plane_strain" else bodies.E_star_plane_stress
-    radius = {
-        "force": lambda: 2.0 * math.sqrt(value * R / (math.pi * E_star)),
-        "radius": lambda: value,
-        "pressure_max": lambda: 2.0 * value * R / E_star,
-    }[name]()
-    derived = {
-        "radius": radius,
-        "force": 0.25 * math.pi * E_star * radius**2 / R,
-        "pressure_max": 0.5 * E_star * radius / R,
-    }
-    return HertzLine(bodies, kinematics, E_star, R, **{**derived, name: value})
+    laws = {"radius": (1.0, 1.0), "force": (0.25 * math.pi * E_star / R, 2.0), "pressure_max": (0.5 * E_star / R, 1.0)}
+    return HertzLine(bodies, kinematics, E_star, R, **by_power_laws(laws, name, value))
 
 
 def hertz_line(

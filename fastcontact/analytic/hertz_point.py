@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from fastcontact.analytic import _half_space
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
 from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, poisson
+from fastcontact.analytic._power_laws import by_power_laws
 from fastcontact.arrays import Array
 
 
@@ -106,19 +107,13 @@ class HertzPoint:
 def _solve(bodies: Bodies, R: float, name: str, value: float) -> HertzPoint:
     """Return the contact in which the quantity called `name` has the given value."""
     E_star = bodies.E_star
-    radius = {
-        "force": lambda: (0.75 * value * R / E_star) ** (1.0 / 3.0),
-        "approach": lambda: math.sqrt(value * R),
-        "radius": lambda: value,
-        "pressure_max": lambda: 0.5 * math.pi * value * R / E_star,
-    }[name]()
-    derived = {
-        "radius": radius,
-        "approach": radius**2 / R,
-        "force": 4.0 / 3.0 * E_star * radius**3 / R,
-        "pressure_max": 2.0 * E_star * radius / (math.pi * R),
+    laws = {
+        "radius": (1.0, 1.0),
+        "approach": (1.0 / R, 2.0),
+        "force": (4.0 / 3.0 * E_star / R, 3.0),
+        "pressure_max": (2.0 * E_star / (math.pi * R), 1.0),
     }
-    return HertzPoint(bodies, E_star, R, **{**derived, name: value})
+    return HertzPoint(bodies, E_star, R, **by_power_laws(laws, name, value))
 
 
 def hertz_point(

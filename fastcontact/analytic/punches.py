@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastcontact.analytic._inputs import array, exactly_one, poisson, positive
+from fastcontact.analytic._power_laws import by_power_laws
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -131,15 +132,9 @@ def _depth_factor(n: float) -> float:
 
 def _solve(E_star: float, A: float, n: float, name: str, value: float) -> PowerLawPunch:
     """Return the contact in which the quantity called `name` has the given value."""
-    slope = A * _depth_factor(n)  # approach = slope * radius^n
-    strength = 2.0 * E_star * slope * n / (n + 1.0)  # force = strength * radius^(n + 1)
-    radius = {
-        "force": lambda: (value / strength) ** (1.0 / (n + 1.0)),
-        "approach": lambda: (value / slope) ** (1.0 / n),
-        "radius": lambda: value,
-    }[name]()
-    derived = {"radius": radius, "approach": slope * radius**n, "force": strength * radius ** (n + 1.0)}
-    return PowerLawPunch(E_star, A, n, **{**derived, name: value})
+    slope = A * _depth_factor(n)
+    laws = {"radius": (1.0, 1.0), "approach": (slope, n), "force": (2.0 * E_star * slope * n / (n + 1.0), n + 1.0)}
+    return PowerLawPunch(E_star, A, n, **by_power_laws(laws, name, value))
 
 
 def _modulus(E: float, nu: float) -> float:

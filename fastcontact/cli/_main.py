@@ -19,6 +19,7 @@ from typing import Any
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
+from fastcontact.cli._arguments import declare
 from fastcontact.cli._completion import SHELLS, PrintCompletion
 from fastcontact.cli._interrupts import CODES, forget, interruptible, meant
 from fastcontact.cli._terminal import add_loudness, encodable, say, somebody_watches
@@ -89,7 +90,10 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
     for name in [command] if command in names else names:
         module = importlib.import_module(f"{__package__}.{name}")
         sub = commands.add_parser(name, help=module.HELP, description=module.HELP)
-        module.arguments(sub)
+        if hasattr(module, "ARGUMENTS"):
+            declare(sub, module.ARGUMENTS)
+        else:
+            module.add_generators(sub)
         sub.set_defaults(run=module.run)
         add_loudness(sub, default=False)
     return top

@@ -10,15 +10,16 @@ import numpy as np
 
 from fastcontact._tools import toml_text
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, check_known
 
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that choose a step and a contact pair."""
-    parser.add_argument("file", help="result file (.vtkhdf)")
-    parser.add_argument("--step", type=int, default=-1, help="number of the step, from 1; by default the last")
-    parser.add_argument("--contact", metavar="NAME", help="contact pair; by default the first")
+# Arguments that choose a step and a contact pair.
+ARGUMENTS: Arguments = {
+    "file": "result file (.vtkhdf)",
+    "--step STEP": (-1, "number of the step, from 1; by default the last"),
+    "--contact NAME": "contact pair; by default the first",
+}
 
 
 def chosen_step(results: Any, number: int) -> Any:

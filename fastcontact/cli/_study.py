@@ -6,29 +6,26 @@ import argparse
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._executor import executor
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError
 
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments for output files and execution."""
-    parser.add_argument("--json", metavar="FILE", help="write all numbers")
-    parser.add_argument("--csv", metavar="FILE", help="write the table")
-    parser.add_argument("--png", metavar="FILE", help="write a picture")
-    parser.add_argument("--html", metavar="FILE", help="write a report in one file, pictures inside")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes (default: one per processor; 1: this one)")
-    parser.add_argument(
-        "--executor",
-        default="processes",
-        metavar="WHERE",
-        help="processes (default), mpi (start with: mpiexec -n N python -m mpi4py.futures -m fastcontact ...), or the "
+# Arguments for output files and execution.
+ARGUMENTS: Arguments = {
+    "--json FILE": "write all numbers",
+    "--csv FILE": "write the table",
+    "--png FILE": "write a picture",
+    "--html FILE": "write a report in one file, pictures inside",
+    "--workers N": (int, "processes (default: one per processor; 1: this one)"),
+    "--executor WHERE": (
+        "processes",
+        "processes (default), mpi (start with: mpiexec -n N python -m mpi4py.futures -m fastcontact ...), or the "
         "address of a Dask scheduler such as tcp://host:8786",
-    )
-    parser.add_argument(
-        "--store", metavar="DIR", help="folder of finished runs, which are not repeated if the study is started again"
-    )
+    ),
+    "--store DIR": "folder of finished runs, which are not repeated if the study is started again",
+}
 
 
 def check_targets(options: argparse.Namespace, *also: str | None) -> None:

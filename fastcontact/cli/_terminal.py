@@ -11,17 +11,17 @@ import os
 import sys
 from typing import Any, TextIO
 
+from fastcontact.cli._arguments import declare
 from fastcontact.errors import FileError, printable
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
     """Add the verbosity options of every command, with `default` as their default value."""
-    loudness = parser.add_mutually_exclusive_group()
-    for flags, text in {
-        ("-v", "--verbose"): "say what is being done and why",
-        ("-q", "--quiet"): "print nothing but errors and warnings",
-    }.items():
-        loudness.add_argument(*flags, action="store_true", default=default, help=text)
+    table = {
+        "-v --verbose": "say what is being done and why",
+        "-q --quiet": "print nothing but errors and warnings",
+    }
+    declare(parser.add_mutually_exclusive_group(), table, default=default)
 
 
 def somebody_watches() -> bool:

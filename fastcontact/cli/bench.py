@@ -8,25 +8,22 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.errors import FastcontactError
 
 HELP = "run the benchmarks of the checkout"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("names", nargs="*", metavar="NAME", help="benchmarks (default: all)")
-    parser.add_argument("--smallest", action="store_true", help="run the smallest size of each once, as a check only")
-    parser.add_argument("--sizes", type=int, nargs="+", metavar="N", help="approximate numbers of unknowns")
-    parser.add_argument("--json", metavar="FILE", help="write results and environment")
-    parser.add_argument(
-        "--png", metavar="FOLDER", help="draw time and memory against unknowns, a picture for each benchmark"
-    )
-    parser.add_argument("--compare", metavar="FILE", help="compare with a run stored by --json")
-    parser.add_argument("--problem", metavar="NAME", help="a contact problem in detail: sphere-on-block, forma04c ...")
-    parser.add_argument("--dofs", type=int, metavar="N", help="with --problem: approximate number of unknowns")
-    parser.add_argument("--linear", metavar="SOLVER", help="with --problem: linear solver (default: the problem's)")
-    parser.add_argument("--tolerance", type=float, metavar="T", help="with --problem: of solver and geometry (1e-8)")
+ARGUMENTS: Arguments = {
+    "names": ({"nargs": "*", "metavar": "NAME"}, "benchmarks (default: all)"),
+    "--smallest": "run the smallest size of each once, as a check only",
+    "--sizes N": ({"type": int, "nargs": "+"}, "approximate numbers of unknowns"),
+    "--json FILE": "write results and environment",
+    "--png FOLDER": "draw time and memory against unknowns, a picture for each benchmark",
+    "--compare FILE": "compare with a run stored by --json",
+    "--problem NAME": "a contact problem in detail: sphere-on-block, forma04c ...",
+    "--dofs N": (int, "with --problem: approximate number of unknowns"),
+    "--linear SOLVER": "with --problem: linear solver (default: the problem's)",
+    "--tolerance T": (float, "with --problem: of solver and geometry (1e-8)"),
+}
 
 
 def suite(name: str) -> Any:

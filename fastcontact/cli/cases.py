@@ -7,18 +7,17 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
 HELP = "list the ready-made cases; print one, or copy it to change it"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("name", nargs="?", help="print this case file instead of the list")
-    parser.add_argument("--copy", metavar="NAME", help="copy this case file, and the mesh file it reads")
-    parser.add_argument("-o", "--output", metavar="FILE", help="copy to this file (default: NAME.toml, here)")
+ARGUMENTS: Arguments = {
+    "name": ({"nargs": "?"}, "print this case file instead of the list"),
+    "--copy NAME": "copy this case file, and the mesh file it reads",
+    "-o --output FILE": "copy to this file (default: NAME.toml, here)",
+}
 
 
 def run(options: argparse.Namespace) -> int:

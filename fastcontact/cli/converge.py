@@ -7,32 +7,30 @@ import dataclasses
 from functools import partial
 
 from fastcontact.cli import _study
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._terminal import somebody_watches
 from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error and mesh error"
 HINT = "--html FILE makes a report to send on"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("case", help="case file (TOML); its table [study] defines the meshes")
-    parser.add_argument("--levels", type=int, default=5, metavar="N", help="number of meshes (default 5)")
-    parser.add_argument("--elements", metavar="NAMES", help="elements to compare, e.g. quad4,quad8, or all")
-    parser.add_argument("--formulations", metavar="NAMES", help="e.g. node_to_segment,continuous, or all")
-    parser.add_argument("--quantities", metavar="NAMES", help="further quantities, e.g. C1.stress.yy,C1.displacement.y")
-    adaptive = parser.add_argument_group("adaptive meshes (2D)")
-    adaptive.add_argument(
-        "--adaptive", nargs="?", const="pressure_max", metavar="QUANTITY",
-        help="refine where the error is large until this quantity is accurate (default pressure_max)",
-    )  # fmt: skip
-    adaptive.add_argument("--tolerance", type=float, default=1e-3, metavar="T", help="relative error (default 0.001)")
-    adaptive.add_argument("--max-dofs", type=int, default=400_000, metavar="N", help="where to stop (default 400000)")
-    adaptive.add_argument(
-        "-o", "--output", metavar="FILE", help="result file of the last mesh, with the error of each cell"
-    )
-    _study.arguments(parser)
+ARGUMENTS: Arguments = {
+    "case": "case file (TOML); its table [study] defines the meshes",
+    "--levels N": (5, "number of meshes (default 5)"),
+    "--elements NAMES": "elements to compare, e.g. quad4,quad8, or all",
+    "--formulations NAMES": "e.g. node_to_segment,continuous, or all",
+    "--quantities NAMES": "further quantities, e.g. C1.stress.yy,C1.displacement.y",
+    "adaptive meshes (2D)": {
+        "--adaptive QUANTITY": (
+            {"nargs": "?", "const": "pressure_max"},
+            "refine where the error is large until this quantity is accurate (default pressure_max)",
+        ),
+        "--tolerance T": (1e-3, "relative error (default 0.001)"),
+        "--max-dofs N": (400_000, "where to stop (default 400000)"),
+        "-o --output FILE": "result file of the last mesh, with the error of each cell",
+    },
+    **_study.ARGUMENTS,
+}
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,15 +8,12 @@ import signal
 import tempfile
 import time
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("--warmup", action="store_true", help="compile the kernels now, so that later runs start fast")
+ARGUMENTS: Arguments = {"--warmup": "compile the kernels now, so that later runs start fast"}
 
 
 def run(options: argparse.Namespace) -> int:

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import argparse
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.errors import CaseError
 
 HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("file", help="result file (.vtkhdf)")
-    parser.add_argument("--med", metavar="FILE", help="write mesh and fields of all steps as MED")
-    parser.add_argument("--xdmf", metavar="FILE", help="write an XDMF file that points into the result file")
+ARGUMENTS: Arguments = {
+    "file": "result file (.vtkhdf)",
+    "--med FILE": "write mesh and fields of all steps as MED",
+    "--xdmf FILE": "write an XDMF file that points into the result file",
+}
 
 
 def run(options: argparse.Namespace) -> int:

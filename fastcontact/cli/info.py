@@ -7,29 +7,18 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
 HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("file", help="mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)")
-    parser.add_argument(
-        "--contacts", action="store_true", help="show the surfaces of bodies that face each other instead"
-    )
-    parser.add_argument(
-        "--distance", metavar="LENGTH", type=float, help="largest gap for --contacts (default: the size of facets)"
-    )
-    parser.add_argument(
-        "--angle",
-        metavar="DEGREES",
-        type=float,
-        default=45.0,
-        help="by how much normals may deviate from opposite (45)",
-    )
-    parser.add_argument("--png", metavar="FILE", help="write a picture of the contacts")
+ARGUMENTS: Arguments = {
+    "file": "mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)",
+    "--contacts": "show the surfaces of bodies that face each other instead",
+    "--distance LENGTH": (float, "largest gap for --contacts (default: the size of facets)"),
+    "--angle DEGREES": (45.0, "by how much normals may deviate from opposite (45)"),
+    "--png FILE": "write a picture of the contacts",
+}
 
 
 def run(options: argparse.Namespace) -> int:

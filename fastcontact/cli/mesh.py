@@ -8,13 +8,14 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
+from fastcontact.cli._arguments import declare
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.cli._terminal import add_loudness, say
 
 HELP = "make a mesh with named groups and report its quality"
 
 
-def arguments(parser: argparse.ArgumentParser) -> None:
+def add_generators(parser: argparse.ArgumentParser) -> None:
     """Add one sub-command per generator, with options from the signature of the generator."""
     from fastcontact.mesh.generate import GENERATORS
 
@@ -22,11 +23,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name, make in GENERATORS.items():
         doc = (inspect.getdoc(make) or "").splitlines()[0]
         sub = kinds.add_parser(name, help=doc, description=inspect.getdoc(make), formatter_class=_Raw)
-        sub.add_argument(
-            "-o", "--output", required=True, help="mesh file, format by suffix: .med, .msh, .inp, .vtu, ..."
+        declare(
+            sub,
+            {"-o --output OUTPUT": ({"required": True}, "mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")},
         )
-        for parameter in inspect.signature(make).parameters.values():
-            sub.add_argument(f"--{parameter.name.replace('_', '-')}", dest=parameter.name, **_option(make, parameter))
+        declare(sub, dict(_option(make, parameter) for parameter in inspect.signature(make).parameters.values()))
         add_loudness(sub, default=argparse.SUPPRESS)  # keeps the options before the name of the generator
 
 
@@ -34,20 +35,17 @@ class _Raw(argparse.RawDescriptionHelpFormatter):
     """Keeps the line breaks of docstrings."""
 
 
-def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> dict[str, Any]:
-    """Return the argparse settings for one argument of a generator."""
+def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> tuple[str, Any]:
+    """Return the entry of a table of `Arguments` for one argument of a generator."""
     hint = typing.get_type_hints(make).get(parameter.name, str)
     options = [kind for kind in (hint, *typing.get_args(hint)) if kind is not type(None)]
-    settings: dict[str, Any] = {
-        "default": argparse.SUPPRESS,
-        "help": f"default: {parameter.default}",
-        "metavar": "VALUE",
-    }
-    for kind in options:
-        if typing.get_origin(kind) is tuple:
-            members = [member for member in typing.get_args(kind) if member is not Ellipsis]
-            return {**settings, "nargs": len(members), "type": members[0]}
-    return {**settings, "type": next((kind for kind in (float, int) if kind in options), str)}
+    kind: dict[str, Any] = {"type": next((kind for kind in (float, int) if kind in options), str)}
+    for option in options:
+        if typing.get_origin(option) is tuple:
+            members = [member for member in typing.get_args(option) if member is not Ellipsis]
+            kind = {"nargs": len(members), "type": members[0]}
+    usage = f"--{parameter.name.replace('_', '-')} VALUE"
+    return usage, ({**kind, "default": argparse.SUPPRESS}, f"default: {parameter.default}")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,45 +6,34 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
 # Kinds of pictures of one contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    _results.arguments(parser)
-    parser.add_argument("--png", metavar="FILE", help="write the picture to this file")
-    kinds = parser.add_mutually_exclusive_group()
-    kinds.add_argument("--history", action="store_true", help="force and contact radius over the load steps instead")
-    kinds.add_argument(
-        "--axis", action="store_true", help="stresses along the axis below the contact, compared with theory"
-    )
-    kinds.add_argument(
-        "--zones", action="store_true", help="where the contact is open, closed and slides, over the load steps"
-    )
-    kinds.add_argument(
-        "--map", action="store_true", help="pressure and shear (or --field contact_slip) over the contact (3D)"
-    )
-    kinds.add_argument("--section", metavar="PLANE", help="a section, such as y=0 or x=12.5 (3D)")
-    kinds.add_argument("--animate", metavar="FILE", help="an animation over the load steps: .gif, with ffmpeg .mp4")
-    kinds.add_argument("--view", action="store_true", help="an interactive window (PyVista) instead of a picture")
-    parser.add_argument(
-        "--field", metavar="NAME", default="von_mises",
-        help="what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
-    )  # fmt: skip
-    parser.add_argument(
-        "--phases",
-        metavar="N",
-        type=int,
-        help="with --animate: one vibration of the shape that is --step, in N pictures",
-    )
-    parser.add_argument("--zoom", metavar="LENGTH", type=float, help="half the width to draw around the largest value")
-    parser.add_argument("--mirrored", action="store_true", help="draw the mirror image beyond the axis, too")
-    parser.add_argument("--scale", type=float, default=1.0, help="factor on the displacements (default 1)")
+ARGUMENTS: Arguments = {
+    **_results.ARGUMENTS,
+    "--png FILE": "write the picture to this file",
+    "": {
+        "--history": "force and contact radius over the load steps instead",
+        "--axis": "stresses along the axis below the contact, compared with theory",
+        "--zones": "where the contact is open, closed and slides, over the load steps",
+        "--map": "pressure and shear (or --field contact_slip) over the contact (3D)",
+        "--section PLANE": "a section, such as y=0 or x=12.5 (3D)",
+        "--animate FILE": "an animation over the load steps: .gif, with ffmpeg .mp4",
+        "--view": "an interactive window (PyVista) instead of a picture",
+    },
+    "--field NAME": (
+        "von_mises",
+        "what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
+    ),
+    "--phases N": (int, "with --animate: one vibration of the shape that is --step, in N pictures"),
+    "--zoom LENGTH": (float, "half the width to draw around the largest value"),
+    "--mirrored": "draw the mirror image beyond the axis, too",
+    "--scale SCALE": (1.0, "factor on the displacements (default 1)"),
+}
 
 
 def run(options: argparse.Namespace) -> int:

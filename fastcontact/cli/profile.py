@@ -8,19 +8,18 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
 from fastcontact.cli._results import drawn, load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    _results.arguments(parser)
-    parser.add_argument("--csv", metavar="FILE", help="write the table")
-    parser.add_argument("--agr", metavar="FILE", help="write an XMGRACE project with the computed and Hertz's curve")
-    parser.add_argument("--png", metavar="FILE", help="write a picture")
+ARGUMENTS: Arguments = {
+    **_results.ARGUMENTS,
+    "--csv FILE": "write the table",
+    "--agr FILE": "write an XMGRACE project with the computed and Hertz's curve",
+    "--png FILE": "write a picture",
+}
 
 
 def run(options: argparse.Namespace) -> int:

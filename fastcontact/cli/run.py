@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.cli._warnings import warnings_shown
@@ -26,38 +27,20 @@ HELP = "solve a case file or an input deck (.inp) and write the results of all s
 ERROR_FIELD = "error"
 # Number of mesh points from which a step is written in the background while the next one is solved.
 LARGE = 30_000
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument(
-        "case", help="case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)"
-    )
-    parser.add_argument("-o", "--output", help="result file (default: the case's name with .vtkhdf, here)")
-    parser.add_argument(
-        "--resume",
-        action="store_true",
-        help="continue after the last complete step of the result file, if it holds any",
-    )
-    parser.add_argument(
-        "--json", metavar="FILE", help="write a summary of the last step and the iterations, or why the run failed"
-    )
-    parser.add_argument(
-        "--plot", metavar="PNG", help="plot the contact pressure of the last step, compared with theory"
-    )
-    parser.add_argument(
-        "--modes", metavar="FILE", help="write the natural modes of the state of the last step (.vtkhdf)"
-    )
-    parser.add_argument(
-        "--nodal-diameters", metavar="N[,N...]",
-        help="nodal diameters of the modes of a cyclic sector, such as 0,1,2, or all; mode shapes are those of the full ring",
-    )  # fmt: skip
-    parser.add_argument("--linear", metavar="SOLVER", help="auto, direct, amg, cholmod or pyamg (default: the case's)")
-    parser.add_argument(
-        "--estimate-error", action="store_true", help="estimate the error of every cell and write it into the file"
-    )
-    parser.add_argument("--strict", action="store_true", help="exit with code 3 if a check of the case fails")
-    parser.add_argument("--threads", type=int, metavar="N", help="threads of parallel kernels")
+ARGUMENTS: Arguments = {
+    "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
+    "-o --output OUTPUT": "result file (default: the case's name with .vtkhdf, here)",
+    "--resume": "continue after the last complete step of the result file, if it holds any",
+    "--json FILE": "write a summary of the last step and the iterations, or why the run failed",
+    "--plot PNG": "plot the contact pressure of the last step, compared with theory",
+    "--modes FILE": "write the natural modes of the state of the last step (.vtkhdf)",
+    "--nodal-diameters N[,N...]": "nodal diameters of the modes of a cyclic sector, such as 0,1,2, or all; mode shapes are "
+    "those of the full ring",
+    "--linear SOLVER": "auto, direct, amg, cholmod or pyamg (default: the case's)",
+    "--estimate-error": "estimate the error of every cell and write it into the file",
+    "--strict": "exit with code 3 if a check of the case fails",
+    "--threads N": (int, "threads of parallel kernels"),
+}
 
 
 def run(options: argparse.Namespace) -> int:

@@ -10,26 +10,22 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _study
+from fastcontact.cli._arguments import Arguments
 from fastcontact.errors import CaseError
 
 HELP = "solve a case for many values of its parameters, and compare with theory"
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of this command."""
-    parser.add_argument("case", help="case file (TOML)")
-    parser.add_argument(
-        "--set",
-        action="append",
-        required=True,
-        metavar="NAME=VALUES",
-        help="a path in the case such as material[0].E, or a name of [study.parameters], and its values: 1,2,5 or "
+ARGUMENTS: Arguments = {
+    "case": "case file (TOML)",
+    "--set NAME=VALUES": (
+        {"action": "append", "required": True},
+        "a path in the case such as material[0].E, or a name of [study.parameters], and its values: 1,2,5 or "
         "FIRST:LAST:COUNT, in equal ratios with :log behind it; given twice, all combinations are run",
-    )
-    parser.add_argument("--element", metavar="NAME", help="element (default: the last of study.combinations)")
-    parser.add_argument("--formulation", metavar="NAME", help="contact formulation (default: likewise)")
-    parser.add_argument("--level", type=int, metavar="N", help="refinement of the mesh, as in converge")
-    _study.arguments(parser)
+    ),
+    "--element NAME": "element (default: the last of study.combinations)",
+    "--formulation NAME": "contact formulation (default: likewise)",
+    "--level N": (int, "refinement of the mesh, as in converge"),
+    **_study.ARGUMENTS,
+}
 
 
 def run(options: argparse.Namespace) -> int:

@@ -14,14 +14,7 @@ from fastcontact._tools.argument_types import check_type
 from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
-from fastcontact.elasticity.materials import (
-    Constant,
-    Material,
-    check_conductivity,
-    check_density,
-    check_expansion,
-    check_positive,
-)
+from fastcontact.elasticity.materials import Constant, Material, check_positive
 from fastcontact.elasticity.varying_constants import CellAxes, Varying, wrapped
 from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
@@ -253,9 +246,7 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
             value = tuple(value.tolist())
         object.__setattr__(material, name, wrapped(value, vector=True))
     object.__setattr__(material, "axes", _axes(material.axes))
-    check_density(material.density)
-    check_expansion(material.expansion, 3)
-    check_conductivity(material.conductivity, 3)
+    material.check_thermal_and_density(3)
     for name in ("expansion", "conductivity"):
         if isinstance(given := getattr(material, name), tuple):
             along = tuple(v if isinstance(v, Varying) else float(v) for v in given)

@@ -86,24 +86,22 @@ class CellStress:
             N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
         loops, points, cells = element_kernels.loops(self._mesh.dim), self._mesh.points, parallel.read_only(cells)
 
-        def part(span: tuple[int, int]) -> None:
-            own = slice(*span)
-            if material.ndim == 1:
-                loops.stress(
-                    points, cells[own], N, dN, moduli, material[own], self._axisymmetric, self._displacement, out[own]
-                )
+        def fill_rows(span: tuple[int, int]) -> None:
+            portion = slice(*span)
+            nodes, numbers, stress = cells[portion], material[portion], out[portion]
+            if numbers.ndim == 1:
+                loops.stress(points, nodes, N, dN, moduli, numbers, self._axisymmetric, self._displacement, stress)
             else:
-                self._fill_varying((name, xi, N, dN), cells[own], material[own], moduli, out[own])
-            shared = of_cells(material[own]), self._axisymmetric, self._displacement
+                self._fill_varying((name, xi, N, dN), nodes, numbers, moduli, stress)
             if split is not None:
-                polynomials = dilatation.basis(name, element.quadrature[0])
+                shared = of_cells(numbers), self._axisymmetric, self._displacement
+                polynomials, basis = dilatation.basis(name, element.quadrature[0]), dilatation.basis(name, xi)
                 dilatation_kernels.add_pressure(
-                    points, cells[own], *element.tables, polynomials, split.bulk, *shared, dilatation.basis(name, xi),
-                    out[own],
-                )  # fmt: skip
-            self._add_modes((name, xi, dN), cells[own], material[own], out[own], rows[own])
+                    points, nodes, *element.tables, polynomials, split.bulk, *shared, basis, stress
+                )
+            self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
 
-        parallel.shared(part, parallel.portions(len(out), cells.shape[1]))
+        parallel.shared(fill_rows, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:
             self._add_offset(self._offset, (name, xi, rows), cells, material, out)
 

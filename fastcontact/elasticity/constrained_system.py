@@ -55,7 +55,72 @@ def _row_sums(K: Any, u: Array) -> Array:
     return np.asarray((block_matrix(K) if isinstance(K, bsr_array) else K).row_sums(u))
 
 
-class System:
+class ConstrainedMotion:
+    """The displacements that supports and constraints allow, ``u = T v + t``.
+
+    Parameters
+    ----------
+    fixed : ndarray of bool (n,)
+    relations : sequence of MultiPointConstraint
+
+    Attributes
+    ----------
+    free : ndarray of bool (n,)
+        The unknowns v.
+    T : csr_array (n, n) or None
+        None without multi-point constraints.
+    """
+
+    T: csr_array | None = None
+
+    def __init__(self, fixed: Mask, relations: Sequence[MultiPointConstraint]) -> None:
+        self.fixed, self.relations = fixed, list(relations)
+        self.free: Mask = ~fixed
+        if not relations:
+            return
+        self._elimination: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
+        self.free[self._elimination.pivots] = False
+        T = csr_array(self._elimination.T @ diags_array(self.free.astype(float)))
+        T.eliminate_zeros()
+        self.T = T
+
+    def values(self, multiplier: Sequence[float]) -> Array:
+        """Return the right-hand sides (m,) of the constraints, given the load multiplier of each."""
+        blocks = [
+            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
+            for relation, factor in zip(self.relations, multiplier, strict=True)
+        ]
+        return np.concatenate(blocks) if blocks else np.empty(0)
+
+    def lift(self, prescribed: Array, values: Array) -> Array:
+        """Return t (n,) for prescribed displacements (n,) and right-hand sides (m,) of the constraints [length].
+
+        Raises
+        ------
+        ModelError
+            If constraints and supports contradict each other.
+        """
+        known: Array = np.where(self.fixed, prescribed, 0.0)
+        if not self.relations:
+            return known
+        values_of_dofs = np.concatenate([known, values])
+        off = np.abs(self._elimination.conditions @ values_of_dofs)
+        scale = np.abs(self._elimination.conditions) @ np.abs(values_of_dofs)
+        wrong = np.flatnonzero(off > CONFLICT * scale)
+        if len(wrong):
+            raise ModelError(
+                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or relations stated "
+                f"before it, by {off[wrong[0]]:.3g}: remove one of them"
+            )
+        lift: Array = self._elimination.T @ known + self._elimination.S @ values
+        return lift
+
+    def _name(self, row: int) -> str:
+        ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
+        return self.relations[int(np.searchsorted(ends, row, side="right"))].name
+
+
+class System(ConstrainedMotion):
     """Stiffness, supports and multi-point constraints of a model.
 
     Parameters
@@ -80,8 +145,6 @@ class System:
         The unknowns.
     weightless : ndarray of bool (n,)
         Unknowns without stiffness: components of rigid obstacles, motions of bodies that constraints make rigid.
-    T : csr_array (n, n) or None
-        The matrix T of ``u = T v + t``; None without multi-point constraints.
     """
 
     def __init__(
@@ -97,11 +160,9 @@ class System:
         if without_stiffness is None:
             without_stiffness = np.zeros(K.shape[0], bool)
         diagonal = diagonal_of(K)
-        self.fixed: Mask = supported | ((diagonal == 0.0) & ~related & ~without_stiffness)
+        super().__init__(supported | ((diagonal == 0.0) & ~related & ~without_stiffness), relations)
         self._reacting: Mask = self.fixed | related  # supports and constraints may exert forces here
-        self._constraints = ConstrainedMotion(self.fixed, relations)
-        self.T = self._constraints.T if relations else None
-        self._without_stiffness = without_stiffness
+        self._independent, self._without_stiffness = self.free, without_stiffness
         self._set_stiffness(K, diagonal)
 
     def renewed(self, K: bsr_array) -> System:
@@ -112,7 +173,7 @@ class System:
 
     def _set_stiffness(self, K: bsr_array, diagonal_of_K: Array) -> None:
         """Set the stiffness K (n, n), given its diagonal (n,)."""
-        self.free: Mask = self._constraints.free.copy()
+        self.free = self._independent.copy()
         if self.T is None:
             self.K = Stiffness(supports_apart(K, self.fixed, diagonal_of_K))
             self.matrix = self.K.parts[0]
@@ -135,20 +196,6 @@ class System:
         if self.K.parts[0] is self.matrix:
             self.K = Stiffness((matrix, *self.K.parts[1:]))
         self.matrix = matrix
-
-    def lift(self, prescribed: Array, values: Array) -> Array:
-        """Return t (n,) for prescribed displacements (n,) and right-hand sides (m,) of the constraints [length].
-
-        Raises
-        ------
-        ModelError
-            If constraints and supports contradict each other.
-        """
-        return self._constraints.lift(prescribed, values)
-
-    def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) of the constraints, given the load multiplier of each."""
-        return self._constraints.values(multiplier)
 
     def right(self, f: Array, t: Array) -> Array:
         """Return the right-hand side (n,) of the solver for forces `f` (n,) on all displacements [force]."""
@@ -201,55 +248,6 @@ class System:
         if round_off is not None:
             residual = np.maximum(np.abs(residual) - (round_off if self.T is None else abs(self.T).T @ round_off), 0.0)
         return np.where(self._reacting, out, 0.0), largest(residual)
-
-
-class ConstrainedMotion:
-    """The displacements that supports and constraints allow, ``u = T v + t``.
-
-    Parameters
-    ----------
-    fixed : ndarray of bool (n,)
-    relations : sequence of MultiPointConstraint
-    """
-
-    def __init__(self, fixed: Mask, relations: Sequence[MultiPointConstraint]) -> None:
-        self.fixed, self.relations = fixed, list(relations)
-        self.free: Mask = ~fixed
-        if not relations:
-            return
-        self._elimination: Elimination = eliminate(stacked_rows(relations, len(fixed)), fixed)
-        self.free[self._elimination.pivots] = False
-        self.T = csr_array(self._elimination.T @ diags_array(self.free.astype(float)))
-        self.T.eliminate_zeros()
-
-    def values(self, multiplier: Sequence[float]) -> Array:
-        """Return the right-hand sides (m,) for the load multiplier of each constraint."""
-        blocks = [
-            np.full(relation.rows.shape[0], np.asarray(relation.value) * factor)
-            for relation, factor in zip(self.relations, multiplier, strict=True)
-        ]
-        return np.concatenate(blocks) if blocks else np.empty(0)
-
-    def lift(self, prescribed: Array, values: Array) -> Array:
-        """See `System.lift`."""
-        known: Array = np.where(self.fixed, prescribed, 0.0)
-        if not self.relations:
-            return known
-        values_of_dofs = np.concatenate([known, values])
-        off = np.abs(self._elimination.conditions @ values_of_dofs)
-        scale = np.abs(self._elimination.conditions) @ np.abs(values_of_dofs)
-        wrong = np.flatnonzero(off > CONFLICT * scale)
-        if len(wrong):
-            raise ModelError(
-                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or relations stated "
-                f"before it, by {off[wrong[0]]:.3g}: remove one of them"
-            )
-        lift: Array = self._elimination.T @ known + self._elimination.S @ values
-        return lift
-
-    def _name(self, row: int) -> str:
-        ends = np.cumsum([relation.rows.shape[0] for relation in self.relations])
-        return self.relations[int(np.searchsorted(ends, row, side="right"))].name
 
 
 def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> tuple[bsr_array, csr_array]:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Numbers
-from fastcontact.elasticity.loads import Pressure, evaluated, facets_of, outward
+from fastcontact.elasticity.loads import Pressure, evaluated
 from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import weighted_area_vectors
@@ -28,11 +28,11 @@ class FollowingPressure:
 
     def __init__(self, mesh: Mesh, kinematics: str, load: Pressure) -> None:
         self._mesh, self._turned = mesh, kinematics == "axisymmetric"
-        self._parts = [self._part(load, name, block) for name, block in facets_of(mesh, load.group).items()]
+        self._parts = [self._part(load, name, facets) for name, facets in load.cells(mesh).items()]
 
-    def _part(self, load: Pressure, name: str, block: Numbers) -> tuple[Numbers, Array, Array, Array]:
+    def _part(self, load: Pressure, name: str, facets: Numbers) -> tuple[Numbers, Array, Array, Array]:
         """Return facets (f, n), shape functions (q, n), derivatives (q, n, k), pressure times weight (f, q)."""
-        facets, element = outward(self._mesh, load.group, name, block), elements.get(name)
+        element = elements.get(name)
         xi, weights = quadrature.product_rule(element.linear, POINTS, POINTS)
         N = element.shape(xi)
         places = np.einsum("qn,fnd->fqd", N, self._mesh.points[facets])

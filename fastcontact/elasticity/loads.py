@@ -11,7 +11,7 @@ the load]; `Components` are values by the number of their axis.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, ClassVar, Protocol
@@ -95,11 +95,25 @@ class Load:
         self._add_to(forces, mesh, kinematics)
         return forces
 
+    def cells(self, mesh: Mesh) -> dict[str, Numbers]:
+        """Return the facets or solid cells (n, n_nodes) on which the load acts, by element type."""
+        return facets_of(mesh, self.group)
+
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        facets_of(mesh, self.group)
+        self.cells(mesh)
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        raise NotImplementedError
+        """Add the integrals of `_density` over all cells."""
+        for element, cells in self.cells(mesh).items():
+            x, N, measure = measured_points(mesh, element, cells, kinematics)
+            add_density(forces, cells, N, self._density(x) * measure[:, :, None])
+
+    def _density(self, x: Array) -> Array:
+        """Return the load per area or volume (c, q, dim) at positions `x` (c, q, dim)."""
+        density = np.zeros(x.shape)
+        for axis, value in self.components.items():
+            density[:, :, axis] = evaluated(value, x, self.name)
+        return density
 
 
 @dataclass(frozen=True)
@@ -111,13 +125,12 @@ class Pressure(Load):
     value: Value
     ramp: Table | None = None
 
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        for element, block in facets_of(mesh, self.group).items():
-            outward(mesh, self.group, element, block)
+    def cells(self, mesh: Mesh) -> dict[str, Numbers]:
+        """As for other loads, oriented so that their normals point outwards."""
+        return {name: outward(mesh, self.group, name, block) for name, block in facets_of(mesh, self.group).items()}
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        for element, block in facets_of(mesh, self.group).items():
-            facets = outward(mesh, self.group, element, block)
+        for element, facets in self.cells(mesh).items():
             x, N, normal = facet_points(mesh, element, facets, kinematics)
             add_density(forces, facets, N, -evaluated(self.value, x, self.name)[:, :, None] * normal)
 
@@ -144,11 +157,6 @@ class Traction(Load):
     components: Components
     ramp: Table | None = None
 
-    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        for element, facets in facets_of(mesh, self.group).items():
-            x, N, normal = facet_points(mesh, element, facets, kinematics)
-            add_density(forces, facets, N, _density(self, x, np.linalg.norm(normal, axis=2)))
-
 
 class VolumeLoad(Load):
     """A load on groups of solid cells, or on all."""
@@ -165,10 +173,9 @@ class VolumeLoad(Load):
         """Names of its groups."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
-    def cells(self, mesh: Mesh) -> Iterator[tuple[str, Numbers]]:
-        """Yield each element and the solid cells (n_cells, n_nodes) on which the load acts."""
-        for element, rows in solid_rows(mesh, self.groups).items():
-            yield element, mesh.cells[element][rows]
+    def cells(self, mesh: Mesh) -> dict[str, Numbers]:
+        """As for other loads."""
+        return {name: mesh.cells[name][rows] for name, rows in solid_rows(mesh, self.groups).items()}
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         check_solids(mesh, self.groups, f": no {self.KIND.removeprefix('the ')} can act on it")
@@ -182,11 +189,6 @@ class BodyForce(VolumeLoad):
     groups: tuple[str, ...] | None
     components: Components
     ramp: Table | None = None
-
-    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        for element, cells in self.cells(mesh):
-            x, N, volume = cell_points(mesh, element, cells, kinematics)
-            add_density(forces, cells, N, _density(self, x, volume))
 
 
 @dataclass(frozen=True)
@@ -224,7 +226,7 @@ class TotalForce(Load):
     ramp: Table | None = None
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        facets_of(mesh, self.group)
+        super()._check_place(mesh, kinematics)
         if kinematics == "axisymmetric" and 0 in self.components:
             raise ModelError(
                 f"{self.name} has a radial component x, but radial forces cancel over the full circle: "
@@ -233,9 +235,8 @@ class TotalForce(Load):
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         shares, area = np.zeros((mesh.n_points, 1)), 0.0
-        for element, facets in facets_of(mesh, self.group).items():
-            _, N, normal = facet_points(mesh, element, facets, kinematics)
-            measure = np.linalg.norm(normal, axis=2)
+        for element, facets in self.cells(mesh).items():
+            _, N, measure = measured_points(mesh, element, facets, kinematics)
             add_density(shares, facets, N, measure[:, :, None])
             area += float(measure.sum())
         for axis, value in self.components.items():
@@ -392,12 +393,12 @@ def _turned(measure: Array, x: Array, kinematics: str) -> Array:
     return measure * (circle if measure.ndim == 2 else circle[:, :, None])
 
 
-def _density(load: Traction | BodyForce, x: Array, measure: Array) -> Array:
-    """Return the components of a load times the measure (c, q) of each point, (c, q, dim)."""
-    density = np.zeros(x.shape)
-    for axis, value in load.components.items():
-        density[:, :, axis] = evaluated(value, x, load.name) * measure
-    return density
+def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
+    """Return `cell_points` of solid cells, and `facet_points` of facets with areas (f, q) [length^2]."""
+    if elements.get(element).dim == mesh.dim:
+        return cell_points(mesh, element, cells, kinematics)
+    x, N, normal = facet_points(mesh, element, cells, kinematics)
+    return x, N, np.linalg.norm(normal, axis=2)
 
 
 def add_density(forces: Array, cells: Numbers, N: Array, density: Array) -> None:

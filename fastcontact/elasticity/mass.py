@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
         volume = cell_volumes(corners, N, element.gradient(xi), kinematics == "axisymmetric") * weights
         return np.einsum("cq,qa,qb->cab", rho * volume, N, N, optimize=True)[..., None]
 
-    matrix = _assembled(mesh, sparsity(mesh), local)
+    matrix = _block_diagonal(mesh, local)
     if missing:
         raise ModelError(
             f"modes need densities, but the materials of {missing} solid cells have none: give them density=..., 0.0 for a "
@@ -82,21 +82,33 @@ def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, An
             out[..., 0] += np.einsum("cq,qa,qb->cab", weighted[:, :, 2] / radius**2, N, N, optimize=True)
         return out
 
-    return _assembled(mesh, sparsity(mesh), local)
+    return _block_diagonal(mesh, local)
 
 
-def _assembled(mesh: Mesh, pattern: Sparsity, local: Callable[[str, Indices], Array]) -> bsr_array:
+def _block_diagonal(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_array:
     """Return the matrix with diagonal blocks, assembled from their diagonals (n_cells, n_nodes, n_nodes, dim or 1)."""
-    diagonals = np.zeros((mesh.dim, len(pattern.indices)))
-    for name, cells in mesh.solids.items():
-        size = max(1, AT_ONCE // cells.shape[1] ** 2)
-        for first in range(0, len(cells), size):
-            rows = np.arange(first, min(first + size, len(cells)))
-            blocks, slots = local(name, rows), pattern.slots[name][rows].ravel()
-            for k in range(mesh.dim):
-                values = blocks[..., min(k, blocks.shape[3] - 1)].ravel()
-                diagonals[k] += np.bincount(slots, values, len(pattern.indices))
+    pattern, diagonals = assembled(mesh, local)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
-    data[:, range(mesh.dim), range(mesh.dim)] = diagonals.T
+    data[:, range(mesh.dim), range(mesh.dim)] = diagonals
     n = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(n, n))
+
+
+def assembled(mesh: Mesh, local: Callable[[str, Indices], Array]) -> tuple[Sparsity, Array]:
+    """Return the node pairs of a mesh, and their sums (n_pairs, k) of local matrices (n_cells, n_nodes, n_nodes, k)."""
+    pattern = sparsity(mesh)
+    total = np.zeros((len(pattern.indices), 1))
+    for name, rows in portions(mesh):
+        blocks, slots = local(name, rows), pattern.slots[name][rows].ravel()
+        sums = [np.bincount(slots, entries.ravel(), len(total)) for entries in np.moveaxis(blocks, 3, 0)]
+        total = total + np.stack(sums, axis=1)
+    return pattern, total
+
+
+def portions(mesh: Mesh) -> Iterator[tuple[str, Indices]]:
+    """Yield elements and numbers (n,) of solid cells, in portions that limit the memory."""
+    for name, cells in mesh.solids.items():
+        n_q = len(integration_rule(elements.get(name))[1])
+        size = max(1, AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))
+        for first in range(0, len(cells), size):
+            yield name, np.arange(first, min(first + size, len(cells)))

@@ -108,6 +108,17 @@ class Material:
         varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
         return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
 
+    def check_thermal_and_density(self, most: int) -> None:
+        """Raise ModelError unless the density is at least 0, and thermal constants are one number or `most` along the axes.
+
+        Varying constants are checked with their cells.
+        """
+        density = self.density
+        if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
+            raise ModelError(f"the density = {density} must be a number, zero or more")
+        check_expansion(self.expansion, most)
+        check_conductivity(self.conductivity, most)
+
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
         """Return the material with its cells, for varying constants; ModelError where these are not admissible."""
         names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
@@ -295,12 +306,6 @@ def check_positive(name: str, value: Any, caption: str = "a positive number") ->
         raise ModelError(f"{name} is out of range: it must lie between {1.0 / LARGEST:g} and {LARGEST:g}, in any unit")
 
 
-def check_density(value: Any) -> None:
-    """Raise ModelError if a density is given and is not a number >= 0; a varying one is checked with its cells."""
-    if not isinstance(value, Varying) and value is not None and not 0.0 <= _real(value) < math.inf:
-        raise ModelError(f"the density = {value} must be a number, zero or more")
-
-
 def check_expansion(value: Any, most: int) -> None:
     """Raise ModelError if an expansion is given and is neither a finite number nor `most` of them along the axes."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
@@ -391,9 +396,7 @@ class LinearElastic(Material):
                 "then and do not lock)"
             )
         check_known("volumetric", self.volumetric, VOLUMETRIC, ModelError)
-        check_density(self.density)
-        check_expansion(self.expansion, 1)
-        check_conductivity(self.conductivity, 1)
+        self.check_thermal_and_density(1)
 
     @property
     def described(self) -> str:

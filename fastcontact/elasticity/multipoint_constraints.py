@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array, vstack
+from scipy.sparse import csr_array, diags_array, vstack
 
 from fastcontact.arrays import Array, Indices, Mask
 
@@ -124,8 +124,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
     uses = np.bincount(R.indices, minlength=n)
     expressed: dict[int, Row] = {}
     users: dict[int, set[int]] = {}
-    conditions: list[Row] = []
-    origin = []
+    conditions: dict[int, Row] = {}
     for k in range(m):
         row = _substituted(R, k, expressed)
         row[n + k] = row.get(n + k, 0.0) - 1.0
@@ -133,17 +132,15 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         unknown = [key for key, c in row.items() if key < n and not known[key] and abs(c) > 0.1 * largest]
         unknown = unknown or [key for key, c in row.items() if key < n and not known[key]]
         if not unknown:
-            conditions.append(row)
-            origin.append(k)
+            conditions[k] = row
             continue
         # The component in the fewest constraints: those on which many others depend are kept.
         pivot = min(unknown, key=lambda key: (uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)
-    T, S = _matrices(expressed, n, m)
-    return Elimination(
-        np.fromiter(expressed, np.intp, len(expressed)), T, S, _rows(conditions, n + m), np.array(origin, np.intp)
-    )
+    pivots, origin = np.array([*expressed], np.intp), np.array([*conditions], np.intp)
+    of_known = _rows(dict(enumerate(conditions.values())), (len(conditions), n + m))
+    return Elimination(pivots, *_matrices(expressed, n, m), of_known, origin)
 
 
 def _substituted(R: csr_array, k: int, expressed: dict[int, Row]) -> Row:
@@ -173,24 +170,15 @@ def _express(pivot: int, by: Row, expressed: dict[int, Row], users: dict[int, se
 
 def _matrices(expressed: dict[int, Row], n: int, m: int) -> tuple[csr_array, csr_array]:
     """Return T (n, n) and S (n, m)."""
-    keep = np.ones(n, bool)
-    keep[list(expressed)] = False
-    kept = np.flatnonzero(keep)
-    entries = [(pivot, key, c) for pivot, row in expressed.items() for key, c in row.items()]
-    rows = np.array([entry[0] for entry in entries], np.intp)
-    columns = np.array([entry[1] for entry in entries], np.intp)
-    values = np.array([entry[2] for entry in entries], np.float64)
-    free = columns < n
-    T = csr_array(
-        (np.r_[np.ones(len(kept)), values[free]], (np.r_[kept, rows[free]], np.r_[kept, columns[free]])), shape=(n, n)
-    )
-    S = csr_array((values[~free], (rows[~free], columns[~free] - n)), shape=(n, m))
-    return T, S
+    kept = np.ones(n)
+    kept[list(expressed)] = 0.0
+    rows = _rows(expressed, (n, n + m))
+    return csr_array(rows[:, :n] + diags_array(kept)), csr_array(rows[:, n:])
 
 
-def _rows(rows: list[Row], width: int) -> csr_array:
-    """Return a matrix with rows given by dictionaries."""
-    row = np.array([i for i, entries in enumerate(rows) for _ in entries], np.intp)
-    column = np.array([key for entries in rows for key in entries], np.intp)
-    values = np.array([c for entries in rows for c in entries.values()], np.float64)
-    return csr_array((values, (row, column)), shape=(len(rows), width))
+def _rows(rows: Mapping[int, Row], shape: tuple[int, int]) -> csr_array:
+    """Return a matrix with rows, by their number, given by dictionaries."""
+    row = np.array([number for number, entries in rows.items() for _ in entries], np.intp)
+    column = np.array([key for entries in rows.values() for key in entries], np.intp)
+    values = np.array([c for entries in rows.values() for c in entries.values()], np.float64)
+    return csr_array((values, (row, column)), shape=shape)

@@ -244,20 +244,10 @@ def rigid_modes(points: Array, kinematics: str) -> Array:
     Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three translations
     and three rotations [length]. Rotations turn about the mean point.
     """
-    n, dim = points.shape
-    if kinematics == "axisymmetric":
-        modes = np.zeros((n, 2, 1))
-        modes[:, 1, 0] = 1.0
-        return modes.reshape(-1, 1)
-    x = points - points.mean(axis=0)
-    if dim == 2:
-        modes = np.zeros((n, 2, 3))
-        modes[:, 0, 0] = modes[:, 1, 1] = 1.0
-        modes[:, 0, 2], modes[:, 1, 2] = -x[:, 1], x[:, 0]
-        return modes.reshape(2 * n, 3)
-    modes = np.zeros((n, 3, 6))
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        modes[:, k, k] = 1.0
-        modes[:, i, 3 + k], modes[:, j, 3 + k] = -x[:, j], x[:, i]
-    return modes.reshape(3 * n, 6)
+    (n, dim), x = points.shape, points - points.mean(axis=0)
+    planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]
+    modes = np.zeros((n, dim, dim + len(planes)))
+    modes[:, range(dim), range(dim)] = 1.0
+    for rotation, (i, j) in enumerate(planes, start=dim):
+        modes[:, i, rotation], modes[:, j, rotation] = -x[:, j], x[:, i]
+    return (modes[:, :, 1:2] if kinematics == "axisymmetric" else modes).reshape(n * dim, -1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +10,8 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.elasticity.energy import cell_volumes, gradients_at, integration_rule
-from fastcontact.elasticity.mass import AT_ONCE
+from fastcontact.elasticity.mass import assembled, portions
 from fastcontact.elasticity.materials import Material
-from fastcontact.elasticity.stiffness import sparsity
 from fastcontact.elasticity.varying_constants import positions
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
@@ -56,31 +55,23 @@ class Conduction:
 
         Quadrature is exact for constant conductivities on cells that are affine images of the reference cell.
         """
-        pattern = sparsity(self.mesh)
-        values = np.zeros(len(pattern.indices))
-        for name, rows in self._cells():
+
+        def local(name: str, rows: Indices) -> Array:
             gradient, k, volume = self._at(name, rows)
-            local = np.einsum("cq,cqai,cqij,cqbj->cab", volume, gradient, k, gradient, optimize=True)
-            values += np.bincount(pattern.slots[name][rows].ravel(), local.ravel(), len(values))
-        return csr_array((values, pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
+            return np.einsum("cq,cqai,cqij,cqbj->cab", volume, gradient, k, gradient, optimize=True)[..., None]
+
+        pattern, values = assembled(self.mesh, local)
+        return csr_array((values[:, 0], pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
         """Return the mean heat flux (n_solids, dim) of every cell [power / area] for temperatures (n_points,)."""
         flux = []
-        for name, rows in self._cells():
+        for name, rows in portions(self.mesh):
             gradient, k, volume = self._at(name, rows)
             slope = np.einsum("cqai,ca->cqi", gradient, temperature[self.mesh.cells[name][rows]])
             total = -np.einsum("cq,cqij,cqj->ci", volume, k, slope, optimize=True)
             flux.append(total / volume.sum(axis=1)[:, None])
         return np.concatenate(flux)
-
-    def _cells(self) -> Iterator[tuple[str, Indices]]:
-        """Yield elements and numbers (n,) of cells, in portions that limit the memory."""
-        for name, cells in self.mesh.solids.items():
-            n_q = len(integration_rule(elements.get(name))[1])
-            size = max(1, AT_ONCE // (cells.shape[1] * max(n_q, cells.shape[1])))
-            for first in range(0, len(cells), size):
-                yield name, np.arange(first, min(first + size, len(cells)))
 
     def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
         """Return gradients (c, q, n, dim) [1 / length], conductivities (c, q, dim, dim), volumes (c, q) at all points."""

@@ -20,11 +20,9 @@ from fastcontact.elasticity.loads import (
     Value,
     VolumeLoad,
     add_density,
-    cell_points,
     check_points,
     evaluated,
-    facet_points,
-    facets_of,
+    measured_points,
 )
 from fastcontact.errors import ModelError
 from fastcontact.linear.sparse_rows import Entries
@@ -99,11 +97,11 @@ class Heating(Load):
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
         """Return the powers (n_points,) of the nodes of the `deformed` mesh at multiplier 1, into the body [power]."""
         total = np.zeros((mesh.n_points, 1))
-        self._add_power(total, mesh, kinematics, deformed)
+        for element, cells in self.cells(mesh).items():
+            x, N, _ = measured_points(mesh, element, cells, kinematics)
+            measure = measured_points(deformed, element, cells, kinematics)[2]
+            add_density(total, cells, N, (evaluated(self.value, x, self.name) * measure)[:, :, None])
         return total[:, 0]
-
-    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)
@@ -115,12 +113,6 @@ class HeatFlux(Heating):
     value: Value
     ramp: Table | None = None
 
-    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
-        for element, facets in facets_of(mesh, self.group).items():
-            x, N, _ = facet_points(mesh, element, facets, kinematics)
-            area = np.linalg.norm(facet_points(deformed, element, facets, kinematics)[2], axis=2)
-            add_density(total, facets, N, (evaluated(self.value, x, self.name) * area)[:, :, None])
-
 
 @dataclass(frozen=True)
 class HeatSource(VolumeLoad, Heating):
@@ -130,12 +122,6 @@ class HeatSource(VolumeLoad, Heating):
     groups: tuple[str, ...] | None
     value: Value
     ramp: Table | None = None
-
-    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
-        for element, cells in self.cells(mesh):
-            x, N, _ = cell_points(mesh, element, cells, kinematics)
-            volume = cell_points(deformed, element, cells, kinematics)[2]
-            add_density(total, cells, N, (evaluated(self.value, x, self.name) * volume)[:, :, None])
 
 
 @dataclass(frozen=True)
@@ -150,9 +136,11 @@ class NodalHeat(Heating):
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         check_points(mesh, self.group, "nothing can heat it")
 
-    def _add_power(self, total: Array, mesh: Mesh, kinematics: str, deformed: Mesh) -> None:
-        nodes = mesh.points_of(self.group)
-        total[nodes, 0] = evaluated(self.value, mesh.points[nodes], self.name)
+    def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
+        """As for other heat loads."""
+        total, nodes = np.zeros(mesh.n_points), mesh.points_of(self.group)
+        total[nodes] = evaluated(self.value, mesh.points[nodes], self.name)
+        return total
 
 
 @dataclass(frozen=True)
@@ -188,12 +176,12 @@ class Film(TemporaryHeat):
         coefficient is negative.
         """
         entries, powers = Entries(), np.zeros((mesh.n_points, 1))
-        for element, facets in facets_of(mesh, self.group).items():
-            x, N, _ = facet_points(mesh, element, facets, kinematics)
+        for element, facets in self.cells(mesh).items():
+            x, N, _ = measured_points(mesh, element, facets, kinematics)
             h = evaluated(self.coefficient, x, f"the coefficient of {self.name}")
             if h.min(initial=0.0) < 0.0:
                 raise ModelError(f"the coefficient of {self.name} is {h.min():g}: it must not be negative")
-            h *= np.linalg.norm(facet_points(deformed, element, facets, kinematics)[2], axis=2)
+            h *= measured_points(deformed, element, facets, kinematics)[2]
             rise = evaluated(self.ambient, x, f"the ambient temperature of {self.name}") - reference
             add_density(powers, facets, N, (h * rise)[:, :, None])
             entries.add(facets, facets, np.einsum("fq,qa,qb->fab", h, N, N))

@@ -61,7 +61,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
-    return {"the mesh": _digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
+    return {"the mesh": digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
 
 
 def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
@@ -101,7 +101,8 @@ def _unordered(items: Iterable[Any], mesh: Mesh) -> list[str]:
 
 
 @remembered
-def _digest_of_mesh(mesh: Mesh) -> str:
+def digest_of_mesh(mesh: Mesh) -> str:
+    """Return the digest of points, cells and groups."""
     return _digest(mesh, mesh)
 
 

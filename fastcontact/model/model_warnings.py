@@ -15,7 +15,7 @@ from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
-from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated, facets_of
+from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
@@ -291,7 +291,8 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
     """Return a warning if a load that is a function varies too much within a cell for the quadrature of loads."""
     off = total = 0.0
     for value in (value for value in load.values if callable(value)):
-        for element, cells in _loaded(model, load):
+        cells_loaded = load.cells(model.mesh) if isinstance(load, (BodyForce, Pressure, Traction)) else {}
+        for element, cells in cells_loaded.items():
             coarse, fine = (
                 _integrals(model.mesh, element, _some(cells), value, load.name, finer) for finer in (False, True)
             )
@@ -301,13 +302,6 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
             f"{load.name} varies within single elements, so that its quadrature is not exact: it is off by {off / total:.2%} "
             "of the whole; refine the mesh there"
         )
-
-
-def _loaded(model: Model, load: Load) -> Iterator[tuple[str, Numbers]]:
-    if isinstance(load, BodyForce):
-        yield from load.cells(model.mesh)
-    elif isinstance(load, (Pressure, Traction)):
-        yield from facets_of(model.mesh, load.group).items()
 
 
 def _integrals(mesh: Mesh, element: str, cells: Numbers, value: Value, name: str, finer: bool) -> Array:

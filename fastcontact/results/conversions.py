@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
@@ -84,40 +84,34 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
     """Return steps as an ``xarray.Dataset`` with the dimensions step, point, axis, stress_component and contact."""
-    xarray = library("xarray", "xarray", "xarray")
-    steps_given = list(steps)
-    pairs = list(dict.fromkeys(name for step in steps_given for name in step.contact))
-    width, dim = 4 if mesh.dim == 2 else 6, mesh.dim
+    xarray, read, dim = library("xarray", "xarray", "xarray"), list(steps), mesh.dim
+    pairs = list(dict.fromkeys(name for step in read for name in step.contact))
+    components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
 
-    def over_steps(values: list[Any], shape: tuple[int, ...]) -> Any:
-        return np.array(values, np.float64).reshape(len(steps_given), *shape)
+    def of_pairs(step: StepResult, name: str, missing: Any) -> list[Any]:
+        return [getattr(step.contact[pair], name) if pair in step.contact else missing for pair in pairs]
 
-    def of_pairs(name: str, shape: tuple[int, ...]) -> Any:
-        missing = np.full(shape, np.nan)
-        rows = [[getattr(s.contact[p], name) if p in s.contact else missing for p in pairs] for s in steps_given]
-        return over_steps(rows, (len(pairs), *shape))
-
-    n = mesh.n_points
-    by_name = {
-        "displacement": (("axis",), (dim,), "length"),
-        "stress": (("stress_component",), (width,), "pressure"),
-        "von_mises": ((), (), "pressure"),
-        "von_mises_signed": ((), (), "pressure"),
-        "reaction": (("axis",), (dim,), "force"),
+    fields: dict[str, tuple[tuple[str, ...], str, Callable[[StepResult], Any]]] = {
+        "displacement": (("point", "axis"), "length", lambda step: step.displacement),
+        "stress": (("point", "stress_component"), "pressure", lambda step: step.stress),
+        "von_mises": (("point",), "pressure", lambda step: step.von_mises),
+        "von_mises_signed": (("point",), "pressure", lambda step: step.von_mises_signed),
+        "reaction": (("point", "axis"), "force", lambda step: step.reaction),
+        "contact_pressure": (("point",), "pressure", lambda step: layout.contact_pressure(mesh, step)),
+        "contact_force": (("contact", "axis"), "force", lambda step: of_pairs(step, "force", np.full(dim, np.nan))),
+        "contact_pressure_max": (("contact",), "pressure", lambda step: of_pairs(step, "pressure_max", np.nan)),
     }
+    sizes = {"point": mesh.n_points, "axis": dim, "stress_component": len(components), "contact": len(pairs)}
     data = {}
-    for name, (dims, shape, quantity) in by_name.items():
-        values = over_steps([getattr(s, name) for s in steps_given], (n, *shape))
-        data[name] = (("step", "point", *dims), values, _unit(units, quantity))
-    nodal = over_steps([layout.contact_pressure(mesh, step) for step in steps_given], (n,))
-    data["contact_pressure"] = (("step", "point"), nodal, _unit(units, "pressure"))
-    data["contact_force"] = (("step", "contact", "axis"), of_pairs("force", (dim,)), _unit(units, "force"))
-    data["contact_pressure_max"] = (("step", "contact"), of_pairs("pressure_max", ()), _unit(units, "pressure"))
+    for name, (dims, quantity, of_step) in fields.items():
+        values = np.array([of_step(step) for step in read], np.float64)
+        shaped = values.reshape(len(read), *(sizes[name_of_dim] for name_of_dim in dims))
+        data[name] = (("step", *dims), shaped, _unit(units, quantity))
     coordinates = {
-        "step": [step.index for step in steps_given],
-        "load_factor": ("step", [step.load_factor for step in steps_given]),
+        "step": [step.index for step in read],
+        "load_factor": ("step", [step.load_factor for step in read]),
         "axis": list(AXES[:dim]),
-        "stress_component": list(STRESS_COMPONENTS[:width]),
+        "stress_component": components,
         "contact": pairs,
     }
     places = {AXES[k]: (("point",), mesh.points[:, k], _unit(units, "length")) for k in range(dim)}

@@ -5,12 +5,11 @@ from __future__ import annotations
 import contextlib
 import io
 import json
-import operator
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +26,7 @@ from fastcontact.results import conversions, journal, layout
 from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.steps import StepSequence
 from fastcontact.results.texts import read_text
 from fastcontact.results.units import units_of_results
 
@@ -63,7 +63,7 @@ def open_results(path: PathLike) -> Results:
     return Results(path)
 
 
-class Results(Sequence[StepResult]):
+class Results(StepSequence):
     """The steps of a result file, read on access, and further data of the file.
 
     Steps are plain NumPy data and remain valid when the file is closed.
@@ -170,29 +170,18 @@ class Results(Sequence[StepResult]):
     def __len__(self) -> int:
         return self._n_steps
 
-    @overload
-    def __getitem__(self, number: int) -> StepResult: ...
-    @overload
-    def __getitem__(self, number: slice) -> list[StepResult]: ...
-    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
-        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
-        if isinstance(number, slice):
-            return [self[position] for position in self._positions(number)]
+    def _chosen(self, number: int | slice) -> int | range:
         try:
-            number = operator.index(number)
-        except TypeError:
-            raise FileError(f"a step of '{self.path}' is a whole number, from 0, or a slice, not {number!r}") from None
-        if not -self._n_steps <= number < self._n_steps:
-            raise IndexError(f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}")
-        return self._read_step(range(self._n_steps)[number])
-
-    def _positions(self, chosen: slice) -> range:
-        try:
-            return range(*chosen.indices(self._n_steps))
-        except (TypeError, ValueError) as error:
-            raise FileError(
-                f"{chosen} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+            return super()._chosen(number)
+        except IndexError:
+            raise IndexError(
+                f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}"
             ) from None
+        except (TypeError, ValueError) as error:
+            text = f"{number} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+            if not isinstance(number, slice):
+                text = f"a step of '{self.path}' is a whole number, from 0, or a slice, not {number!r}"
+            raise FileError(text) from None
 
     def lacks(self, names: Sequence[str]) -> list[str]:
         """Return the paths of HDF5 objects that are missing in the file."""
@@ -296,7 +285,7 @@ class Results(Sequence[StepResult]):
     def _note(self, first: int, count: int) -> dict[str, Any]:
         return json.loads(self._file["fastcontact/notes"][first : first + count].tobytes())
 
-    def _read_step(self, number: int) -> StepResult:
+    def _step(self, number: int) -> StepResult:
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
         with self._explained():

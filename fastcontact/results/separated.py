@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact.arrays import Array, Numbers
+from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult
@@ -25,7 +25,7 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
     return Mesh(mesh.points[sides.node], sides.cells), sides.node, stress
 
 
-def cells_by_element(mesh: Mesh, values: Numbers) -> dict[str, Numbers]:
+def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
     """Return values of all solid cells (n_solids,) by element type."""
     ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
     return dict(zip(mesh.solids, np.split(values, ends), strict=True))

@@ -1,8 +1,9 @@
-"""The steps of an analysis as a list with a concise representation."""
+"""Steps as a sequence, and those of an analysis as a list with a concise representation."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from abc import abstractmethod
+from collections.abc import Iterable, Sequence
 from typing import SupportsIndex, overload
 
 from fastcontact._tools.html_table import html_table
@@ -10,6 +11,26 @@ from fastcontact.results.step import StepResult
 
 # Length of the longest list whose steps are all shown.
 SHOWN = 30
+
+
+class StepSequence(Sequence[StepResult]):
+    """A sequence of steps, each of which is read or made when it is asked for."""
+
+    @abstractmethod
+    def _step(self, position: int) -> StepResult: ...
+
+    @overload
+    def __getitem__(self, number: int) -> StepResult: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[StepResult]: ...
+    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
+        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
+        chosen = self._chosen(number)
+        return self._step(chosen) if isinstance(chosen, int) else [self._step(position) for position in chosen]
+
+    def _chosen(self, number: int | slice) -> int | range:
+        """Return the position of a step, or those of a slice."""
+        return range(len(self))[number]
 
 
 class Steps(list[StepResult]):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import overload
 
 from fastcontact.results.reader import Results
 from fastcontact.results.step import StepResult
+from fastcontact.results.steps import StepSequence
 
 
-class StoredSteps(Sequence[StepResult]):
+class StoredSteps(StepSequence):
     """The steps of a file at the time of opening, each read when used; the last one, with its `restart`, is kept.
 
     `release` must be called before the file is changed, because HDF5 does not update its view of an open file. The file is
@@ -32,15 +31,7 @@ class StoredSteps(Sequence[StepResult]):
     def __len__(self) -> int:
         return self._count
 
-    @overload
-    def __getitem__(self, number: int) -> StepResult: ...
-    @overload
-    def __getitem__(self, number: slice) -> list[StepResult]: ...
-    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
-        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
-        if isinstance(number, slice):
-            return [self[position] for position in range(*number.indices(self._count))]
-        position = range(self._count)[number]
+    def _step(self, position: int) -> StepResult:
         if position == self._count - 1:
             return self._last
         if self._results is None:

@@ -266,20 +266,12 @@ def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> No
     rows, steps = pair["rows"], pair["steps"]
     row = np.zeros((), steps.dtype)
     if contact is not None:
-        table = np.zeros(len(contact.points), rows.dtype)
-        for name in table.dtype.names or ():
-            table[name] = getattr(contact, name)
-        row["first"], row["count"] = len(rows), len(table)
+        row["first"], row["count"] = _append_rows(rows, contact)
         for name in set(row.dtype.names or ()).difference(layout.PLACES):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
-        _extend(rows, table)
         if "primary" in pair:  # missing in older files
-            primary = pair["primary"]
-            faced = np.zeros(len(contact.primary_points), primary.dtype)
-            faced["points"], faced["force_vectors"] = contact.primary_points, contact.primary_force_vectors
-            row["primary_first"], row["primary_count"] = len(primary), len(faced)
-            _extend(primary, faced)
+            row["primary_first"], row["primary_count"] = _append_rows(pair["primary"], contact, "primary_")
     _set_row(steps, number, row)
 
 
@@ -292,11 +284,18 @@ def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -
         growing_table(group, "steps", layout.SIDES_STEP)
         parent["materials"] = group
     group = parent["materials"]
-    table = np.zeros(len(sides.points), group["rows"].dtype)
-    for name in ("points", "material", "stress"):
-        table[name] = getattr(sides, name)
-    _set_row(group["steps"], number, np.array((len(group["rows"]), len(table)), layout.SIDES_STEP))
-    _extend(group["rows"], table)
+    _set_row(group["steps"], number, np.array((len(group["rows"]), len(sides.points)), layout.SIDES_STEP))
+    _append_rows(group["rows"], sides)
+
+
+def _append_rows(table: Any, source: ContactResult | MaterialStress, prefix: str = "") -> tuple[int, int]:
+    """Append a row for each point of the arrays of `source` named by the columns; return the first row and their number."""
+    rows = np.zeros(len(getattr(source, f"{prefix}points")), table.dtype)
+    for name in table.dtype.names:
+        rows[name] = getattr(source, prefix + name)
+    first = len(table)
+    _extend(table, rows)
+    return first, len(rows)
 
 
 def _extend(table: Any, values: AnyArray, first: int | None = None) -> None:

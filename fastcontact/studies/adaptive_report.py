@@ -18,7 +18,7 @@ from fastcontact.results.units import labelled
 from fastcontact.studies.error_estimate import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
 from fastcontact.studies.render.figure import frame, panels
-from fastcontact.studies.render.table import Rows, number
+from fastcontact.studies.render.table import Rows, by_columns, number
 from fastcontact.studies.report import Report
 
 
@@ -150,11 +150,13 @@ class AdaptiveStudy(Report):
         shown = {"estimated error": "estimate", "energy error": "energy_error"}
         if math.isfinite(errors["true_error"][-1]):
             shown |= {"true error": "true_error", "effectivity": "effectivity"}
-        rows = [["round", "cells", "DOF", column(q, q, self.units), *shown]]
-        for k, round_ in enumerate(self.rounds):
-            row = [str(k), str(round_.n_cells), str(round_.n_dofs), number(round_.values[q], 8)]
-            rows.append(row + [number(errors[name][k], 2) for name in shown.values()])
-        return rows
+        columns = [
+            ("round", [str(k) for k in range(len(self.rounds))]),
+            ("cells", [str(round_.n_cells) for round_ in self.rounds]),
+            ("DOF", [str(round_.n_dofs) for round_ in self.rounds]),
+            (column(q, q, self.units), [number(round_.values[q], 8) for round_ in self.rounds]),
+        ]
+        return by_columns(columns + [(label, [number(v, 2) for v in errors[name]]) for label, name in shown.items()])
 
     def sentences(self) -> list[str]:
         """See `Report`."""

@@ -9,7 +9,6 @@ from itertools import zip_longest
 from typing import Any
 
 from fastcontact.arrays import AnyArray
-from fastcontact.results.tables import structured
 from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_figures import draw_differences, draw_errors, draw_pressure
 from fastcontact.studies.fit import CONFIDENCE
@@ -84,7 +83,7 @@ class Study(Report):
         quantity its value in its unit, ``..._error`` [-] (relative to its limit), ``..._order`` [-] (from the previous
         level) and, if there is a theory, ``..._from_theory`` [-] (relative to the theory).
         """
-        return structured(tables.csv_columns(self.series))
+        return self.structured_known(tables.csv_columns(self.series))
 
     def tables(self) -> list[tuple[str, Rows]]:
         """See `Report`: levels and limits of every combination, and a comparison of all combinations."""

@@ -9,31 +9,32 @@ from typing import Any
 
 from fastcontact.cases.summary import finite
 from fastcontact.results.units import labelled
+from fastcontact.studies.fit import Limit
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render.table import Rows, number, percent
+from fastcontact.studies.render.table import Rows, by_columns, number, percent
 from fastcontact.studies.sentences import sentences
-from fastcontact.studies.series import Series
+from fastcontact.studies.series import Series, Split
 
 # Quantities with columns in the tables of levels; the limits are given for all quantities.
 IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
-# Columns of limits, and the first columns of the table of all combinations.
+# Columns of limits.
 OF_LIMITS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
 # Mark after the error bar of a limit whose values do not settle.
 UNSETTLED = " (unsettled)"
-COMBINATION = ("combination", "levels", "finest DOF")
 
 
-def level_rows(series: Series, units: Mapping[str, str], quantities: Sequence[str] | None = None) -> Rows:
+def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
     """Return header and rows: h, DOF, and for each quantity its value, error against the limit and order between levels."""
-    names = series.shown(IN_TABLES) if quantities is None else quantities
-    header = ["level", labelled("h", units, "length"), "DOF"]
-    rows = [[str(level.number), number(level.h, 4), str(level.n_dofs)] for level in series.levels]
-    for name in names:
-        header += [column(name, name, units), "error", "order"]
-        columns = zip(series.values(name), series.errors(name), series.orders(name), strict=True)
-        for row, (value, error, order) in zip(rows, columns, strict=True):
-            row += [number(value, 8), percent(error), f"{order:.2f}" if math.isfinite(order) else "-"]
-    return [header, *rows]
+    columns = [
+        ("level", [str(level.number) for level in series.levels]),
+        (labelled("h", units, "length"), [number(h, 4) for h in series.h]),
+        ("DOF", [str(level.n_dofs) for level in series.levels]),
+    ]
+    for name in series.shown(IN_TABLES):
+        orders = [f"{order:.2f}" if math.isfinite(order) else "-" for order in series.orders(name)]
+        columns.append((column(name, name, units), [number(value, 8) for value in series.values(name)]))
+        columns += [("error", list(map(percent, series.errors(name)))), ("order", orders)]
+    return by_columns(columns)
 
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
@@ -45,20 +46,17 @@ def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
     """Return header and a row for each combination: limits of the quantities, and their mesh and model errors."""
-    header, rows = [*COMBINATION], [_start(series) for series in all_series]
+    header, shown = ["combination", "levels", "finest DOF"], []
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
-        for row, series in zip(rows, all_series, strict=True):
-            row += _cells(series, name, ("limit", "+-", "order alone", "mesh error", "model error"))
+        shown += [(name, cell) for cell in ("limit", "+-", "order alone", "mesh error", "model error")]
     if "pressure_max" in quantities:
         header.append("p at equal force")
-        for row, series in zip(rows, all_series, strict=True):
-            row += _cells(series, "pressure_max", ("at equal force",))
+        shown.append(("pressure_max", "at equal force"))
+    rows = [[str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)] for series in all_series]
+    for row, series in zip(rows, all_series, strict=True):
+        row += [cell for name, kind in shown for cell in _cells(series, name, (kind,))]
     return [header, *rows]
-
-
-def _start(series: Series) -> list[str]:
-    return [str(series.combination), str(len(series.levels)), str(series.finest.n_dofs)]
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
@@ -82,7 +80,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
 
 
 def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
-    """Return the columns (n_rows,) of all levels by name, without those that contain no number; see `Study.table`."""
+    """Return the columns (n_rows,) of all levels by name; see `Study.table`."""
     quantities = dict.fromkeys(name for series in all_series for name in series.quantities)
     columns: dict[str, list[Any]] = {}
     for series in all_series:
@@ -104,7 +102,7 @@ def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
             }
         for name, values in of_series.items():
             columns.setdefault(name, []).extend(values)
-    return {name: values for name, values in columns.items() if not all(value != value for value in values)}
+    return columns
 
 
 def series_dict(series: Series) -> dict[str, Any]:
@@ -112,26 +110,11 @@ def series_dict(series: Series) -> dict[str, Any]:
     return {
         "element": series.combination.element,
         "formulation": series.combination.formulation,
-        "levels": [
-            {
-                "level": level.number,
-                "h": level.h,
-                "n_dofs": level.n_dofs,
-                **{name: finite(value) for name, value in level.values.items()},
-                "seconds": level.seconds,
-                "warnings": list(level.warnings),
-            }
-            for level in series.levels
-        ],
+        "levels": [{"level": level.number, **level.as_dict()} for level in series.levels],
         "failed": [{"level": number, "error": text} for number, text in series.failed.items()],
         "quantities": {name: _quantity_dict(series, name) for name in series.quantities},
         "equal_force": {
-            name: {
-                "theory": split.theory,
-                "model_error": split.model,
-                "mesh_error": split.mesh,
-                "uncertainty": split.uncertainty,
-            }
+            name: _fields(split, theory="theory", model_error="model", mesh_error="mesh", uncertainty="uncertainty")
             for name in series.quantities
             if name != "force" and (split := series.split_equal_force(name)) is not None
         },
@@ -139,19 +122,22 @@ def series_dict(series: Series) -> dict[str, Any]:
     }
 
 
+def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
+    """Return fields by key; None for NaN, and for all without values."""
+    fields = {key: getattr(values, name, None) for key, name in names.items()}
+    return {key: finite(value) if isinstance(value, float) else value for key, value in fields.items()}
+
+
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
     """Return limit, order, theory and errors of a quantity; None for missing numbers."""
     limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
     entry: dict[str, Any] = {
-        "limit": limit.value if limit else None,
-        "uncertainty": limit.uncertainty if limit else None,
-        "order": finite(limit.order) if limit else None,
-        "order_uncertainty": finite(limit.order_uncertainty) if limit else None,
-        "converging": limit.converging if limit else None,
+        **_fields(
+            limit, limit="value", **{key: key for key in ("uncertainty", "order", "order_uncertainty", "converging")}
+        ),
         "converges_to_theory": series.converges_to_theory(name),
         "theory": series.theory.get(name),
-        "model_error": split.model if split else None,
-        "model_error_uncertainty": split.uncertainty if split else None,
+        **_fields(split, model_error="model", model_error_uncertainty="uncertainty"),
         "mesh_error": finite(series.mesh_error(name)),
     }
     if reference is not None:

@@ -18,6 +18,7 @@ from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.integration import facet_measure, fine_rule
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.energy import elastic_energy
+from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
@@ -140,7 +141,8 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
             if not len(facet):
                 continue
             at_nodes = smooth[name][cell[:, None], local]
-            traction = _traction(np.einsum("qa,fai->fqi", N, at_nodes), normals[facet])
+            tensor = np.einsum("qa,fai->fqi", N, at_nodes)[..., PAIRS[mesh.dim]]
+            traction = (tensor * normals[facet][..., None, :]).sum(axis=-1)
             p = nodal[block.facets[facet]] @ N.T
             off = traction + p[:, :, None] * normals[facet]
             length = area[facet].sum(axis=1)
@@ -151,12 +153,6 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
                 * ((off * normals[facet]).sum(axis=2) ** 2 * area[facet]).sum(axis=1)
             )
             np.add.at(contact, first[number] + cell, np.where(length > 0, value, 0.0))
-
-
-def _traction(stress: Array, normal: Array) -> Array:
-    """Return stress times normal (..., dim)."""
-    tensor = stress[..., [[0, 3], [3, 1]] if normal.shape[-1] == 2 else [[0, 3, 5], [3, 1, 4], [5, 4, 2]]]
-    return np.asarray((tensor * normal[..., None, :]).sum(axis=-1))
 
 
 def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:

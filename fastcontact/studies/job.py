@@ -29,6 +29,7 @@ from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.contact_options import SHARED_OPTIONS
+from fastcontact.model.fingerprint import digest_of_mesh
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh, recipe
@@ -109,10 +110,8 @@ class Job(Run):
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
         inputs["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
-        hashed = hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode())
-        if self.base is not None:
-            hashed.update(_fingerprint(self.base))
-        return hashed.hexdigest()[:32]
+        inputs["mesh"] = None if self.base is None else digest_of_mesh(self.base)
+        return hashlib.sha256(json.dumps(inputs, sort_keys=True, default=str).encode()).hexdigest()[:32]
 
     def solved(self) -> tuple[Case, list[StepResult]]:
         """See `Run`."""
@@ -146,28 +145,18 @@ def job_of(
     )  # fmt: skip
 
 
-def _fingerprint(mesh: Mesh) -> bytes:
-    digest = hashlib.sha256(np.ascontiguousarray(mesh.points).tobytes())
-    for block in (mesh.cells, mesh.cell_groups, mesh.point_groups):
-        for name, numbers in block.items():
-            digest.update(name.encode() + np.ascontiguousarray(numbers).tobytes())
-    return digest.digest()
-
-
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
     """Return the case data with another formulation, and with the options and number of load steps of the study.
 
     Options that another formulation does not have are dropped.
     """
     data = copy.deepcopy({key: value for key, value in settings.data.items() if key != "study"})
-    formulation = combination.formulation
-    named = data.get("contact", {})
-    for name, entry in named.items() if formulation and isinstance(named, dict) else ():
-        _exchange(entry, str(formulation), settings, settings.formulations[name])
-    if formulation and (named == "auto" or "contacts" in data):
-        _exchange(data.setdefault("contacts", {}), str(formulation), settings, settings.own.formulation or "")
-    for name, entry in data.get("obstacle", {}).items() if formulation else ():
-        _exchange(entry, str(formulation), settings, settings.formulations[name])
+    formulation, pairs = combination.formulation, data.get("contact", {})
+    if formulation:
+        if pairs == "auto" or "contacts" in data:
+            _exchange(data.setdefault("contacts", {}), formulation, settings, settings.own.formulation or "")
+        for name, entry in {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}.items():
+            _exchange(entry, formulation, settings, settings.formulations[name])
     if settings.load_steps is not None:
         data["ramp"] = ramp_of(data.get("ramp", {}), settings.load_steps)
     return data

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -10,6 +11,7 @@ from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.results.conversions import data_frame
+from fastcontact.results.tables import structured
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.quantities import unit
 from fastcontact.studies.render import page
@@ -88,6 +90,11 @@ class Report:
     def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""
         raise NotImplementedError
+
+    @staticmethod
+    def structured_known(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
+        """Return columns (n_rows,) as a structured array (n_rows,), without those that contain only NaN."""
+        return structured({name: values for name, values in columns.items() if any(v == v for v in values)})
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed.

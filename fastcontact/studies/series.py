@@ -6,7 +6,9 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
+from fastcontact.cases.summary import finite
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
@@ -70,7 +72,7 @@ class Measured:
     Attributes
     ----------
     h : float
-        Shortest facet of the secondary surface; without contact the shortest edge [length].
+        Shortest facet of the secondary surface; without contact the shortest edge; NaN if unknown [length].
     n_dofs : int
     values : dict of str to float
         Quantities of interest, in the case's units.
@@ -87,6 +89,12 @@ class Measured:
     profile: dict[str, list[float]] = field(repr=False)
     seconds: float
     warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return sizes, quantities, time and warnings for JSON; without an unknown mesh size, and None for NaN."""
+        size = {} if math.isnan(self.h) else {"h": self.h}
+        values = {name: finite(value) for name, value in self.values.items()}
+        return {**size, "n_dofs": self.n_dofs, **values, "seconds": self.seconds, "warnings": list(self.warnings)}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

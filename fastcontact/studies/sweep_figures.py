@@ -107,13 +107,10 @@ class Drawing:
 
     def _unmoved(self, quantity: str) -> str:
         """Return a note if the theory is the same for all values of the first parameter; otherwise empty."""
-        several = False
-        for _, _, points in self._curves():
-            known = {point.theory[quantity] for point in points if quantity in point.theory}
-            several |= len(points) > 1
-            if len(known) != 1 and points:
-                return ""
-        return f"\n(the same for every {self.first})" if several else ""
+        curves = [points for _, _, points in self._curves()]
+        values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
+        same = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
+        return f"\n(the same for every {self.first})" if same else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
         """Draw the ratios to theory at equal approach and at equal force over the parameter."""

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from fastcontact.arrays import AnyArray
-from fastcontact.cases.summary import finite
-from fastcontact.results.tables import structured
 from fastcontact.studies.quantities import column
 from fastcontact.studies.render.figure import panels
-from fastcontact.studies.render.table import Rows, number, percent
+from fastcontact.studies.render.table import Rows, by_columns, number, percent
 from fastcontact.studies.report import Report
 from fastcontact.studies.sweep_figures import Drawing
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
@@ -73,8 +71,8 @@ class Sweep(Report):
     def table(self) -> AnyArray:
         """Return a structured array (n_points,), one row a point, as ``--csv`` writes it.
 
-        Fields are the parameters, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every quantity its value in its
-        unit and, if known, ``..._from_theory``, ``..._from_theory_at_equal_force`` and ``..._from_reference`` [-].
+        Fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s], and for every quantity its value in
+        its unit and, if known, ``..._from_theory``, ``..._from_theory_at_equal_force`` and ``..._from_reference`` [-].
         """
         columns: dict[str, list[Any]] = {name: [p.parameters[name] for p in self.points] for name in self.parameters}
         for attribute in ("h", "n_dofs", "seconds"):
@@ -82,10 +80,8 @@ class Sweep(Report):
         for name in self.quantities:
             columns[name] = [point.values.get(name, math.nan) for point in self.points]
             for other, key in DIFFERENCES.items():
-                off = [point.ratio(name, other) - 1.0 for point in self.points]
-                if any(map(math.isfinite, off)):
-                    columns[f"{name}_{key}"] = off
-        return structured(columns)
+                columns[f"{name}_{key}"] = [point.ratio(name, other) - 1.0 for point in self.points]
+        return self.structured_known(columns)
 
     def tables(self) -> list[tuple[str, Rows]]:
         """See `Report`."""
@@ -119,25 +115,25 @@ class Sweep(Report):
 
     def _rows(self) -> Rows:
         """Return header and a row for each point: parameters, DOF, main quantities, differences from theory."""
-        header = [*self.parameters, "DOF"]
-        rows = [[_shown(p.parameters[name]) for name in self.parameters] + [str(p.n_dofs)] for p in self.points]
+        columns = [(name, [_shown(point.parameters[name]) for point in self.points]) for name in self.parameters]
+        columns.append(("DOF", [str(point.n_dofs) for point in self.points]))
         for name in self._main():
             known = any(name in point.theory for point in self.points)
             compared = {"theory": "from theory"} if known else {}
             compared |= {"equal_force": "at equal force"} if known and name != "force" else {}
-            header += [column(name, name, self.units), *compared.values()]
-            for row, point in zip(rows, self.points, strict=True):
-                row.append(number(point.values.get(name, math.nan), 7))
-                row += [percent(point.ratio(name, other) - 1.0) for other in compared]
-        return [header, *rows]
+            values = [number(point.values.get(name, math.nan), 7) for point in self.points]
+            columns.append((column(name, name, self.units), values))
+            for other, label in compared.items():
+                columns.append((label, [percent(point.ratio(name, other) - 1.0) for point in self.points]))
+        return by_columns(columns)
 
 
 def _point_dict(point: Point) -> dict[str, Any]:
-    entry: dict[str, Any] = {"parameters": dict(point.parameters), "h": point.h, "n_dofs": point.n_dofs, **point.values}
+    entry: dict[str, Any] = {"parameters": dict(point.parameters), **point.as_dict()}
     for other, key in DIFFERENCES.items():
         off = {name: point.ratio(name, other) - 1.0 for name in getattr(point, other)}
-        entry[key] = {name: value for name, value in off.items() if finite(value) is not None}
-    return {**entry, "seconds": point.seconds, "warnings": list(point.warnings)}
+        entry[key] = {name: value for name, value in off.items() if math.isfinite(value)}
+    return entry
 
 
 def _shown(value: Value) -> str:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,23 +23,15 @@ from fastcontact.model.model import Model
 from fastcontact.results.conversions import data_frame
 from fastcontact.results.phases import phases
 from fastcontact.results.step import StepResult
+from fastcontact.results.steps import StepSequence
 from fastcontact.round_off import ROUND_OFF
 
 if TYPE_CHECKING:
     import pandas
 
 
-class Shapes(Sequence[StepResult]):
+class Shapes(StepSequence):
     """A sequence of mode shapes, each as a step: displacement, its stress, and the frequency as load factor."""
-
-    @abstractmethod
-    def _step(self, number: int) -> StepResult: ...
-
-    def __getitem__(self, place: Any) -> Any:
-        """Return a shape, or a list of those of a slice."""
-        if isinstance(place, slice):
-            return [self[k] for k in range(*place.indices(len(self)))]
-        return self._step(range(len(self))[place])
 
     @typed(ModelError)
     def phases(self, number: int, count: int = 24) -> list[StepResult]:

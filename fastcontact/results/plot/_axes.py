@@ -30,12 +30,6 @@ def placed(points: Array, size: float) -> str:
     return f"({', '.join(f'{x:.4g}' for x in kept)})"
 
 
-def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
-    """Return the corners of a square around its middle (2,), of a half width, clipped to the bounds of `points` (n, 2)."""
-    low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
-    return np.maximum(middle - half, low), np.minimum(middle + half, high)
-
-
 def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
     """Return a contact pair of each step; raises FastcontactError if there are no steps, or none has such a pair."""
     if not len(steps):
@@ -110,22 +104,9 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
     return panels
 
 
-def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
-    """Return width and height of a picture filled by the body, including colours, labels and title [inches]."""
-    width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
-    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
-
-
-def legend_below(points: Array) -> float:
-    """Return the position of the legend, in heights of such axes: half an inch below for the label of the axis."""
-    width, height = np.ptp(points, axis=0)
-    return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
-
-
-def bar_beside(points: Array) -> float:
-    """Return the length of the colour bar over the available length: the height of slender bodies, except for its label."""
-    width, height = np.ptp(points, axis=0)
-    return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
+def outer_legend(ax: Any, columns: int) -> None:
+    """Add a legend below the label of the abscissa, where it cannot hide data."""
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize=8)
 
 
 def settled(axes: Any) -> Any:

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from fastcontact.arrays import Array, Numbers
+from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.recovery import von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import contact_slip
-from fastcontact.results.separated import separated
+from fastcontact.results.separated import cells_by_element, separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import valued
@@ -74,82 +77,66 @@ class Field:
 
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     """Return a field of a step by one of `names`; FastcontactError if there is no such field."""
-    everywhere = np.arange(mesh.n_points, dtype=np.int32)
+    known = [*names(mesh), *step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
+    if name not in known:
+        raise FastcontactError(unknown("field", name, known))
+    if name in OF_STRESS and name not in step.cell_fields:
+        separate_mesh, node, stress = separated(mesh, step)
+        caption, of_stress = OF_STRESS[name]
+        values = step.von_mises if name == "von_mises" and separate_mesh is mesh else of_stress(stress)
+        return Field(separate_mesh, node, values, caption, "pressure")
+    caption, quantity = name, ""
     if name in DISPLACEMENTS:
-        axis = AXES.index(name[-1]) if "." in name else None
-        if axis is not None and axis >= mesh.dim:
-            raise FastcontactError(unknown("field", name, names(mesh)))
-        values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
-        return Field(
-            mesh, everywhere, values, "displacement" if axis is None else f"displacement along {name[-1]}", "length"
-        )
-    if name in SLIPS:
-        slip = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
-        return Field(mesh, everywhere, slip, SLIPS[name], "length")
-    if name == "temperature" and step.temperature is not None:
-        return Field(mesh, everywhere, step.temperature, name, "")
-    if name in step.cell_fields:
-        return Field(mesh, everywhere, _of_cells(mesh, step.cell_fields[name]), CELLS.get(name, name), "")
-    separate_mesh, node, stress = separated(mesh, step)
-    if name == "von_mises" and separate_mesh is mesh:
-        return Field(mesh, node, step.von_mises, CAPTIONS[name], "pressure")
-    if name not in names(mesh):
-        further = [*step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
-        raise FastcontactError(unknown("field", name, [*names(mesh), *further]))
-    if name in CAPTIONS:
-        return Field(separate_mesh, node, OF_STRESS[name](stress), CAPTIONS[name], "pressure")
-    component = name.removeprefix("stress.")
-    values = stress[:, STRESS_COMPONENTS.index(component)]
-    return Field(separate_mesh, node, values, f"stress {component}", "pressure")
+        caption, quantity = name.replace(".", " along "), "length"
+        along = AXES.index(name[-1]) if "." in name else None
+        values = np.linalg.norm(step.displacement, axis=1) if along is None else step.displacement[:, along]
+    elif name in SLIPS:
+        caption, quantity = SLIPS[name], "length"
+        values = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
+    elif name == "temperature" and step.temperature is not None:
+        values = step.temperature
+    else:
+        caption, values = CELLS.get(name, name), _of_cells(mesh, step.cell_fields[name])
+    return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)
 
 
 def names(mesh: Mesh) -> list[str]:
     """Return the names of all possible fields of a mesh."""
-    components = STRESS_COMPONENTS[: 4 if mesh.dim == 2 else 6]
-    displacements = [name for name in DISPLACEMENTS if "." not in name or name[-1] in AXES[: mesh.dim]]
-    return [*CAPTIONS, *(f"stress.{name}" for name in components), *displacements, *SLIPS]
+    in_space = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
+    return [name for name in (*OF_STRESS, *DISPLACEMENTS, *SLIPS) if name not in in_space]
 
 
 def _of_cells(mesh: Mesh, values: Array) -> Array:
     """Return values of solid cells (n_solids,) at the points (n_points,): the mean of the cells around each."""
-    total, count, first = np.zeros(mesh.n_points), np.zeros(mesh.n_points), 0
-    for block in mesh.solids.values():
-        block_values = values[first : first + len(block)]
-        np.add.at(total, block, block_values[:, None])
+    total, count, by_element = np.zeros(mesh.n_points), np.zeros(mesh.n_points), cells_by_element(mesh, values)
+    for name, block in mesh.solids.items():
+        np.add.at(total, block, by_element[name][:, None])
         np.add.at(count, block, 1.0)
-        first += len(block)
     return total / np.maximum(count, 1.0)
 
 
-def principal_stresses(stress: Array) -> Array:
-    """Return the principal stresses (n, 3) of stresses (n, 4) or (n, 6), the smallest first [pressure]."""
+def principal_stress(stress: Array, number: int) -> Array:
+    """Return a principal stress (n,) of stresses (n, 4) or (n, 6), counted from the smallest [pressure]."""
     full = np.zeros((len(stress), 6))
     full[:, : stress.shape[1]] = stress
-    xx, yy, zz, xy, yz, xz = full.T
-    tensor = np.stack([xx, xy, xz, xy, yy, yz, xz, yz, zz], axis=1).reshape(-1, 3, 3)
-    return np.asarray(np.linalg.eigvalsh(tensor))
+    return np.asarray(np.linalg.eigvalsh(full[:, PAIRS[3]])[:, number])
 
 
-def _tresca(stress: Array) -> Array:
-    principal = principal_stresses(stress)
-    return np.asarray(principal[:, 2] - principal[:, 0])
-
-
-CAPTIONS = {
-    "von_mises": "von Mises stress",
-    "von_mises_signed": "von Mises stress with the sign of the trace",
-    "tresca": "Tresca stress (largest less smallest principal)",
-    "stress.principal_max": "largest principal stress",
-    "stress.principal_mid": "middle principal stress",
-    "stress.principal_min": "smallest principal stress",
-}
-OF_STRESS: dict[str, Callable[[Array], Array]] = {
-    "von_mises": von_mises,
-    "von_mises_signed": von_mises_signed,
-    "tresca": _tresca,
-    "stress.principal_max": lambda stress: principal_stresses(stress)[:, 2],
-    "stress.principal_mid": lambda stress: principal_stresses(stress)[:, 1],
-    "stress.principal_min": lambda stress: principal_stresses(stress)[:, 0],
+# Caption, and values (n,) of stresses (n, 4) or (n, 6) [pressure].
+OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
+    "von_mises": ("von Mises stress", von_mises),
+    "von_mises_signed": ("von Mises stress with the sign of the trace", von_mises_signed),
+    "tresca": (
+        "Tresca stress (largest less smallest principal)",
+        lambda stress: principal_stress(stress, 2) - principal_stress(stress, 0),
+    ),
+    "stress.principal_max": ("largest principal stress", partial(principal_stress, number=2)),
+    "stress.principal_mid": ("middle principal stress", partial(principal_stress, number=1)),
+    "stress.principal_min": ("smallest principal stress", partial(principal_stress, number=0)),
+    **{
+        f"stress.{name}": (f"stress {name}", operator.itemgetter((slice(None), k)))
+        for k, name in enumerate(STRESS_COMPONENTS)
+    },
 }
 CELLS = {
     "plastic_strain": "equivalent plastic strain",

@@ -8,11 +8,11 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
-from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import Axes, new_axes, settled, size_around
-from fastcontact.results.plot.patches import outlines
+from fastcontact.results.plot._axes import Axes, new_axes, settled
+from fastcontact.results.plot.framing import size_around
+from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 
 
@@ -47,8 +47,6 @@ def contacts(
         axes.set_aspect("equal")
         axes.autoscale_view()
     else:
-        axes.set_proj_type("ortho")
-        axes.view_init(elev=view[0], azim=view[1])
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
     axes.set(**{f"{axis}label": axis for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
@@ -91,11 +89,7 @@ def _draw_3d(axes: Any, found_contacts: FoundContacts) -> None:
 
     mesh = found_contacts.mesh
     for facets in outer_facets(mesh).values():
-        shape = mesh.points[facets][:, flat_triangles(facets.shape[1])].reshape(-1, 3, 3)
-        axes.add_collection3d(Poly3DCollection(shape, facecolors="0.6", alpha=0.12))
+        axes.add_collection3d(Poly3DCollection(triangles_of(mesh.points, facets), facecolors="0.6", alpha=0.12))
     for group, label, colour, opacity in _sides(found_contacts):
-        shapes = [
-            mesh.points[block][:, flat_triangles(block.shape[1])].reshape(-1, 3, 3)
-            for block in mesh.cells_of(group, 2).values()
-        ]
+        shapes = [triangles_of(mesh.points, block) for block in mesh.cells_of(group, 2).values()]
         axes.add_collection3d(Poly3DCollection(np.concatenate(shapes), facecolors=[colour], alpha=opacity, label=label))

@@ -37,8 +37,7 @@ class Screen:
         low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
         across, up = (high - low + 1).T
         count = across * up
-        number = np.repeat(np.arange(len(count)), count)
-        within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+        number, within = _counted(count)
         column, row = within % across[number], within // across[number]
         square = (low[number, 0] + column) * self.n_bins + low[number, 1] + row
         order = np.argsort(square, kind="stable")
@@ -54,10 +53,8 @@ class Screen:
         column, row = self._square(flat[:, :2]).T
         square = column * self.n_bins + row
         first, count = self.starts[square], self.starts[square + 1] - self.starts[square]
-        index = np.repeat(np.arange(len(flat)), count)
-        triangle = self.members[
-            np.repeat(first, count) + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-        ]
+        index, within = _counted(count)
+        triangle = self.members[first[index] + within]
         behind = self._behind(flat[index], triangle)
         return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
 
@@ -70,6 +67,11 @@ class Screen:
         weights = np.stack([_cross(b - p, c - p), _cross(c - p, a - p), _cross(a - p, b - p)], axis=1) / area[:, None]
         depth = (weights * self.depth[triangle]).sum(axis=1)
         return np.asarray((weights > 0.0).all(axis=1) & (depth > flat[:, 2] + self.tolerance))
+
+
+def _counted(count: Indices) -> tuple[Indices, Indices]:
+    """Return for each of `count` (n,) members of each entry the number of the entry, and that of the member in it."""
+    return np.repeat(np.arange(len(count)), count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
 
 
 def across(eye: Array) -> Array:

@@ -11,7 +11,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contacts_of, new_axes, new_panels
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contacts_of, new_axes, new_panels, outer_legend
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
@@ -174,5 +174,5 @@ def contact_zones(
     distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3, fontsize=8)  # below: points are everywhere
+    outer_legend(axes, 3)
     return axes

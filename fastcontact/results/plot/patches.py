@@ -36,22 +36,27 @@ def fill(
     ends : (float, float)
         Values of the first and the last colour, in the unit of `values`.
     """
-    from matplotlib.tri import Triangulation
-
     few = sum(map(len, blocks.values())) <= FEW
     places, heights, triangles, start = [], [], [], 0
     for name, cells in blocks.items():
-        xi, pieces = _lattice(name) if few and name != "tri3" else (None, flat_triangles(cells.shape[1]))
-        shape = elements.get(name).shape(xi) if xi is not None else np.eye(cells.shape[1])
+        shape, pieces = np.eye(cells.shape[1]), flat_triangles(cells.shape[1])
+        if few and name != "tri3":
+            kind = elements.get(name)
+            xi, pieces = lattice(kind.n_corners == 3, CUTS)
+            shape = kind.shape(xi if kind.n_corners == 3 else 2.0 * xi - 1.0)
         places.append(np.einsum("ps,nsd->npd", shape, points[cells]).reshape(-1, 2))
         heights.append((values[cells] @ shape.T).ravel())
         triangles.append((start + len(shape) * np.arange(len(cells))[:, None, None] + pieces).reshape(-1, 3))
         start += len(shape) * len(cells)
-    x, y = np.concatenate(places).T
-    return ax.tripcolor(
-        Triangulation(x, y, np.concatenate(triangles)), np.concatenate(heights), shading="gouraud", cmap=colours,
-        vmin=ends[0], vmax=ends[1],
-    )  # fmt: skip
+    return shaded(ax, np.concatenate(places), np.concatenate(triangles), np.concatenate(heights), colours, ends)
+
+
+def shaded(ax: Any, points: Array, triangles: AnyArray, values: Array, colours: str, ends: tuple[float, float]) -> Any:
+    """Fill triangles (m, 3) of int between `points` (n, 2) by linear interpolation of `values` (n,); others as in `fill`."""
+    from matplotlib.tri import Triangulation
+
+    mesh = Triangulation(points[:, 0], points[:, 1], triangles)
+    return ax.tripcolor(mesh, values, shading="gouraud", cmap=colours, vmin=ends[0], vmax=ends[1])
 
 
 def outlines(name: str, corners: Array) -> Array:
@@ -63,16 +68,16 @@ def outlines(name: str, corners: Array) -> Array:
     return np.concatenate([np.einsum("ps,nsd->npd", line, corners[:, list(side)]) for side in kind.facets], axis=1)
 
 
-def _lattice(name: str) -> tuple[Array, AnyArray]:
-    """Return a lattice of reference coordinates (n, 2) in a cell, and the triangles (m, 3) between them."""
-    corner = elements.get(name).n_corners == 3
-    last = CUTS if corner else 2 * CUTS
-    places = [(i, j) for i in range(CUTS + 1) for j in range(CUTS + 1) if i + j <= last]
-    number = {lattice_point: k for k, lattice_point in enumerate(places)}
-    squares = [(i, j) for i in range(CUTS) for j in range(CUTS)]
-    xi = np.array(places, float) / CUTS
-    lower = [(i, j) for i, j in squares if not corner or i + j < CUTS]
-    upper = [(i, j) for i, j in squares if not corner or i + j < CUTS - 1]
-    pieces = [[number[i, j], number[i + 1, j], number[i, j + 1]] for i, j in lower]
-    pieces += [[number[i + 1, j], number[i + 1, j + 1], number[i, j + 1]] for i, j in upper]
-    return (xi if corner else 2.0 * xi - 1.0), np.array(pieces)
+def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:
+    """Return points (k, 2) [-] and triangles (m, 3) between them, `n` a side, that divide the unit triangle or square."""
+    points = [(i, j) for i in range(n + 1) for j in range(n + 1) if not triangle or i + j <= n]
+    number = {point: k for k, point in enumerate(points)}
+    squares = [((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)) for i in range(n) for j in range(n)]
+    pieces = [(a, b, c) for a, b, c, _ in squares] + [(b, d, c) for _, b, c, d in squares]
+    inside = [[number[point] for point in piece] for piece in pieces if number.keys() >= {*piece}]
+    return np.array(points, float) / n, np.array(inside)
+
+
+def triangles_of(points: Array, facets: AnyArray) -> Array:
+    """Return the flat triangles (n, 3, dim) [length] of facets between `points` (n_points, dim) [length]."""
+    return points[facets][:, flat_triangles(facets.shape[1])].reshape(-1, 3, points.shape[1])

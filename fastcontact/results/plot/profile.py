@@ -12,7 +12,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, outer_legend
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.results.units import labelled, valued
 
@@ -71,7 +71,7 @@ def pressure_profile(
         raise FastcontactError(
             f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: one of each node"
         )
-    ax, units = new_axes(ax, (6.4, 4.4)), units or contact.units
+    ax, units = new_axes(ax, (6.4, 5.0)), units or contact.units
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
@@ -97,7 +97,7 @@ def pressure_profile(
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
     ax.title.set_fontsize("medium")
-    ax.legend(fontsize=9)
+    outer_legend(ax, 2)
     return ax
 
 

@@ -13,21 +13,12 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import (
-    UNKNOWN,
-    Axes,
-    Units,
-    bar_beside,
-    legend_below,
-    mark,
-    new_axes,
-    part_shown,
-    placed,
-    size_around,
-)
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, mark, new_axes, placed
 from fastcontact.results.plot.fields import Field, field_of
+from fastcontact.results.plot.framing import framed, part_shown, size_around
 from fastcontact.results.plot.hiding import seen_along
-from fastcontact.results.plot.shape import framed, scaled
+from fastcontact.results.plot.patches import shaded
+from fastcontact.results.plot.shape import scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
@@ -100,7 +91,9 @@ def section(
     points = flat.reshape(-1, 2)
     points = points if zoom is None else np.array(part_shown(flat[best], zoom, points))
     axes = new_axes(ax, size_around(points))
-    drawn = _fill(axes, flat, values, shown)
+    limits = shown.range if shown.signed else (float(values.min()), float(values.max()))
+    corner_rows = np.arange(values.size).reshape(-1, 3)
+    drawn = shaded(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
     strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         _stroke(axes, strokes)
@@ -110,9 +103,8 @@ def section(
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
     state = f"{step.instant}, displacements x {scale:g}"
-    below, bar = (legend_below(points), bar_beside(points)) if ax is None else (-0.14, 0.8)
     labels = labels or ("along the section", "across it")
-    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, below, bar, labels)
+    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
@@ -197,18 +189,6 @@ def _between(data: Array, height: Array, i: int, j: int) -> Array:
     """Return the data (n, k) interpolated to zero height between two corners."""
     t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
     return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
-
-
-def _fill(axes: Any, flat: Array, values: Array, shown: Field) -> Any:
-    """Fill triangles (n, 3, 2) by the values (n, 3) at their corners; return the artist with the colours."""
-    from matplotlib.tri import Triangulation
-
-    corners = flat.reshape(-1, 2)
-    low, high = shown.range if shown.signed else (float(values.min()), float(values.max()))
-    return axes.tripcolor(
-        Triangulation(corners[:, 0], corners[:, 1], np.arange(len(corners)).reshape(-1, 3)), values.ravel(),
-        shading="gouraud", cmap=shown.colours, vmin=low, vmax=high,
-    )  # fmt: skip
 
 
 def _stroke(axes: Any, strokes: Array) -> None:

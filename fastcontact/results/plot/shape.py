@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,24 +10,12 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import (
-    UNKNOWN,
-    Axes,
-    Units,
-    bar_beside,
-    legend_below,
-    mark,
-    new_axes,
-    part_shown,
-    placed,
-    settled,
-    size_around,
-)
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, mark, new_axes, placed, settled
 from fastcontact.results.plot.fields import Field, field_of
+from fastcontact.results.plot.framing import framed, part_shown, size_around
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view_of_extreme
 from fastcontact.results.step import StepResult
-from fastcontact.results.units import labelled
 
 LARGEST = 1e30  # largest coordinate that can be drawn: the libraries multiply coordinates
 
@@ -114,7 +101,7 @@ def deformed_shape(
         view = view or view_of_extreme(shown, points)
         drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
-        framed(axes, drawn, shown, heading, units, 0.02, 0.6, "xyz")
+        framed(axes, drawn, shown, heading, units, "xyz")
         return axes if ax is not None else settled(axes)
     extent = np.concatenate([points, points * [-1.0, 1.0]]) if mirrored else points
     extent = extent if zoom is None else np.array(part_shown(points[shown.extreme], zoom, extent))
@@ -124,25 +111,7 @@ def deformed_shape(
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
     _mark(axes, shown, points, mesh, units)
-    below = -0.09 if ax is not None else legend_below(extent)
-    return framed(axes, drawn, shown, heading, units, below, bar_beside(extent), "xy")
-
-
-def framed(
-    axes: Any, drawn: Any, shown: Field, heading: str, units: Units, below: float, bar: float, labels: Sequence[str]
-) -> Any:
-    """Add a colour bar, a title, a label for each direction, and a legend at height `below` [-] to axes; return them.
-
-    The colour bar takes the fraction `bar` of the available length [-].
-    """
-    caption, flat = labelled(shown.caption, units, shown.quantity), len(labels) == 2
-    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=bar)
-    if flat:
-        axes.set_aspect("equal")
-    axes.set_title(heading, fontsize="medium", pad=None if flat else 18)
-    axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
-    return axes
+    return framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:

@@ -13,6 +13,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.hiding import Screen
+from fastcontact.results.plot.patches import lattice
 
 # Number of cells or facets above which edges would only blacken the picture.
 MOST_EDGES = 5000
@@ -44,9 +45,7 @@ def draw_solid(
     from matplotlib.colors import Normalize
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    eye = towards(view)
-    facing = _facing(shown, points, eye)
-    screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
+    facing, screen = _facing(shown, points, towards(view))
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
         weights = _cut(CUTS if elements.get(name).order == 1 else 1)
@@ -62,13 +61,11 @@ def draw_solid(
     lines = faces.copy()  # lines in the colour of the face close the hairline gaps between neighbours
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
         # Nearer objects are drawn later: strokes are moved towards the eye, which does not change their parallel projection.
-        drawn = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * eye
+        drawn = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * towards(view)
         polygons += list(drawn)
         faces = np.vstack([faces, np.zeros((len(drawn), 4))])
         lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(drawn), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
-    ax.set_proj_type("ortho")
-    ax.view_init(elev=view[0], azim=view[1])
     show_box(ax, points.min(axis=0), points.max(axis=0), view)
     return ScalarMappable(norm, shown.colours)
 
@@ -80,6 +77,8 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
     """
     from matplotlib.ticker import MaxNLocator
 
+    ax.set_proj_type("ortho")
+    ax.view_init(elev=view[0], azim=view[1])
     size, eye = np.maximum(high - low, 1e-9 * np.ptp([low, high])), towards(view)
     diagonal = float(np.linalg.norm(size))
     level = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
@@ -97,9 +96,7 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
 
 def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
     """Return whether the extreme value of a field is visible, with points at `points` (n_points, 3) [length]."""
-    eye = towards(view)
-    facing = _facing(shown, points, eye)
-    screen = Screen(np.concatenate([corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]), eye)
+    _, screen = _facing(shown, points, towards(view))
     return not bool(screen.hidden(points[[shown.extreme]])[0])
 
 
@@ -114,8 +111,8 @@ def towards(view: tuple[float, float]) -> Array:
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
-def _facing(shown: Field, points: Array, eye: Array) -> list[tuple[str, Array, Array, Indices]]:
-    """Return name, corners, values of the field and flat triangles of the facets that face the eye, by kind."""
+def _facing(shown: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
+    """Return name, corners, values and flat triangles of the facets that face the eye, by kind, and what they hide."""
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
     facing = []
     for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
@@ -123,7 +120,8 @@ def _facing(shown: Field, points: Array, eye: Array) -> list[tuple[str, Array, A
         a, b, c = np.moveaxis(points[facets][:, flat], -2, 0)
         visible = facets[np.cross(b - a, c - a).sum(axis=1) @ eye > 0]
         facing.append((name, points[visible], shown.values[visible], flat))
-    return facing
+    triangles = [corners[:, flat].reshape(-1, 3, 3) for _, corners, _, flat in facing]
+    return facing, Screen(np.concatenate(triangles), eye)
 
 
 def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
@@ -169,14 +167,8 @@ def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
 
 def _cut(n: int) -> Array:
     """Return the weights (n * n, 3, 3) of the corners of the n * n equal pieces of a triangle."""
-    pieces = []
-    for i in range(n):
-        for j in range(n - i):
-            pieces.append([(i, j), (i + 1, j), (i, j + 1)])
-            if i + j < n - 1:
-                pieces.append([(i + 1, j), (i + 1, j + 1), (i, j + 1)])
-    steps = np.array(pieces, float) / n
-    return np.concatenate([1.0 - steps.sum(axis=2, keepdims=True), steps], axis=2)
+    points, pieces = lattice(True, n)
+    return np.column_stack([1.0 - points.sum(axis=1), points])[pieces]
 
 
 def _outline(name: str, corners: Array) -> Array:

@@ -28,6 +28,11 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
     return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
 
 
+def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
+    """Return columns, each a header and its texts, as rows with the headers as the first."""
+    return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
+
+
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Return rows of texts as lines, columns right-aligned, the first row a header."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]

@@ -56,19 +56,19 @@ def test_indices_do_not_gather_in_memory(shared: int, tmp_path: Path, monkeypatc
             assert_same(results[number], nth_step(number), f"step {number}")
 
 
-def test_a_resumed_file_is_read_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_resumed_file_is_step_by_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A long run of a large model is resumed in the memory of its last step; the others are there when they are asked for."""
     path, read = tmp_path / "run.vtkhdf", []
     with ResultWriter(path, MESH) as out:
         for number in range(6):
             out.write(nth_step(number))
-    ordinary = reader.Results._read_step
+    ordinary = reader.Results._step
 
     def noting(self: reader.Results, number: int) -> object:
         read.append(number)
         return ordinary(self, number)
 
-    monkeypatch.setattr(reader.Results, "_read_step", noting)
+    monkeypatch.setattr(reader.Results, "_step", noting)
     with ResultWriter(path, MESH, resume=True) as out:
         assert (len(out.done), read) == (6, [5])
         assert repr(out.done).endswith("6 steps)")

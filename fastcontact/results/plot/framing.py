@@ -1,0 +1,56 @@
+"""Frames of pictures of bodies: size, part shown, titles, labels, colour bar and legend."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fastcontact.arrays import Array
+from fastcontact.results.plot._axes import Units
+from fastcontact.results.plot.fields import Field
+from fastcontact.results.units import labelled
+
+
+def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
+    """Return width and height of a picture filled by the body, including colours, labels and title [inches]."""
+    width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
+    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
+
+
+def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
+    """Return the corners of a square around its middle (2,), of a half width, clipped to the bounds of `points` (n, 2)."""
+    low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
+    return np.maximum(middle - half, low), np.minimum(middle + half, high)
+
+
+def framed(
+    axes: Any, drawn: Any, shown: Field, heading: str, units: Units, labels: Sequence[str], points: Array | None = None,
+    *, alone: bool = True,
+) -> Any:  # fmt: skip
+    """Add a colour bar, a title, a label for each direction and a legend to axes; return them.
+
+    `points` (n, 2) [length] are those around which axes in the plane are shown; they are `alone` in their figure or not.
+    """
+    caption, flat = labelled(shown.caption, units, shown.quantity), points is not None
+    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if points is None else _bar_length(points))
+    if flat:
+        axes.set_aspect("equal")
+    axes.set_title(heading, fontsize="medium", pad=None if flat else 18)
+    axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
+    below = 0.02 if points is None else _legend_height(points) if alone else -0.09
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
+    return axes
+
+
+def _legend_height(points: Array) -> float:
+    """Return the position of the legend, in heights of such axes: half an inch below for the label of the axis."""
+    width, height = np.ptp(points, axis=0)
+    return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
+
+
+def _bar_length(points: Array) -> float:
+    """Return the length of the colour bar over the available length: the height of slender bodies, except for its label."""
+    width, height = np.ptp(points, axis=0)
+    return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
