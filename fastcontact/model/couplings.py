@@ -16,9 +16,10 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError, ModelError, check_known
+from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
+from fastcontact.model.spread_forces import Spread, by_rotation, mean_rotation, shares_of, turned
 
 Term = tuple[int, int, float]  # point, component, coefficient
 KINDS = ("rigid", "distributing")
@@ -33,8 +34,10 @@ class ReferencePoint:
     place: tuple[float, ...]
 
 
-def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> MultiPointConstraint:
-    """Return equations, lists of terms that sum to zero, as a constraint of a mesh of `shape` (n_points, dim)."""
+def relation(
+    name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int], value: float = 0.0, ramp: Table | None = None
+) -> MultiPointConstraint:
+    """Return equations, lists of terms whose sum is `value`, as a constraint of a mesh of `shape` (n_points, dim)."""
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
     column = [point * dim + axis for terms in rows for point, axis, _ in terms]
@@ -42,19 +45,11 @@ def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) 
     matrix = csr_array((values, (row, column)), shape=(len(rows), n_points * dim))
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
-    return MultiPointConstraint(name, matrix)
+    return MultiPointConstraint(name, matrix, value, ramp)
 
 
-def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
-    """Return the rotation components, with factors, that move the end of an arm (dim,) along an axis."""
-    if dim == 2:
-        return [(0, -arm[1] if axis == 0 else arm[0])]
-    after, last = (axis + 1) % 3, (axis + 2) % 3
-    return [(after, arm[last]), (last, -arm[after])]
-
-
-def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: Sequence[int]) -> list[list[Term]]:
-    """Return the equations of a rigid coupling: points follow the translation and rotation of a reference point.
+def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, directions: Array, n_dofs: int) -> csr_array:
+    """Return the rows (n k, n_dofs) of a rigid coupling: points follow the translation and rotation of a reference point.
 
     Parameters
     ----------
@@ -62,19 +57,22 @@ def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: 
     points : ndarray of int (n,)
     places : ndarray (n, dim)
         Their reference coordinates [length].
-    axes : sequence of int
-        Components of the displacement that follow.
+    directions : ndarray (n, k, dim)
+        Unit vectors along which each point follows [-].
+    n_dofs : int
     """
-    dim, rows = places.shape[1], []
-    for point, arm in zip(points.tolist(), places - np.array(reference.place), strict=True):
-        for axis in axes:
-            turns = [(reference.rotation, k, -factor) for k, factor in _turn(dim, axis, arm) if factor]
-            rows.append([(point, axis, 1.0), (reference.point, axis, -1.0), *turns])
-    return rows
+    n, k, dim = directions.shape
+    nodes = np.column_stack([points, np.tile([reference.point, reference.rotation], (n, 1))])
+    turns = directions @ by_rotation(places - np.array(reference.place))
+    turns = np.pad(turns, ((0, 0), (0, 0), (0, dim - turns.shape[2])))
+    values = np.stack([directions, -directions, -turns], axis=2)
+    return nodal_rows(np.repeat(nodes, k, axis=0), values.reshape(n * k, 3, dim), n_dofs)
 
 
-def distributing_rows(reference: ReferencePoint, points: Indices, places: Array, weight: Array) -> list[list[Term]]:
-    """Return the equations of a distributing coupling: a reference point follows the mean motion of points.
+def distributing_rows(
+    reference: ReferencePoint, points: Indices, places: Array, weight: Array, directions: Array, n_dofs: int
+) -> csr_array:
+    """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
     The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the points.
 
@@ -86,20 +84,19 @@ def distributing_rows(reference: ReferencePoint, points: Indices, places: Array,
         Their reference coordinates [length].
     weight : ndarray (n,)
         Weights of sum 1 [-].
+    directions : ndarray (k, dim)
+        Unit vectors along which the reference point follows [-].
+    n_dofs : int
     """
-    dim = places.shape[1]
-    middle = weight @ places
-    turn = mean_rotation(weight, places - middle)
-    rows = []
-    for k in range(turn.shape[0]):
-        terms = [(int(p), axis, -float(turn[k, i, axis])) for i, p in enumerate(points) for axis in range(dim)]
-        rows.append([(reference.rotation, k, 1.0), *terms])
-    offset = np.array(reference.place) - middle
-    for axis in range(dim):
-        terms = [(int(p), axis, -float(w)) for p, w in zip(points, weight, strict=True)]
-        turns = [(reference.rotation, k, -f) for k, f in _turn(dim, axis, offset) if f]
-        rows.append([(reference.point, axis, 1.0), *terms, *turns])
-    return rows
+    middle, dim = weight @ places, places.shape[1]
+    rotation = mean_rotation(weight, places - middle)
+    turns = directions @ by_rotation(np.array(reference.place) - middle)
+    heads = np.zeros((len(rotation) + len(directions), 2, dim))  # the reference point and its rotation
+    heads[: len(rotation), 1] = np.eye(len(rotation), dim)
+    heads[len(rotation) :, 0], heads[len(rotation) :, 1, : len(rotation)] = directions, -turns
+    means = np.concatenate([rotation, directions[:, None] * weight[:, None]])
+    nodes = np.tile([reference.point, reference.rotation, *points], (len(heads), 1))
+    return nodal_rows(nodes, np.concatenate([heads, -means], axis=1), n_dofs)
 
 
 def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
@@ -155,16 +152,14 @@ def coupling(
     reference_nodes = np.isin(points, (reference.point, reference.rotation))
     if reference_nodes.any() or not len(points):
         raise ModelError(f"{name}: the group needs points, without the reference point itself")
-    places = mesh.points[points]
+    places, directions, n_dofs = mesh.points[points], np.eye(mesh.dim)[list(axes)], mesh.points.size
+    if kind == "rigid":
+        each = np.tile(directions, (len(points), 1, 1))
+        return MultiPointConstraint(name, rigid_rows(reference, points, places, each, n_dofs))
     try:
-        rows = (
-            rigid_rows(reference, points, places, axes)
-            if kind == "rigid"
-            else distributing_rows(reference, points, places, weight)
-        )
+        return MultiPointConstraint(name, distributing_rows(reference, points, places, weight, directions, n_dofs))
     except ModelError as error:
         raise ModelError(f"{name}: {error}") from error
-    return relation(name, rows, mesh.points.shape)
 
 
 @dataclass(frozen=True)

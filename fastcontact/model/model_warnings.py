@@ -58,16 +58,10 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     pairs, pushed = [(pair, model.bind(pair)) for pair in model.contact], _pushed(supports)
     texts = [*_moduli(model), *_named_units(model), *_proportions(model, float(pushed.max())), poorest_cell(model.mesh)]
     texts += [hanging_nodes_warning(model), _coincident(model), *_friction(model), *_penetrating(model, pairs, pushed)]
-    texts += [*_unramped(model, ramp), *_prescribed_overlaps(pairs, supports), *_lost_loads(model)]
+    texts += [*_unramped(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_lost_loads(model)]
     texts += [*_split_sides(model, pairs), *_wetted_twice(model), _stiffness(model.mesh)]
     texts += [text for load in model.loads for text in _load_integral(model, load)]
     return [text for text in texts if text]
-
-
-def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
-    """Return a warning for each contact with nodes whose prescribed displacements cause penetration."""
-    supported = [(pair, bound) for pair, bound in pairs if supports.fixed[bound.secondary.points].any()]
-    return prescribed_overlap_warnings(supported, supports)
 
 
 def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:

@@ -216,18 +216,8 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     else:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
         around = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
-    edges = [
-        csr_array(
-            sum(
-                (
-                    T.multiply((weight * constraints.friction)[:, None])
-                    for T, weight in zip(constraints.tangents, parts)
-                ),
-                start=constraints.B,
-            )
-        )
-        for parts in around
-    ]
+    shear = [T.multiply(constraints.friction[:, None]) for T in constraints.tangents]
+    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, parts)) for parts in around]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 

@@ -98,22 +98,20 @@ def mean_rotation(weight: Array, arms: Array) -> Array:
     The points have `weight` (n,) [-] and `arms` (n, dim) from their centroid [length]. Products with moments are forces
     at the points with this moment, and no resultant.
     """
-    x, y = arms[:, 0], arms[:, 1]
-    zero = np.zeros_like(x)
-    if arms.shape[1] == 2:
-        cross = np.stack([np.column_stack([-y, x])])
-        inertia = np.array([[weight @ (x * x + y * y)]])
-    else:
-        z = arms[:, 2]
-        cross = np.stack(
-            [np.column_stack([zero, -z, y]), np.column_stack([z, zero, -x]), np.column_stack([-y, x, zero])]
-        )
-        inertia = (weight @ (arms**2).sum(axis=1)) * np.eye(3) - np.einsum("n,ni,nj->ij", weight, arms, arms)
+    motion = by_rotation(arms)
+    inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)
     if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
         raise ModelError(
             "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
         )
-    return np.einsum("kl,lnd,n->knd", np.linalg.inv(inertia), cross, weight)
+    return np.einsum("kl,ndl,n->knd", np.linalg.inv(inertia), motion, weight)
+
+
+def by_rotation(arms: Array) -> Array:
+    """Return the displacement (..., dim, n_rotations) of the ends of `arms` (..., dim) by each unit rotation [length]."""
+    if arms.shape[-1] == 2:
+        return np.asarray(([-1.0, 1.0] * arms[..., ::-1])[..., None])
+    return np.cross(arms[..., None, :], np.eye(3))
 
 
 @dataclass(frozen=True)
@@ -143,9 +141,7 @@ class SpreadForce(Load):
         places = mesh.points[points]
         nodal = weight[:, None] * force
         arm = np.array(self.spread.place) - weight @ places
-        moment = (
-            np.atleast_1d(np.cross(arm, force)) if mesh.dim == 3 else np.array([arm[0] * force[1] - arm[1] * force[0]])
-        )
+        moment = force @ by_rotation(arm)
         size = float(np.ptp(mesh.points, axis=0).max())
         if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
             try:

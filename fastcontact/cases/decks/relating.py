@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
@@ -40,8 +41,8 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     rows += [row for constraint in content.multi_points for row in multi_point_rows(deck_mesh, constraint)]
     made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
-        rows = _distributing(deck_mesh, mesh, link) if link.distributing else _rigid(deck_mesh, link)
-        made.append(relation(f"*{link.location.keyword} of line {link.location.line}", rows, mesh.points.shape))
+        name = f"*{link.location.keyword} of line {link.location.line}"
+        made.append(MultiPointConstraint(name, _link_rows(deck_mesh, mesh, link)))
     return made
 
 
@@ -95,19 +96,21 @@ def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
     return kept
 
 
-def _reference(deck_mesh: DeckMesh, link: Link) -> ReferencePoint:
-    point = deck_mesh.made.node(link.reference, link.location)
-    return ReferencePoint(
-        point, deck_mesh.rotations[point], tuple(deck_mesh.made.points[point][: deck_mesh.dim].tolist())
-    )
-
-
-def _rigid(deck_mesh: DeckMesh, link: Link) -> list[list[Term]]:
-    """Return the equations that make nodes follow the rigid motion of a reference point."""
-    points, dim = np.array(_points(deck_mesh, link), np.intp), deck_mesh.dim
-    rows = rigid_rows(_reference(deck_mesh, link), points, deck_mesh.made.points[points, :dim], range(dim))
-    along = [_directions(deck_mesh, link, point) for point in points.tolist()]
-    return [row for i, axes in enumerate(along) for row in _along(rows[i * dim : (i + 1) * dim], axes)]
+def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
+    """Return the rows that make nodes follow a reference point, or it the area-weighted mean motion of a surface."""
+    made, n_dofs = deck_mesh.made, mesh.points.size
+    point = made.node(link.reference, link.location)
+    reference = ReferencePoint(point, deck_mesh.rotations[point], tuple(made.points[point][: deck_mesh.dim].tolist()))
+    points = np.array(_points(deck_mesh, link), np.intp)
+    places = made.points[points, : deck_mesh.dim]
+    if not link.distributing:
+        directions = np.array([_directions(deck_mesh, link, follower) for follower in points.tolist()])
+        return rigid_rows(reference, points, places, directions, n_dofs)
+    group = deck_mesh.add_facets(f"coupling of line {link.location.line}", made.faces(link.group, link.location))
+    areas = Traction(_known(mesh, deck_mesh, group), {0: 1.0}, None).vector(mesh, deck_mesh.kinematics)[:, 0]
+    weight = areas[points] / areas[points].sum()
+    with refusing(link):
+        return distributing_rows(reference, points, places, weight, _directions(deck_mesh, link, point), n_dofs)
 
 
 def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
@@ -118,31 +121,6 @@ def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
             orientation_of(deck_mesh.made.content, link.orientation, link.location), deck_mesh.made.points[point]
         )
     return axes[[component - 1 for component in link.components if component <= deck_mesh.dim], : deck_mesh.dim]
-
-
-def _along(rows: Sequence[Sequence[Term]], directions: Array) -> list[list[Term]]:
-    """Return equations for displacements along `directions` (n, dim) from those for each axis."""
-    return [
-        [
-            (point, axis, float(factor) * value)
-            for factor, row in zip(direction, rows, strict=True)
-            for point, axis, value in row
-        ]
-        for direction in directions
-    ]
-
-
-def _distributing(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
-    """Return the equations that make a reference point follow the area-weighted mean motion of a surface."""
-    made = deck_mesh.made
-    group = deck_mesh.add_facets(f"coupling of line {link.location.line}", made.faces(link.group, link.location))
-    areas = Traction(_known(mesh, deck_mesh, group), {0: 1.0}, None).vector(mesh, deck_mesh.kinematics)[:, 0]
-    points = np.array(_points(deck_mesh, link), np.intp)
-    weight = areas[points] / areas[points].sum()
-    with refusing(link):
-        rows = distributing_rows(_reference(deck_mesh, link), points, made.points[points, : deck_mesh.dim], weight)
-    turns = len(rows) - deck_mesh.dim
-    return rows[:turns] + _along(rows[turns:], _directions(deck_mesh, link, made.node(link.reference, link.location)))
 
 
 def _known(mesh: Mesh, deck_mesh: DeckMesh, group: str) -> str:
