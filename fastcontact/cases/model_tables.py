@@ -26,7 +26,7 @@ from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import cut
-from fastcontact.mesh.generate.reference_points import with_reference_points
+from fastcontact.mesh.generate.transform import with_reference_points
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table

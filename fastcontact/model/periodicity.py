@@ -18,7 +18,7 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import less_first, matched
@@ -48,9 +48,8 @@ def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indice
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))
-    label = connected_components(csr_array((np.ones(len(ends[0])), ends), shape=(n_points, n_points)), directed=False)[
-        1
-    ]
+    graph = csr_array((np.ones(len(ends[0])), ends), shape=(n_points, n_points))
+    label = connected_components(graph, directed=False)[1]
     return np.unique(label, return_index=True)[1][label]
 
 
@@ -166,10 +165,7 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
         return None
     on = places(other, near.facet, near.xi)
     m, dim, n = len(nodes), mesh.dim, mesh.n_points
-    weights = csr_array(
-        (on.shape.ravel(), (np.repeat(np.arange(m), on.nodes.shape[1]), on.nodes.ravel())), shape=(m, n)
-    )
-    identity = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
+    weights, identity = shapes_at(on.shape, on.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
 
 

@@ -10,8 +10,7 @@ import numpy as np
 from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ModelError
-from fastcontact.mesh.files.file_fields import read_file_field
-from fastcontact.mesh.files.mesh_fields import at_points_of
+from fastcontact.mesh.files.mesh_fields import at_points_of, read_file_field
 from fastcontact.mesh.mesh import Mesh
 
 # Tolerance of the times of a file, relative to the latest.

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import Location, defined, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
-from fastcontact.cases.decks.refusals import defined
 from fastcontact.mesh import elements
 
 # Number of set names that a message lists, and number of characters that it shows of each.
@@ -54,7 +53,7 @@ Face = tuple[Element, int]
 
 
 @dataclass
-class Assembled:
+class Assembly:
     """Points and elements of a deck with all its instances.
 
     Attributes
@@ -345,17 +344,17 @@ def matching(element: str) -> tuple[int, ...]:
     return MATCHING[element]
 
 
-def assembled(content: Content) -> Assembled:
-    """Return the points and elements of all instances; raises CaseError if an element uses an undefined node."""
-    made, total, counts = Assembled(content), 0, {}  # type: tuple[Assembled, int, dict[str, int]]
+def assemble(assembly: Assembly) -> None:
+    """Add the points and elements of all instances; raises CaseError if an element uses an undefined node."""
+    content, total, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
     places = []
-    for scope in made.scopes:
-        part = made.part(scope)
+    for scope in assembly.scopes:
+        part = assembly.part(scope)
         places.append(_placed(part, content.instances.get(scope)))
         index = {number: total + row for number, row in part.nodes.items()} if total else part.nodes
-        made.index[scope] = index
+        assembly.index[scope] = index
         total += len(index)
-        elements = made.elements[scope] = {}
+        elements = assembly.elements[scope] = {}
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
@@ -365,8 +364,7 @@ def assembled(content: Content) -> Assembled:
             if kind is not None:
                 counts[kind.element] += 1
             elements[number] = Element(scope, number, cell, kind, points, row)
-    made.points = np.concatenate(places) if len(places) > 1 else places[0]
-    return made
+    assembly.points = np.concatenate(places) if len(places) > 1 else places[0]
 
 
 def _placed(part: Part, instance: Instance | None) -> Array:

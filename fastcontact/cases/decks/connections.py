@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Equation, Link, MultiPoint, Pair, Pin
 from fastcontact.cases.decks.cyclic_symmetry import sector_ends
-from fastcontact.cases.decks.multi_points import LEAST
+from fastcontact.cases.decks.relating import LEAST
 
 # Largest number of terms of an equation: more would couple everything to everything.
 MOST_TERMS = 100_000

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.cases.decks.assembled import Assembled, facet_points
-from fastcontact.cases.decks.blocks import Located, Location
+from fastcontact.cases.decks.assembled import Assembly, facet_points
+from fastcontact.cases.decks.blocks import Located, Location, refusing
 from fastcontact.cases.decks.conditions import Conditions
 from fastcontact.cases.decks.meshing import DeckMesh
-from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -49,25 +48,25 @@ class GapGroup(Located):
     opposite: str
 
 
-def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed: str) -> None:
+def check_discrete(assembly: Assembly, kind: str, given: Mapping[str, Any], needed: str) -> None:
     """Refuse springs and gap elements without properties."""
-    with_one = {element for name, entry in given.items() for element in made.elements_of(name, entry[0])}
-    for element in made.discrete:
+    with_one = {element for name, entry in given.items() for element in assembly.elements_of(name, entry[0])}
+    for element in assembly.discrete:
         if element.cell.type == kind and element not in with_one:
             raise element.cell.refuse(f"element {element.number} of type {kind} has no {needed}")
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
     """Make groups of the facets around the nodes of gap elements; raises CaseError if these do not fill whole facets."""
-    made, groups = deck_mesh.made, []
-    check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
-    for name, (location, clearance, vector) in made.content.gaps.items():
-        gap_elements = made.elements_of(name, location)
+    groups = []
+    check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
+    for name, (location, clearance, vector) in deck_mesh.content.gaps.items():
+        gap_elements = deck_mesh.elements_of(name, location)
         if any(element.cell.type != "GAPUNI" for element in gap_elements):
             raise location.refuse("acts on elements of type GAPUNI only")
-        shown = made.content.root.set_names.get(name, name)
+        shown = deck_mesh.content.root.set_names.get(name, name)
         ends = np.array([element.points for element in gap_elements], np.intp)
-        bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
+        bodies = all(point in deck_mesh.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
                 shown, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
@@ -81,7 +80,7 @@ def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
 def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
     """Make a group of the facets with all nodes among points; raises CaseError if a point belongs to none of them."""
     chosen = set(points.tolist())
-    faces = deck_mesh.made.faces_within(chosen)
+    faces = deck_mesh.faces_within(chosen)
     if {p for face in faces for p in facet_points(*face)} != chosen:
         raise location.refuse(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"

@@ -11,12 +11,11 @@ from typing import Any, Generic
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element, Face
-from fastcontact.cases.decks.blocks import Block, Location, Row
+from fastcontact.cases.decks.assembled import Assembly, Element, Face
+from fastcontact.cases.decks.blocks import Block, Location, Row, refusing
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
-from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.model.model import Model
@@ -179,12 +178,11 @@ class Spans(Generic[Name]):
 class HeatConditions:
     """Prescribed temperatures, nodal heat, fluxes and films of a deck, with their histories."""
 
-    def __init__(self, deck_mesh: DeckMesh, initial: Mapping[int, float]) -> None:
-        self.found, self.made = deck_mesh, deck_mesh.made
-        content = self.made.content
-        self.reference = _reference(self.made, initial) if content.heat else 0.0
+    def __init__(self, assembly: DeckMesh, initial: Mapping[int, float]) -> None:
+        self.assembly, content = assembly, assembly.content
+        self.reference = _reference(assembly, initial) if content.heat else 0.0
         self.rest: dict[Exchange, float] = {}
-        of_points = dict.fromkeys(range(len(self.made.points)), self.reference) if content.heat else {}
+        of_points = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
         self.temperatures: Histories[int] = Histories(content, rest=of_points)
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Exchange] = Histories(content)
@@ -201,7 +199,7 @@ class HeatConditions:
 
     def prescribe(self, given: Given, row: Row) -> None:
         """Prescribe the temperature of nodes from a line of *BOUNDARY."""
-        if not self.made.content.heat:
+        if not self.assembly.content.heat:
             raise row.refuse("component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE")
         if "FIXED" in given.block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give them")
@@ -210,10 +208,10 @@ class HeatConditions:
 
     def _of_solids(self, row: Row) -> list[int]:
         """Return the points of the node set in a line; raises CaseError if one belongs to no solid."""
-        points = self.made.nodes(row.text(0), row.location)
+        points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
-            if point not in self.made.of_solids:
-                raise row.refuse(f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature")
+            if point not in self.assembly.of_solids:
+                raise row.refuse(f"node {self.assembly.number_of(point)} belongs to no solid, so it has no temperature")
         return points
 
     def take(self, given: Given) -> None:
@@ -257,10 +255,10 @@ class HeatConditions:
         if keyword in ("DSFLUX", "SFILM"):
             if label != letter:
                 raise row.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
-            return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
-        elements = self.made.elements_of(row.text(0), row.location)
+            return [Exchange(keyword, face, (), coefficient) for face in self.assembly.faces(row.text(0), row.location)]
+        elements = self.assembly.elements_of(row.text(0), row.location)
         if label[:1] == letter and label[1:].isdigit():
-            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in elements]
+            faces = [(element, self.assembly.facet(element, int(label[1:]), row.location)) for element in elements]
             return [Exchange(keyword, face, (), coefficient) for face in faces]
         if label == "BF" and keyword == "DFLUX":
             return [Exchange(keyword, None, tuple(elements))]
@@ -278,7 +276,7 @@ class HeatConditions:
 
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
         """Make the mesh groups of all heat loads; return functions that add them to a model."""
-        found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
+        assembly, adders = self.assembly, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
         risen = ByShape[int]()
         for table, names in self.temperatures.alike():
@@ -286,27 +284,27 @@ class HeatConditions:
                 spans += [span] * (span not in spans)
                 risen.add(spans.index(span), self._risen(table), points)
         for number, nodes, value, table in risen:
-            group = found.add_points(f"temperature {len(made)}", nodes)
+            group = assembly.add_points(f"temperature {len(adders)}", nodes)
             fixed = {"value": _above(value, self.reference), "ramp": table, **_between(spans[number])}
-            made.append(partial(Model.fix_temperature, group=group, **fixed))
+            adders.append(partial(Model.fix_temperature, group=group, **fixed))
         for _, nodes, value, table in ByShape.of(self.powers.alike()):
-            group = found.add_points(f"heat {len(made)}", nodes)
+            group = assembly.add_points(f"heat {len(adders)}", nodes)
             powers = tuple((time, power / thickness) for time, power in table)
-            made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
+            adders.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
         sources = ByShape[str]()
         on_faces = ByShape[tuple[str, str]]()
         for table, fluxes in self.fluxes.alike():
             for flux in fluxes:
-                for cell, rows in found.facet_rows([flux.face] if flux.face else []).items():
+                for cell, rows in assembly.facet_rows([flux.face] if flux.face else []).items():
                     on_faces.add((flux.keyword, cell), table, rows)
                 for cell, rows in rows_by_type(flux.elements).items():
                     sources.add(cell, table, rows)
         for cell, indices, value, table in sources:
-            found.groups[group := f"heat source {len(made)}"] = {cell: indices.tolist()}
-            made.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
+            assembly.groups[group := f"heat source {len(adders)}"] = {cell: indices.tolist()}
+            adders.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
         for (keyword, cell), indices, value, table in on_faces:
-            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: indices.tolist()}
-            made.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
+            assembly.groups[group := f"{keyword.lower()} {len(adders)}"] = {cell: indices.tolist()}
+            adders.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
         blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
         for table, films in self.films.alike():
             for span, members in self.blown.of(films).items():
@@ -314,9 +312,9 @@ class HeatConditions:
                     assert film.face is not None
                     blown.setdefault((table, film.coefficient or 0.0, span), []).append(film.face)
         for (table, coefficient, span), faces in blown.items():
-            group = found.add_facets(f"film {len(made)}", faces)
-            made.append(partial(self._film(group, coefficient, table), **_between(span)))
-        return made
+            group = assembly.add_facets(f"film {len(adders)}", faces)
+            adders.append(partial(self._film(group, coefficient, table), **_between(span)))
+        return adders
 
     def _risen(self, table: Table) -> Table:
         """Return a temperature history relative to the reference temperature."""
@@ -344,10 +342,10 @@ def _above(value: Any, reference: float) -> Any:
     return risen if callable(value) else value + reference
 
 
-def _reference(made: Assembled, initial: Mapping[int, float]) -> float:
+def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
     """Return the initial temperature of all solids; zero if it varies and no material expands."""
-    content = made.content
-    values = {initial.get(point, 0.0) for point in made.of_solids}
+    content = assembly.content
+    values = {initial.get(point, 0.0) for point in assembly.of_solids}
     if len(values) == 1:
         return values.pop()
     location = content.initial[0].location

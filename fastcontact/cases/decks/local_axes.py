@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element
+from fastcontact.cases.decks.assembled import Assembly, Element
 from fastcontact.cases.decks.blocks import Location, folded
 from fastcontact.cases.decks.content import Axes, Content
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-def local_directions(made: Assembled) -> dict[int, Array]:
+def local_directions(assembly: Assembly) -> dict[int, Array]:
     """Return the local axes (3, 3), as rows, of the points of all nodes with *TRANSFORM [-]."""
     return {
-        point: local_axes(axes, made.points[point])
-        for axes in made.content.axes
-        for point in made.nodes(axes.nodes, axes.location)
+        point: local_axes(axes, assembly.points[point])
+        for axes in assembly.content.axes
+        for point in assembly.nodes(axes.nodes, axes.location)
     }
 
 
@@ -35,15 +35,15 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
     return axes
 
 
-def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Array:
+def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> Array:
     """Return the axes (n, 3, 3) of the solids of the mesh, for `members` from a *DISTRIBUTION [-].
 
     Other solids have the axes of the mesh. Raises CaseError if an element has no axes and there is no default line.
     """
-    block = made.content.distributions.get(folded(axes.distribution))
+    block = assembly.content.distributions.get(folded(axes.distribution))
     if block is None:
         raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
-    scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
+    scopes = [scope for scope in assembly.scopes if assembly.part(scope) is axes.part]
     default, given = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():
         points = tuple(row.number(index) for index in range(1, 7))
@@ -52,10 +52,10 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
             default = frame
             continue
         for scope in scopes:
-            for element in made.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
+            for element in assembly.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
                 given[id(element)] = frame
-    first = dict(zip(made.by_kind, np.cumsum([0, *map(len, made.by_kind.values())]).tolist()))
-    frames = np.tile(np.eye(3), (len(made.solids), 1, 1))
+    first = dict(zip(assembly.by_kind, np.cumsum([0, *map(len, assembly.by_kind.values())]).tolist()))
+    frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
     for element in members:
         axes_here = given.get(id(element), default)
         if axes_here is None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block
+from fastcontact.cases.decks.blocks import Block, refusing
 from fastcontact.cases.decks.content import Content, Material
-from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.blocks import Block, folded, unquoted
+from fastcontact.cases.decks.blocks import Block, defined, folded, refusing, registered, unquoted
 from fastcontact.cases.decks.content import Amplitude, Axes, Content, Interaction, Material, Part, Section
-from fastcontact.cases.decks.refusals import defined, refusing, registered
 from fastcontact.contact.overclosure import TabularLaw
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
@@ -137,11 +136,11 @@ def section(content: Content, part: Part, block: Block) -> None:
 def interaction(content: Content, block: Block) -> Interaction:
     """*SURFACE INTERACTION: the beginning of the properties of contact pairs."""
     name = block.required("NAME")
-    made = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
+    properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
         block.rows[0].number(0, 1.0)
         content.note(block.rows[0], "the thickness of the interaction has no effect: that of the sections counts")
-    return made
+    return properties
 
 
 def changed_interaction(content: Content, block: Block) -> Interaction:

@@ -87,10 +87,10 @@ def given(content: Content, step: Step | None, block: Block) -> None:
     if name and folded(name) not in content.amplitudes:
         known = ", ".join(content.amplitudes) or "none"
         raise block.refuse(f"amplitude '{name}' is not defined above this line; amplitudes: {known}")
-    made = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
+    conditions = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
-        step.given.append(made)
+        step.given.append(conditions)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(made)
+        content.supports.append(conditions)
     else:
         raise block.refuse("loads belong in a step")

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled
+from fastcontact.cases.decks.assembled import Assembly
 from fastcontact.cases.decks.blocks import Block, Row
 from fastcontact.cases.decks.content import Content, Given, Material
 from fastcontact.cases.decks.histories import ByShape, Histories
@@ -58,30 +58,30 @@ def initial_conditions(content: Content, block: Block) -> None:
     (content.initial if kind == "TEMPERATURE" else content.stresses).append(block)
 
 
-def initial_temperatures(made: Assembled, blocks: Iterable[Block]) -> dict[int, float]:
+def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
     """Return initial temperatures by point; of several for a point, the last one counts."""
-    return {point: value for block in blocks for point, value in _by_point(made, block)}
+    return {point: value for block in blocks for point, value in _by_point(assembly, block)}
 
 
-def give(made: Assembled, histories: Histories[int], given: Given) -> None:
+def give(assembly: Assembly, histories: Histories[int], given: Given) -> None:
     """Set the temperatures of a *TEMPERATURE for the current step."""
     if given.new:
         histories.forget()
     for row in given.block.each():
-        for point, value in _of_row(made, given.block, row):
+        for point, value in _of_row(assembly, given.block, row):
             histories.give(point, value, given.amplitude, row.location)
 
 
-def _by_point(made: Assembled, block: Block) -> Iterable[tuple[int, float]]:
+def _by_point(assembly: Assembly, block: Block) -> Iterable[tuple[int, float]]:
     for row in block.each():
-        yield from _of_row(made, block, row)
+        yield from _of_row(assembly, block, row)
 
 
-def _of_row(made: Assembled, block: Block, row: Row) -> list[tuple[int, float]]:
+def _of_row(assembly: Assembly, block: Block, row: Row) -> list[tuple[int, float]]:
     if any(row.entries[2:]):
         raise row.refuse("gradients of the temperature are those of beams and shells: give one number")
     value = row.number(1)
-    return [(point, value) for point in made.nodes(row.text(0), row.location)]
+    return [(point, value) for point in assembly.nodes(row.text(0), row.location)]
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:

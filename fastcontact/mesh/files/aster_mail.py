@@ -10,8 +10,7 @@ import numpy as np
 
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.blocks import VERTEX
-from fastcontact.mesh.files.meshio_content import mesh_of
+from fastcontact.mesh.files.meshio_content import VERTEX, mesh_of
 from fastcontact.mesh.mesh import Mesh
 
 # Cells by keyword; positions of our nodes among those of code_aster where the orders differ.

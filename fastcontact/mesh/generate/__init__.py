@@ -17,11 +17,17 @@ from fastcontact.mesh.generate.forest import Forest
 from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
 from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
 from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
-from fastcontact.mesh.generate.reference_points import with_reference_points
 from fastcontact.mesh.generate.refine import circles, linearised, refined
 from fastcontact.mesh.generate.rings import rings
 from fastcontact.mesh.generate.sphere import sphere_octant, sphere_on_block
-from fastcontact.mesh.generate.transform import merge_points, mirrored, renamed, transformed, union
+from fastcontact.mesh.generate.transform import (
+    merge_points,
+    mirrored,
+    renamed,
+    transformed,
+    union,
+    with_reference_points,
+)
 from fastcontact.mesh.mesh import Mesh
 
 GENERATORS: dict[str, Callable[..., Mesh]] = {

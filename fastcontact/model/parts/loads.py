@@ -25,11 +25,10 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.errors import ModelError
 from fastcontact.model.checks import check_forces
-from fastcontact.model.couplings import Moment
+from fastcontact.model.couplings import Moment, SpreadForce, spread_of
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.heat import ModelHeat
 from fastcontact.model.ramp import History, Table, table_of
-from fastcontact.model.spread_forces import SpreadForce, spread_of
 
 
 @typed(ModelError)
