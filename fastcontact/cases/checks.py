@@ -164,16 +164,9 @@ def read_check(
     if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
     of = field.split(".")[0] if owner in pairs else "pressure_max"
-    check = Check(
-        name=entry.get("name", entry["quantity"]),
-        quantity=entry["quantity"],
-        tolerance=float(entry["tolerance"]),
-        theory=entry.get("theory", ""),
-        of=entry.get("of", of),
-        value=float(entry["value"]) if "value" in entry else None,
-        source=entry.get("source", ""),
-        factor=float(entry.get("factor", _whole(field, theories.get(entry.get("theory", ""), {})))),
-    )
+    factor = _whole(field, theories.get(entry.get("theory", ""), {}))
+    numbers = {key: float(entry[key]) for key in ("tolerance", "value", "factor") if key in entry}
+    check = Check(**{"name": entry["quantity"], "of": of, "factor": factor, **entry, **numbers})
     if not 0.0 < check.tolerance < math.inf:
         raise CaseError(
             f"{where}.tolerance = {check.tolerance:g} must be a positive number, e.g. 0.01 for one per cent"

@@ -15,7 +15,7 @@ from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Element
 from fastcontact.cases.decks.blocks import defined, folded, refusing
 from fastcontact.cases.decks.cohesive import cohesion_of
-from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
+from fastcontact.cases.decks.conditions import Acting, Component, Conditions
 from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
@@ -28,6 +28,7 @@ from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
+from fastcontact.cases.decks.targets import Target
 from fastcontact.cases.decks.temperatures import add_temperatures, conductivity_of
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.anisotropic_materials import Orthotropic
@@ -295,13 +296,13 @@ class Building:
                         by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
                 for (cell, density), cells in by_density.items():
                     scaled = tuple((time, density * value) for time, value in table)
-                    alike.add((name.kind, name.vector, cell), scaled, cells)
+                    alike.add((name.kind, name.numbers, cell), scaled, cells)
         loads = [(f"load {number}", *load) for number, load in enumerate(alike, start=1)]
         self.model.mesh = self.model.mesh.with_groups(cells={group: cells for group, _, cells, _, _ in loads})
         for group, (kind, vector, _), _, value, table in loads:
             self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.assembly.dim))
 
-    def _density(self, element: Element, name: Distributed, conditions: Conditions) -> float:
+    def _density(self, element: Element, name: Target, conditions: Conditions) -> float:
         if name.kind[0] == "B":
             return 1.0
         material = self._material(element.given_section)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
@@ -14,6 +13,7 @@ from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
+from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.cases.decks.temperatures import give as give_temperatures
 from fastcontact.cases.decks.temperatures import initial_temperatures
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -21,17 +21,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
 # Point and component, counted from 0; supports on local axes have True as a third entry.
 Component = tuple[int, int, bool]
-
-
-@dataclass(frozen=True, slots=True)
-class Distributed:
-    """Target of a distributed load: its kind, its facets or elements, and its direction or axis."""
-
-    keyword: str
-    kind: str
-    face: Face | None = None
-    elements: tuple[Element, ...] = ()
-    vector: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +43,7 @@ class Conditions:
         self.assembly, content = assembly, assembly.content
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
-        self.loads: Histories[Distributed] = Histories(content)
+        self.loads: Histories[Target] = Histories(content)
         initial = initial_temperatures(assembly, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
         self.acting: dict[Component, Acting] = {}  # supports that do not act from the start
@@ -206,24 +195,5 @@ class Conditions:
         if given.new:
             self.loads.forget(lambda name: name.keyword == keyword)
         for row in given.block.each():
-            for name, value in self._distributed(keyword, row):
-                self.loads.give(name, value, given.amplitude, row.location)
-
-    def _distributed(self, keyword: str, row: Row) -> list[tuple[Distributed, float]]:
-        label = row.text(1).upper()
-        if keyword == "DSLOAD":
-            if label != "P":
-                raise row.refuse(f"load {label[:40]} on a surface is not supported, only P")
-            faces, value = self.assembly.faces(row.text(0), row.location), row.number(2)
-            return [(Distributed(keyword, "P", face), value) for face in faces]
-        elements = self.assembly.elements_of(row.text(0), row.location) if row.text(0) else self.assembly.solids
-        if label[:1] == "P" and label[1:].isdigit():
-            facets = [(element, self.assembly.facet(element, int(label[1:]), row.location)) for element in elements]
-            return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
-        size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
-        if size is None:
-            raise row.refuse(f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ")
-        vector = tuple(row.number(3 + i, 0.0) for i in range(size))
-        if size and not any(vector[-3:]):
-            raise row.refuse(f"the direction of {label} is missing")
-        return [(Distributed(keyword, label, None, tuple(elements), vector), row.number(2))]
+            for target in targets(self.assembly, row):
+                self.loads.give(target, row.number(2), given.amplitude, row.location)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import Any, Generic
@@ -11,11 +10,12 @@ from typing import Any, Generic
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembly, Element, Face
+from fastcontact.cases.decks.assembled import Assembly, Face
 from fastcontact.cases.decks.blocks import Block, Location, Row, refusing
 from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
+from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.contact.conductance import Conductance
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.model.model import Model
@@ -141,16 +141,6 @@ def check_steps(content: Content) -> None:
                 )
 
 
-@dataclass(frozen=True)
-class Exchange:
-    """Target of a flux or a film: a face or elements; the coefficient of a film, None for a flux."""
-
-    keyword: str
-    face: Face | None
-    elements: tuple[Element, ...] = ()
-    coefficient: float | None = None
-
-
 class Spans(Generic[Name]):
     """Intervals of the load factor in which loads act, from the steps that give and remove them."""
 
@@ -181,15 +171,15 @@ class HeatConditions:
     def __init__(self, assembly: DeckMesh, initial: Mapping[int, float]) -> None:
         self.assembly, content = assembly, assembly.content
         self.reference = _reference(assembly, initial) if content.heat else 0.0
-        self.rest: dict[Exchange, float] = {}
+        self.rest: dict[Target, float] = {}
         of_points = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
         self.temperatures: Histories[int] = Histories(content, rest=of_points)
         self.powers: Histories[int] = Histories(content)
-        self.fluxes: Histories[Exchange] = Histories(content)
-        self.films: Histories[Exchange] = Histories(content, rest=self.rest)
+        self.fluxes: Histories[Target] = Histories(content)
+        self.films: Histories[Target] = Histories(content, rest=self.rest)
         self.fixed: Spans[int] = Spans()
-        self.blown: Spans[Exchange] = Spans()
-        self.film_of: dict[tuple[str, Face | None], Exchange] = {}
+        self.blown: Spans[Target] = Spans()
+        self.film_of: dict[tuple[str, Face | None], Target] = {}
         self.begun = False
 
     @property
@@ -231,39 +221,22 @@ class HeatConditions:
             film = history is self.films
             if film and row.number(3) < 0.0:
                 raise row.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
-            for name in self._places(keyword, row, row.number(3) if film else None):
+            for target in targets(self.assembly, row, (row.number(3),) if film else ()):
                 if film:
-                    self._in_place_of_others(name, row)
-                history.give(name, row.number(2), given.amplitude, row.location)
+                    self._in_place_of_others(target, row)
+                history.give(target, row.number(2), given.amplitude, row.location)
 
-    def _in_place_of_others(self, film: Exchange, row: Row) -> None:
+    def _in_place_of_others(self, film: Target, row: Row) -> None:
         """Replace a film that has another coefficient on the same face."""
         self.rest[film] = self.reference
         before = self.film_of.get((film.keyword, film.face))
         if before is not None and before != film:
             if before in self.films.changing:
-                raise row.refuse(
-                    f"{film.coefficient:g} is the second coefficient here in one step, after {before.coefficient:g}"
-                )
+                (new,), (old,) = film.numbers, before.numbers
+                raise row.refuse(f"{new:g} is the second coefficient here in one step, after {old:g}")
             if before in self.films.tracks and self.films.tracks[before].alive:
                 self.films.dying[before] = None
         self.film_of[film.keyword, film.face] = film
-
-    def _places(self, keyword: str, row: Row, coefficient: float | None) -> list[Exchange]:
-        """Return the targets of a line of fluxes or films."""
-        label, letter = row.text(1).upper(), "S" if coefficient is None else "F"
-        if keyword in ("DSFLUX", "SFILM"):
-            if label != letter:
-                raise row.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
-            return [Exchange(keyword, face, (), coefficient) for face in self.assembly.faces(row.text(0), row.location)]
-        elements = self.assembly.elements_of(row.text(0), row.location)
-        if label[:1] == letter and label[1:].isdigit():
-            faces = [(element, self.assembly.facet(element, int(label[1:]), row.location)) for element in elements]
-            return [Exchange(keyword, face, (), coefficient) for face in faces]
-        if label == "BF" and keyword == "DFLUX":
-            return [Exchange(keyword, None, tuple(elements))]
-        known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
-        raise row.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
@@ -310,7 +283,7 @@ class HeatConditions:
             for span, members in self.blown.of(films).items():
                 for film in members:
                     assert film.face is not None
-                    blown.setdefault((table, film.coefficient or 0.0, span), []).append(film.face)
+                    blown.setdefault((table, film.numbers[0], span), []).append(film.face)
         for (table, coefficient, span), faces in blown.items():
             group = assembly.add_facets(f"film {len(adders)}", faces)
             adders.append(partial(self._film(group, coefficient, table), **_between(span)))

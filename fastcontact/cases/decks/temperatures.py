@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly
-from fastcontact.cases.decks.blocks import Block, Row
+from fastcontact.cases.decks.blocks import Block, Location
 from fastcontact.cases.decks.content import Content, Given, Material
 from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.model.model import Model
@@ -60,28 +60,24 @@ def initial_conditions(content: Content, block: Block) -> None:
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
     """Return initial temperatures by point; of several for a point, the last one counts."""
-    return {point: value for block in blocks for point, value in _by_point(assembly, block)}
+    return {point: value for block in blocks for point, value, _ in _by_point(assembly, block)}
 
 
 def give(assembly: Assembly, histories: Histories[int], given: Given) -> None:
     """Set the temperatures of a *TEMPERATURE for the current step."""
     if given.new:
         histories.forget()
-    for row in given.block.each():
-        for point, value in _of_row(assembly, given.block, row):
-            histories.give(point, value, given.amplitude, row.location)
+    for point, value, location in _by_point(assembly, given.block):
+        histories.give(point, value, given.amplitude, location)
 
 
-def _by_point(assembly: Assembly, block: Block) -> Iterable[tuple[int, float]]:
+def _by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
+    """Yield the temperatures of a block by point, with the location of each."""
     for row in block.each():
-        yield from _of_row(assembly, block, row)
-
-
-def _of_row(assembly: Assembly, block: Block, row: Row) -> list[tuple[int, float]]:
-    if any(row.entries[2:]):
-        raise row.refuse("gradients of the temperature are those of beams and shells: give one number")
-    value = row.number(1)
-    return [(point, value) for point in assembly.nodes(row.text(0), row.location)]
+        if any(row.entries[2:]):
+            raise row.refuse("gradients of the temperature are those of beams and shells: give one number")
+        value = row.number(1)
+        yield from ((point, value, row.location) for point in assembly.nodes(row.text(0), row.location))
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
