@@ -17,8 +17,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.rigid_parts import RigidParts, rigid_parts
-from fastcontact.mesh.topology import bodies
+from fastcontact.mesh.topology import RigidParts, bodies, rigid_parts
 
 MODE_NAMES = {
     "axisymmetric": ("translation along y (the axis)",),

@@ -13,7 +13,7 @@ from fastcontact._tools.hdf5 import check_size, opened, values
 from fastcontact._tools.neighbours import nearest
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
-from fastcontact.errors import FileError, MeshError, check_known, unknown
+from fastcontact.errors import FastcontactError, FileError, MeshError, check_known, unknown
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.mesh import Mesh
 
@@ -74,7 +74,9 @@ def read_field(
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
     name = f"field '{field}' of '{file}'"
     cells, of_file = _cells(mesh, groups), read_file_field(file, field, over)
-    row = _row(of_file, instant, name)
+    if instant is None and len(of_file.values) != 1:
+        raise FileError(f"{name} has {len(of_file.values)} instants: say which with instant")
+    row = 0 if instant is None else row_of(instant, of_file.times, name)
     if over == "cells":
         return at_cells(of_file, np.concatenate([mesh.points[block].mean(axis=1) for block in cells]), mesh, name)[row][
             :, None
@@ -98,17 +100,14 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
     return blocks
 
 
-def _row(field: FileField, instant: float | None, name: str) -> int:
-    """Return the row of the requested instant of a field."""
-    if instant is None:
-        if len(field.values) != 1:
-            raise FileError(f"{name} has {len(field.values)} instants: say which with instant")
-        return 0
-    if field.times is None:
-        raise FileError(f"{name} has no times: leave out instant")
-    row = int(np.abs(field.times - instant).argmin())
-    if abs(field.times[row] - instant) > SAME_TIME * np.abs(field.times).max():
-        raise FileError(f"{name} has no instant {instant:g}, the next is {field.times[row]:g}")
+def row_of(instant: float, times: Array | None, name: str, error: type[FastcontactError] = FileError) -> int:
+    """Return the row of an instant among the `times` (n_instants,) of a field; raises `error` if there is none."""
+    if times is None:
+        raise error(f"{name} has no times: leave out instant")
+    row = int(np.abs(times - instant).argmin())
+    if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
+        among = f"the next is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
+        raise error(f"{name} has no instant {instant:g}, {among}")
     return row
 
 

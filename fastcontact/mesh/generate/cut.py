@@ -13,7 +13,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh, starts_of
+from fastcontact.mesh.mesh import Mesh
 
 Facet = frozenset[int]
 
@@ -148,22 +148,14 @@ def _opened(
         rows = np.flatnonzero((new_node[block] >= 0).any(axis=1))
         follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
         _with_nodes(cells, name, np.array(follow, int), new_node)
-    groups = {}
-    starts = starts_of({name: range(len(block) + len(facets.get(name, ()))) for name, block in cells.items()})
-    for named, members in mesh.cell_groups.items():
-        parts = [starts[name] + rows for name, rows in mesh.split(members).items()]
-        groups[named] = np.concatenate(parts) if parts else members
-    groups[group + OPPOSITE] = np.concatenate(
-        [starts[name] + len(cells[name]) + np.arange(len(block)) for name, block in facets.items()]
-    )
-    for name, block in facets.items():
-        cells[name] = np.concatenate([cells[name], new_node[block]])
     old = np.flatnonzero(new_node >= 0)
     point_groups = {
         name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
         for name, members in mesh.point_groups.items()
     }
-    return Mesh(np.concatenate([mesh.points, mesh.points[old]]), cells, groups, point_groups)
+    points = np.concatenate([mesh.points, mesh.points[old]])
+    opened = mesh.replace(points=points, cells=cells, point_groups=point_groups)
+    return opened.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
 
 
 def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new_node: Numbers) -> list[Facet]:
