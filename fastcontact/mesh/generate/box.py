@@ -14,6 +14,7 @@ from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
 
 # All nodes of all elements are on a lattice of four steps per hexahedron, including mid nodes of the inner edges of pyramids.
 STEPS = 4
@@ -71,11 +72,13 @@ def box(
     shape = np.array(each(count, "divisions", divisions))
     block, lattice = _solids(solid, shape)
     mesh = Mesh(corner + lattice / (STEPS * shape) * lengths, {element: block}, {name: np.arange(len(block))})
+    sides = {}
     for axis, letter in enumerate("XYZ"):
         x = mesh.points[:, axis]
-        for end, place in (("MIN", x.min()), ("MAX", x.max())):
-            mesh = mesh.with_facet_group(letter + end, lambda points, on=x == place: on)
-    return mesh
+        for end, on in (("MIN", x == x.min()), ("MAX", x == x.max())):
+            facets = {kind: block[on[block].all(axis=1)] for kind, block in outer_facets(mesh).items()}
+            sides[letter + end] = {kind: block for kind, block in facets.items() if len(block)}
+    return mesh.with_facets(sides)
 
 
 def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
