@@ -54,10 +54,7 @@ def hanging_nodes_warning(model: Model) -> str:
     """Return a warning if nodes hang on facets of their own body without a contact or constraint between them."""
     mesh = model.mesh
     node, facet, outer = hanging_nodes(mesh)
-    relevant = np.ones(len(node), bool)
-    held = np.zeros(mesh.n_points, bool)
-    held[model.holding_rows().indices // mesh.dim] = True
-    relevant &= ~held[node]
+    relevant = ~model.related_points()[node]
     for pair in model.contact if len(node) else ():
         if pair.primary:
             relevant &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])

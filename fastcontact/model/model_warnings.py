@@ -163,7 +163,7 @@ def _coincident(model: Model) -> str:
     for pair in model.contact:
         for group in (pair.secondary, pair.primary):
             lone[mesh.points_of(group) if group else []] = False
-    lone[model.holding_rows().indices // mesh.dim] = False
+    lone[model.related_points()] = False
     numbers = np.flatnonzero(lone)
     pairs = numbers[close_pairs(mesh.points[numbers], SINGLE_PRECISION * size)]
     apart = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)

@@ -12,7 +12,7 @@ from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.blocks import refusing
 from fastcontact.cases.decks.content import Equation, Link, MultiPoint, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
-from fastcontact.cases.decks.meshing import DeckMesh
+from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.mesh import Mesh
@@ -106,8 +106,9 @@ def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
     if not link.distributing:
         directions = np.array([_directions(deck_mesh, link, follower) for follower in points.tolist()])
         return rigid_rows(reference, points, places, directions, n_dofs)
-    group = deck_mesh.add_facets(f"coupling of line {link.location.line}", deck_mesh.faces(link.group, link.location))
-    areas = Traction(_known(mesh, deck_mesh, group), {0: 1.0}, None).vector(mesh, deck_mesh.kinematics)[:, 0]
+    deck_mesh.faces(link.group, link.location)
+    surface = Traction(group_of_surface(deck_mesh, link.group), {0: 1.0}, None)
+    areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
     weight = areas[points] / areas[points].sum()
     with refusing(link):
         return distributing_rows(reference, points, places, weight, _directions(deck_mesh, link, point), n_dofs)
@@ -119,15 +120,6 @@ def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
     if link.orientation:
         axes = local_axes(orientation_of(deck_mesh.content, link.orientation, link.location), deck_mesh.points[point])
     return axes[[component - 1 for component in link.components if component <= deck_mesh.dim], : deck_mesh.dim]
-
-
-def _known(mesh: Mesh, deck_mesh: DeckMesh, group: str) -> str:
-    """Return a group of the mesh with the same facets as one added after the mesh was deck_mesh."""
-    return next(
-        name
-        for name, members in deck_mesh.groups.items()
-        if members == deck_mesh.groups[group] and name in mesh.cell_groups
-    )
 
 
 # Least numbers of nodes by kind.

@@ -174,7 +174,7 @@ class ModelBase:
             )
         return np.asarray(vector / np.linalg.norm(vector))
 
-    def _related(self) -> Mask:
+    def related_points(self) -> Mask:
         """Return which points (n_points,) have constraints or springs."""
         related = np.zeros(self.mesh.n_points, bool)
         related[self.holding_rows().indices // self.mesh.dim] = True

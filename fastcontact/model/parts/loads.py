@@ -332,7 +332,7 @@ class ModelLoads(ModelHeat):
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return the nodal forces (n_points, dim) of all loads at multiplier 1, by history [force]."""
-        related = self._related()
+        related = self.related_points()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
             forces = self.load_vector(load)
