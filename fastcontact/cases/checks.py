@@ -11,17 +11,12 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.contact_resultants import contact_moment
-from fastcontact.cases.keys import NUMBER
+from fastcontact.cases.keys import NUMBER, keys_of
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
-# Keys of a check in a case file.
-CHECK: dict[str, Any] = {
-    **dict.fromkeys(("name", "quantity", "theory", "of", "source"), str),
-    **dict.fromkeys(("value", "factor", "tolerance"), NUMBER),
-}
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
 # Quantities that need an option of the pair, and the message where it is missing.
 NEEDED = {
@@ -142,6 +137,9 @@ class Check:
         source = f" ({self.source})" if self.source else ""
         against = f"the theory's {self.of}" if self.theory else f"{self.value:g}{source}"
         return f"{self.quantity} against {against} within {self.tolerance:g}"
+
+
+CHECK = keys_of(Check)
 
 
 def read_check(

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
-import types
-import typing
-from collections import abc
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from reprlib import repr
 from typing import Any
 
 from fastcontact._tools.argument_types import types_of
-from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
+from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables, toml_types
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
@@ -120,7 +117,7 @@ def _constants() -> dict[str, tuple[type, ...]]:
     for law in _LAWS:
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
             if key in inspect.signature(law).parameters:
-                known.setdefault(key, set()).update(_toml_types(annotation))
+                known.setdefault(key, set()).update(toml_types(annotation))
     return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
@@ -164,31 +161,13 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
     for add in adding:
         annotated = types_of(inspect.unwrap(add))
         for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # without the model
-            kinds = _toml_types(annotated[key])
+            kinds = toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
                 known |= AXES
             else:
                 known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
                 needed += [key] * (parameter.default is parameter.empty)
     return {**known, **further}, needed
-
-
-# Numbers, functions of the position and time series in a case file.
-_TOML: dict[Any, tuple[type, ...]] = {
-    float: NUMBER,
-    abc.Callable: (dict,),
-    **dict.fromkeys((abc.Sequence, abc.Iterable), (list,)),
-}
-
-
-def _toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the case-file types that an annotated argument takes; a function is given as a table."""
-    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
-    if kind in (typing.Union, types.UnionType):
-        return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in _toml_types(member)))
-    if kind in (bool, int, str):
-        return (kind,)
-    return _TOML.get(kind, ())
 
 
 # By kind of table: the value types of its keys, and its required keys.
