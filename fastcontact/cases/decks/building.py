@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,28 +13,30 @@ from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Element
 from fastcontact.cases.decks.blocks import defined, folded, refusing
-from fastcontact.cases.decks.cohesive import cohesion_of
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions
-from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
+from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
-from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
-from fastcontact.cases.decks.histories import JUMP, ByShape, Histories
+from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
+from fastcontact.cases.decks.interactions import (
+    cohesion_of,
+    conductance_of,
+    friction_heat_of,
+    friction_of,
+    perfect_conductance,
+)
 from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
+from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import begun, group_of_surface, secondary_group
-from fastcontact.cases.decks.nonlinear import strain_of
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.targets import Target
-from fastcontact.cases.decks.temperatures import add_temperatures, conductivity_of
+from fastcontact.cases.decks.temperatures import add_temperatures
 from fastcontact.contact.integration import all_nodes_carry
-from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
-from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
-from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 from fastcontact.model.relation_rows import along
@@ -147,7 +148,7 @@ class Building:
             axes = self._axes(members[0].given_section, members)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
-            law = _law(self.content, material, axes, modes)
+            law = law_of(self.content, material, axes, modes)
             materials.append((law, self.assembly.add_solids(group, members)))
         return materials, thickness or 1.0
 
@@ -352,7 +353,7 @@ class Building:
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
-        options.update(_friction(law, len(self.content.steps)))
+        options.update(friction_of(law, len(self.content.steps)))
         if "friction" in options and self.content.heat:
             options.update(friction_heat_of(self.content, law))
         return {**options, **self._fitted(pair)}
@@ -417,74 +418,6 @@ class Building:
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
-
-
-def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the friction options of a pair; *CHANGE FRICTION changes them at the beginning of steps."""
-    table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
-    for before, changed in law.changes:
-        if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
-        table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
-        sticks |= {changed.stick} if changed.friction else set()
-    largest = max(value for _, value in table)
-    if not largest:
-        return {}
-    if len(sticks) > 1:
-        raise law.changes[0][1].refuse("a stick slope that changes is not supported: give the same one")
-    options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
-    if law.changes:
-        points = {**dict(table), float(n_steps): table[-1][1]}
-        options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
-    return options
-
-
-def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model along axes, with its expansion, and with incompatible modes if elements have them."""
-    if content.heat == "alone":
-        return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
-    assert material.law is not None
-    law, expansion = material.law(axes), material.expansion
-    law = replace(law, density=material.density)
-    if isinstance(law, NonlinearElastic) and modes:
-        content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
-    elif modes:
-        law = replace(law, incompatible_modes=True)
-    if content.heat or material.conductivity is not None:
-        law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
-    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
-    if expansion is None:
-        if heated:
-            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
-        return replace(law, expansion=0.0) if heated else law
-    if not heated:
-        content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
-    return _with_axes(material, law, axes, expansion=expansion)
-
-
-def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; raises CaseError if heat is computed and there is none."""
-    block = material.conductivity
-    if content.heat:
-        if block is None:
-            raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
-        return conductivity_of(material, block)
-    if block is not None:
-        content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
-    return None
-
-
-def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
-    """Return a material with further constants; it becomes orthotropic where they differ along the axes."""
-    if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
-        if isinstance(law, NonlinearElastic):
-            raise material.refuse(
-                f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
-            )
-        G = law.E / (2.0 * (1.0 + law.nu))
-        others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
-    return replace(law, **constants)
 
 
 def _parts(step: Step) -> list[float]:

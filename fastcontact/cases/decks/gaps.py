@@ -1,4 +1,4 @@
-"""Gap elements of a deck: contact of the faces around their nodes with a rigid plane, or with the faces of another body."""
+"""Gap elements and springs of a deck: contact of the faces around nodes with a rigid plane or the faces of another body."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.cases.decks.assembled import Assembly, facet_points
-from fastcontact.cases.decks.blocks import Located, Location, refusing
+from fastcontact.cases.decks.blocks import Block, Located, Location, folded, refusing
 from fastcontact.cases.decks.conditions import Conditions
+from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
@@ -46,6 +47,25 @@ class GapGroup(Located):
     ends: Indices
     facets: str
     opposite: str
+
+
+def gap(content: Content, block: Block) -> None:
+    """*GAP: clearance and direction of gap elements."""
+    row = block.only()
+    direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
+    if not any(direction):
+        raise row.refuse("the direction of the gap elements is missing")
+    content.gaps[folded(block.required("ELSET"))] = (block.location, row.number(0), direction)
+
+
+def spring(content: Content, block: Block) -> None:
+    """*SPRING: stiffness of springs along their axis."""
+    rows = block.rows
+    if len(rows) != 1:
+        raise block.refuse("linear springs along their line need an empty line and then one with the stiffness")
+    if rows[0].text(1):
+        raise rows[0].refuse("only linear springs are supported: one stiffness")
+    content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
 
 
 def check_discrete(assembly: Assembly, kind: str, given: Mapping[str, Any], needed: str) -> None:

@@ -1,4 +1,4 @@
-"""Keywords of the geometry: nodes, elements, sets, surfaces, parts, instances."""
+"""Keywords of the geometry: nodes, elements, sets, surfaces, sections, parts, instances."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from itertools import groupby
 
 from fastcontact.cases.decks.blocks import Block, Row, defined, folded, registered, unquoted
-from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, SurfaceDefinition
+from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import described, element_type
 from fastcontact.mesh import elements
 
@@ -145,3 +145,16 @@ def new_part(content: Content, block: Block) -> Part:
     """*PART."""
     name = block.required("NAME")
     return registered("part", name, content.parts, Part(unquoted(name)), block)
+
+
+def section(content: Content, part: Part, block: Block) -> None:
+    """*SOLID SECTION: the material of the elements of a set."""
+    thickness = None
+    for row in block.rows[:1]:
+        thickness = row.number(0, 1.0)
+        if not thickness > 0:
+            raise row.refuse(f"the thickness {thickness:g} must be positive")
+    orientation = block.get("ORIENTATION")
+    part.sections.append(
+        Section(block.location, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
+    )

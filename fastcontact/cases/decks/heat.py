@@ -1,23 +1,20 @@
-"""Heat conduction of a deck: conductivity and conductance; temperatures, fluxes and films of its steps as loads."""
+"""Heat conduction of a deck: temperatures, fluxes and films of its steps as loads of the model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from itertools import pairwise
 from typing import Any, Generic
 
 import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Face
-from fastcontact.cases.decks.blocks import Block, Location, Row, refusing
-from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
+from fastcontact.cases.decks.blocks import Block, Row
+from fastcontact.cases.decks.content import Content, Given, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
 from fastcontact.cases.decks.targets import Target, targets
-from fastcontact.contact.conductance import Conductance
-from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -25,99 +22,11 @@ from fastcontact.model.ramp import Table
 OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 # Number of the temperature degree of freedom.
 TEMPERATURE = 11
-# The bodies in steps of pure heat conduction, which are fixed.
-HELD = LinearElastic(E=1.0, nu=0.0)
-# Conductance of ties relative to conductivity over model size: the sides differ in temperature by about its inverse.
-PERFECT = 1e8
-# Clearance, relative to the last one of a table, beyond which no heat is conducted.
-BEYOND = 1.0 + 1e-9
-
-
-def conductivity(content: Content, current: Material, block: Block) -> None:
-    """*CONDUCTIVITY: stored until it is known whether heat is computed."""
-    current.conductivity = block
-
-
-def specific_heat(content: Content, current: Material, block: Block) -> None:
-    """*SPECIFIC HEAT: without effect in static and steady-state steps."""
-    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def physical_constants(content: Content, block: Block) -> None:
     """*PHYSICAL CONSTANTS: constants of radiation, without effect."""
     content.note(block, "no effect: there is no radiation")
-
-
-def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP CONDUCTANCE: stored until it is known whether heat is computed."""
-    current.conductance.append(block)
-
-
-def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP HEAT GENERATION: the fraction of the friction work that becomes heat, half of it on each side."""
-    row = block.rows[0] if block.rows else Row(block.location, ())
-    share, secondary = row.number(0, 1.0), row.number(1, 0.5)
-    if not 0.0 <= share <= 1.0:
-        raise row.refuse(f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1")
-    if secondary != 0.5:
-        raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
-    if row.number(2, 0.0) > 0.0:
-        raise row.refuse("a given velocity is not supported: sides slide by their displacements")
-    current.friction_heat = block.location, share
-
-
-def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the conductance options of a contact pair, by pressure or clearance; none without a table."""
-    tables: dict[str, Any] = {}
-    for block in law.conductance:
-        rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
-        if len({row.number(2, 0.0) for row in block.rows}) > 1:
-            raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
-        if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.refuse("needs conductances with pressures or clearances that ascend")
-        if len(rows) == 1:
-            tables["number"] = rows[0][1]
-            continue
-        pressure = "PRESSURE" in block.parameters
-        by = "pressure" if pressure or rows[-1][1] >= rows[0][1] else "gap"
-        if not pressure:
-            meant = (
-                "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
-            )
-            content.note(block, f"the conductance is by what it {meant}")
-        end = (rows[-1][0] * BEYOND, 0.0)
-        tables[by] = rows if by == "pressure" else [*rows, end]
-        if by == "pressure" and content.heat == "alone":
-            content.note(block, "steps of heat alone have no pressures: sides that touch conduct as without any")
-    given = tables.pop("number", None)
-    if given is not None and tables:
-        raise law.conductance[0].refuse("one conductance, and a table besides: give one of them")
-    if given is None and not tables:
-        return {}
-    with refusing(law.conductance[0]):
-        Conductance(law.name, tables or given)
-    return {"conductance": tables or given}
-
-
-def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option for frictional heating of both sides, with the step length as time."""
-    if law.friction_heat is None:
-        if law.conductance:
-            content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
-        return {}
-    location, share = law.friction_heat
-    periods = {step.period for step in content.steps}
-    if len(periods) > 1:
-        raise location.refuse("heat of friction is supported in steps of the same length only, which is their time")
-    return {"friction_heat": share / periods.pop()}
-
-
-def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie, independent of pressure and gap."""
-    largest = max(np.max(material.conductivity) for material, _ in model.materials)
-    h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
-    content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
-    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h
 
 
 def check_steps(content: Content) -> None:

@@ -8,14 +8,15 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from fastcontact.cases.decks import (
-    cohesive,
     connections,
     cyclic_symmetry,
+    gaps,
     geometry,
     heat,
-    nonlinear,
+    interactions,
+    local_axes,
+    materials,
     pretension,
-    properties,
     stepping,
     temperatures,
 )
@@ -57,49 +58,49 @@ TRANSLATED = {
         "deck", None, "NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
     ),
     # In parts, or in decks without parts.
-    "DISTRIBUTION": Keyword("part", properties.distribution, "NAME; LOCATION", "TABLE"),
-    "DISTRIBUTION TABLE": Keyword("part", properties.distribution_table, ANYTHING),
+    "DISTRIBUTION": Keyword("part", local_axes.distribution, "NAME; LOCATION", "TABLE"),
+    "DISTRIBUTION TABLE": Keyword("part", local_axes.distribution_table, ANYTHING),
     "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
     "ELSET": Keyword("part", geometry.element_set, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "NODE": Keyword("part", geometry.nodes, "NSET; SYSTEM"),
     "NSET": Keyword("part", geometry.node_set, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
-    "ORIENTATION": Keyword("part", properties.orientation, "NAME; SYSTEM; DEFINITION"),
-    "SOLID SECTION": Keyword("part", properties.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
+    "ORIENTATION": Keyword("part", local_axes.orientation, "NAME; SYSTEM; DEFINITION"),
+    "SOLID SECTION": Keyword("part", geometry.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
     "SURFACE": Keyword("part", geometry.surface, "NAME; TYPE", "INTERNAL"),
     # Below *MATERIAL.
-    "CONDUCTIVITY": Keyword("material", heat.conductivity, ANYTHING),
-    "DENSITY": Keyword("material", properties.density),
-    "ELASTIC": Keyword("material", properties.elastic, "TYPE"),
-    "EXPANSION": Keyword("material", temperatures.expansion, "TYPE", "ZERO"),
-    "HYPERELASTIC": Keyword("material", nonlinear.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
-    "PLASTIC": Keyword("material", nonlinear.plastic, "HARDENING"),
-    "SPECIFIC HEAT": Keyword("material", heat.specific_heat, ANYTHING),
+    "CONDUCTIVITY": Keyword("material", materials.conductivity, ANYTHING),
+    "DENSITY": Keyword("material", materials.density),
+    "ELASTIC": Keyword("material", materials.elastic, "TYPE"),
+    "EXPANSION": Keyword("material", materials.expansion, "TYPE", "ZERO"),
+    "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
+    "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
+    "SPECIFIC HEAT": Keyword("material", materials.specific_heat, ANYTHING),
     # Below *SURFACE INTERACTION.
-    "COHESIVE BEHAVIOR": Keyword("interaction", cohesive.keep, "TYPE; ELIGIBILITY"),
+    "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
-        "interaction", cohesive.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
+        "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
-    "DAMAGE INITIATION": Keyword("interaction", cohesive.keep, "CRITERION"),
-    "DAMAGE STABILIZATION": Keyword("interaction", cohesive.stabilization, ANYTHING),
-    "FRICTION": Keyword("interaction", properties.friction),
-    "GAP CONDUCTANCE": Keyword("interaction", heat.gap_conductance, "PRESSURE"),
-    "GAP HEAT GENERATION": Keyword("interaction", heat.gap_heat_generation),
-    "SURFACE BEHAVIOR": Keyword("interaction", properties.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
+    "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
+    "DAMAGE STABILIZATION": Keyword("interaction", interactions.stabilization, ANYTHING),
+    "FRICTION": Keyword("interaction", interactions.friction),
+    "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
+    "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
+    "SURFACE BEHAVIOR": Keyword("interaction", interactions.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
     # In the whole model.
-    "AMPLITUDE": Keyword("model", properties.amplitude, "NAME; TIME; DEFINITION; VALUE"),
+    "AMPLITUDE": Keyword("model", stepping.amplitude, "NAME; TIME; DEFINITION; VALUE"),
     "CLEARANCE": Keyword("model", connections.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
     "CONTACT PAIR": Keyword("model", connections.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
     "EQUATION": Keyword("model", connections.equation),
-    "GAP": Keyword("model", properties.gap, "ELSET"),
+    "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", temperatures.initial_conditions, "TYPE"),
     "MPC": Keyword("model", connections.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", connections.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
-    "SPRING": Keyword("model", properties.spring, "ELSET"),
+    "SPRING": Keyword("model", gaps.spring, "ELSET"),
     "TIE": Keyword("model", connections.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
-    "TRANSFORM": Keyword("model", connections.transform, "NSET; TYPE"),
+    "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
     "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
     **dict.fromkeys(
@@ -149,8 +150,6 @@ _REASONS = {
     ),
 }
 REFUSED = {name: reason for reason, names in _REASONS.items() for name in names.split("; ")}
-
-
 _SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
 
 
@@ -265,16 +264,16 @@ class Reader:
 
     def _material(self, block: Block) -> None:
         self._not_in_step(block)
-        self.material = properties.material(self.content, block)
+        self.material = materials.material(self.content, block)
 
     def _surface_interaction(self, block: Block) -> None:
         self._not_in_step(block)
-        self.interaction = properties.interaction(self.content, block)
+        self.interaction = interactions.interaction(self.content, block)
 
     def _change_friction(self, block: Block) -> None:
         if self.step is None:
             raise block.refuse("belongs in a step")
-        self.interaction = properties.changed_interaction(self.content, block)
+        self.interaction = interactions.changed_interaction(self.content, block)
 
     def _coupling(self, block: Block) -> None:
         self._not_in_step(block)

@@ -9,45 +9,10 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly
 from fastcontact.cases.decks.blocks import Block, Location
-from fastcontact.cases.decks.content import Content, Given, Material
+from fastcontact.cases.decks.content import Content, Given
 from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
-
-# Numbers of coefficients of expansion and conductivity by type.
-COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
-
-
-def expansion(content: Content, current: Material, block: Block) -> None:
-    """*EXPANSION: coefficients at one temperature."""
-    current.expansion = along_axes(current, block)
-    if "ZERO" in block.parameters:
-        content.note(
-            block, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
-        )
-
-
-def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
-    """Return coefficients at one temperature, one for all directions or one along each axis."""
-    kind = block.choice("TYPE", tuple(COEFFICIENTS))
-    if len(block.rows) != 1:
-        raise block.refuse(
-            f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
-            "temperatures are not supported"
-        )
-    row, count = block.rows[0], COEFFICIENTS[kind]
-    values = tuple(row.number(index) for index in range(count))
-    if any(row.entries[count + 1 :]):
-        raise row.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
-    return values[0] if kind == "ISO" else values
-
-
-def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
-    """Return the conductivity of a material, one or three along its axes; raises CaseError unless all are positive."""
-    values = along_axes(material, block)
-    if not np.min(values) > 0.0:
-        raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
-    return values
 
 
 def initial_conditions(content: Content, block: Block) -> None:
