@@ -52,10 +52,16 @@ class Located:
 
 
 @dataclass(frozen=True, slots=True)
-class Row(Located):
-    """A data line: its entries without surrounding blanks, and its location."""
+class Item(Located):
+    """A deck item that does not change once it is read."""
 
     location: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Row(Item):
+    """A data line: its entries without surrounding blanks, and its location."""
+
     entries: tuple[str, ...]
     goes_on: bool = False
 
@@ -103,10 +109,9 @@ class Lines:
 
 
 @dataclass(frozen=True, slots=True)
-class Block(Located):
+class Block(Item):
     """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
 
-    location: Location
     parameters: dict[str, str | None]
     lines: Iterable[Row] = ()
 

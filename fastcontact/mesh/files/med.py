@@ -335,16 +335,16 @@ def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Arra
             raise FileError(f"field '{field}' of '{path}' has no values at {where} in the layout of MED 3 or 4")
         step = None if mesh is None else _first_step(mesh)
         points, count = None if mesh is None else _read_points(step, mesh), int(attribute(group, "NCO"))
-        fields, places = [], []
+        fields, places = [], []  # type: list[Array], list[Array]
         for support in sorted({support for entry in instants for support in _supports(entry, at_points)}):
             at = points if points is None or at_points else _middles(path, field, step, points, support)
             sizes = [values(p, "CO").size // count for e in instants for p in e[support].values()] if at is None else []
             n_values = max(sizes) if at is None else len(at)
             check_size(f"field '{field}' of '{path}'", (len(instants), n_values, count), file)
             fields.append(np.stack([_read_instant(file, entry.get(support), n_values, count) for entry in instants]))
-            places.append(at)
+            places += [] if at is None else [at]
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        return times, np.concatenate(fields, axis=1), None if points is None else np.concatenate(places)
+        return times, np.concatenate(fields, axis=1), np.concatenate(places) if places else None
 
 
 def _supports(entry: Any, at_points: bool) -> list[str]:
