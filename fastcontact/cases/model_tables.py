@@ -121,35 +121,27 @@ def _constants() -> dict[str, tuple[type, ...]]:
     return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
-# Functions by kind of table, in the order in which the tables are added to the model.
-_ADD: dict[str, Callable[..., None]] = {
+# Functions by kind of table that are not called like it.
+_NAMED: dict[str, Callable[..., None]] = {
     "material": _add_material,
     "support": Model.prescribe,
-    "pressure": Model.add_pressure,
-    "traction": Model.add_traction,
-    "body_force": Model.add_body_force,
-    "gravity": Model.add_gravity,
-    "centrifugal": Model.add_centrifugal,
     "temperature": _add_temperature,
     "fixed_temperature": Model.fix_temperature,
-    "heat_flux": Model.add_heat_flux,
-    "heat_source": Model.add_heat_source,
-    "nodal_heat": Model.add_nodal_heat,
-    "film": Model.add_film,
-    "initial_stress": Model.add_initial_stress,
-    "initial_strain": Model.add_initial_strain,
-    "force": Model.add_force,
-    "moment": Model.add_moment,
-    "hydrostatic_pressure": Model.add_hydrostatic_pressure,
     "coupling": _add_coupling,
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
-    "periodicity": Model.add_periodicity,
-    "cyclic_symmetry": Model.add_cyclic_symmetry,
-    "spring": Model.add_spring,
-    "pretension": Model.add_pretension,
 }
+# Functions by kind of table, in the order in which the tables are added to the model.
+_ADD: dict[str, Callable[..., None]] = {
+    kind: _NAMED.get(kind) or getattr(Model, f"add_{kind}")
+    for kind in (
+        "material", "support", "pressure", "traction", "body_force", "gravity", "centrifugal", "temperature",
+        "fixed_temperature", "heat_flux", "heat_source", "nodal_heat", "film", "initial_stress", "initial_strain", "force",
+        "moment", "hydrostatic_pressure", "coupling", "couple", "relation", "group_relation", "periodicity",
+        "cyclic_symmetry", "spring", "pretension",
+    )
+}  # fmt: skip
 # Tables that refer to contact pairs, to be added after these.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
 

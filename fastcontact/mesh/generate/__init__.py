@@ -30,19 +30,12 @@ from fastcontact.mesh.generate.transform import (
 )
 from fastcontact.mesh.mesh import Mesh
 
+_GENERATORS = (
+    half_spheres, quarter_disc, block, block_on_block, cylinder_on_block, box, graded_block, sphere_on_block, sphere_octant,
+    punched_block, crowned_blocks, rings,
+)  # fmt: skip
 GENERATORS: dict[str, Callable[..., Mesh]] = {
-    "half-spheres": half_spheres,
-    "quarter-disc": quarter_disc,
-    "block": block,
-    "block-on-block": block_on_block,
-    "cylinder-on-block": cylinder_on_block,
-    "box": box,
-    "graded-block": graded_block,
-    "sphere-on-block": sphere_on_block,
-    "sphere-octant": sphere_octant,
-    "punched-block": punched_block,
-    "crowned-blocks": crowned_blocks,
-    "rings": rings,
+    generator.__name__.replace("_", "-"): generator for generator in _GENERATORS
 }
 
 __all__ = [
