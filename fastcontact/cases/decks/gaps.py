@@ -117,11 +117,8 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
-        if (
-            np.ptp(along) > size
-            or np.abs(between - np.outer(along, gap.direction)).max() > size
-            or along.mean() < -size
-        ):
+        off = np.abs(between - np.outer(along, gap.direction)).max()
+        if max(np.ptp(along), off, -along.mean()) > size:
             raise gap.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )

@@ -78,9 +78,8 @@ def read_field(
         raise FileError(f"{name} has {len(of_file.values)} instants: say which with instant")
     row = 0 if instant is None else row_of(instant, of_file.times, name)
     if over == "cells":
-        return at_cells(of_file, np.concatenate([mesh.points[block].mean(axis=1) for block in cells]), mesh, name)[row][
-            :, None
-        ]
+        middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
+        return at_cells(of_file, middles, mesh, name)[row][:, None]
     wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
     values = at_points_of(of_file, mesh, wanted, name)[row]
     return np.where(np.isfinite(values), values, values[wanted].mean())

@@ -12,6 +12,7 @@ from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import finite_vector, typed
 from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value, check_number, check_solids, evaluated, solid_rows
 from fastcontact.elasticity.material_field import MaterialField, material_field
@@ -211,6 +212,11 @@ class ModelBase:
     def cell_fields(self) -> tuple[str, ...]:
         """Names of the `StepResult.cell_fields` in steps of this model: none for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
+
+    def bending(self) -> list[bool]:
+        """Return for each material whether its cells have incompatible modes."""
+        bend = self.kinematics != "axisymmetric" and any(name in BENDING for name in self.mesh.solids)
+        return [bend and material.incompatible_modes for material, _ in self.materials]
 
     @property
     def nonlinear(self) -> bool:

@@ -161,17 +161,14 @@ class ModelConnections(ModelInitialStates):
             check_number(f"a number of {name}", number)
         if component != NORMAL:
             axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
+        table = table_of(ramp, f"the ramp of {name}")
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
         for (nodes, directions), (opposite, directions_opposite) in zip(*sides, strict=True):
             match = matched(self.mesh, (first, nodes), (second, opposite), translation)
             rows = coefficients[0] * along(nodes, directions, self.n_dofs)
             rows = csr_array(rows + coefficients[1] * along(opposite[match], directions_opposite[match], self.n_dofs))
             rows.eliminate_zeros()
-            self.relations.append(
-                MultiPointConstraint(
-                    name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}")
-                )
-            )
+            self.relations.append(MultiPointConstraint(name, rows[np.diff(rows.indptr) > 0], float(value), table))
 
     def add_periodicity(
         self,
@@ -277,13 +274,8 @@ class ModelConnections(ModelInitialStates):
             raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
         origin_given = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
-        if (
-            sectors < 2
-            or sectors != int(sectors)
-            or len(origin_given) != self.mesh.dim
-            or len(along) != 3
-            or not any(along)
-        ):
+        on_axis = len(origin_given) == self.mesh.dim and len(along) == 3 and any(along)
+        if sectors < 2 or sectors != int(sectors) or not on_axis:
             raise ModelError(
                 f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
                 f"three, not {sectors}, {origin_given} and {along}"

@@ -298,11 +298,7 @@ class ModelContact(ModelConnections):
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
-        turned = (
-            (None, None)
-            if rotation is None
-            else rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
-        )
+        turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         self._add_pair(
             ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
         )
