@@ -202,9 +202,9 @@ class Building:
             for name in names:
                 for cell, rows in self.assembly.facet_rows([name.face] if name.face else []).items():
                     alike.add((name.keyword, cell), table, rows)
-        pressures = []
-        for number, ((_, cell), rows, value, table) in enumerate(alike, start=1):
-            self.assembly.groups[group := f"pressure {number}"] = {cell: rows.tolist()}
+        pressures: list[Callable[[Model], None]] = []
+        for number, ((_, cell), facets, value, table) in enumerate(alike, start=1):
+            self.assembly.groups[group := f"pressure {number}"] = {cell: facets.tolist()}
             if any(factor for _, factor in table):
                 pressures.append(partial(Model.add_pressure, group=group, value=value, ramp=table))
         return pressures
