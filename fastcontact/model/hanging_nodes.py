@@ -127,8 +127,8 @@ def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> A
         J = np.einsum("nk,mnd->mdk", elements.get(element.linear).gradient(middle[None])[0], corners)
         away = np.einsum("mdk,md->mk", J, mesh.points[node[rows]] - corners.mean(axis=1))
         xi = middle + np.linalg.solve(np.einsum("mdk,mdl->mkl", J, J), away[..., None])[..., 0]
-        there = np.einsum("mn,mnd->md", element.shape(xi), x)
-        height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], there - outer.centre[facet[rows]])
+        curved = np.einsum("mn,mnd->md", element.shape(xi), x)
+        height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], curved - outer.centre[facet[rows]])
     return np.asarray(height)
 
 

@@ -237,9 +237,9 @@ def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
     ramps = [(item.name, item.ramp) for item in items]
     ramps += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
     turning = {s.group: s.rotation_ramp or s.ramp for s in model.supports if s.rotation is not None}
-    ramps += [(f"the rotation of '{group}'", own) for group, own in turning.items()]
+    ramps += [(f"the rotation of '{group}'", history) for group, history in turning.items()]
     ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
-    without = [name for name, own in ramps if own is None]
+    without = [name for name, history in ramps if history is None]
     if 0 < len(without) < len(ramps):
         yield (
             f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "

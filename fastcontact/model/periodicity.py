@@ -122,7 +122,7 @@ def cyclic(
         raise ModelError(f"{name}: one of the groups is empty")
     rotation = Rotation(tuple(map(float, origin)), tuple(map(float, direction)), 2.0 * math.pi / sectors)  # type: ignore[arg-type]
     turns = [_turned(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
-    distance, match, turn = min(turns, key=lambda one: float(one[0].max()))
+    distance, match, turn = min(turns, key=lambda candidate: float(candidate[0].max()))
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
     if len(first) == len(second) == len(np.unique(match)) and distance[far] <= SINGLE_PRECISION * size:

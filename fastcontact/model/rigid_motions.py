@@ -161,12 +161,12 @@ def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Ar
             f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
         )
     ends = np.cumsum([0] + [motion.shape[2] for _, motion in moving])
-    there = np.zeros((len(rigid.hinge_node), mesh.dim, width))
+    at_hinges = np.zeros((len(rigid.hinge_node), mesh.dim, width))
     for row, (node, number) in enumerate(zip(rigid.hinge_node, rigid.hinge_part, strict=True)):
         members, motion = moving[number]
-        there[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
+        at_hinges[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
     same = rigid.hinge_node[1:] == rigid.hinge_node[:-1]
-    return _null_space((there[1:] - there[:-1])[same].reshape(int(same.sum()) * mesh.dim, width))
+    return _null_space((at_hinges[1:] - at_hinges[:-1])[same].reshape(int(same.sum()) * mesh.dim, width))
 
 
 def node_at(mesh: Mesh, node: int) -> str:

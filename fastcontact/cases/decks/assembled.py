@@ -146,19 +146,18 @@ class Assembly:
         numbers = entry.numbers
         if not isinstance(numbers, range):
             return self._all_existing(kind, scope, entry)
-        there = self._there(kind, scope)
-        numbers_there = [
-            n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers
-        ]
-        if len(numbers_there) < len(numbers):
-            absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
+        items = self._items_of(kind, scope)
+        candidates = numbers if len(numbers) <= len(items) else sorted(items)
+        known = [n for n in candidates if n in items and n in numbers]
+        if len(known) < len(numbers):
+            absent = f"{len(numbers) - len(known)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry, f"{absent} are no {kind}s and left out")
-        return (there[n] for n in numbers_there)
+        return (items[n] for n in known)
 
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
-        there = self._there(kind, scope)
+        items = self._items_of(kind, scope)
         for number in entry.numbers:
-            item = there.get(number)
+            item = items.get(number)
             yield self._existing(kind, scope, number, entry.place_of(number)) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
@@ -171,12 +170,12 @@ class Assembly:
             )
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
-    def _there(self, kind: str, scope: str) -> Mapping[int, Any]:
+    def _items_of(self, kind: str, scope: str) -> Mapping[int, Any]:
         """Return the points or elements of an instance by number."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
     def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
-        item = self._there(kind, scope).get(number)
+        item = self._items_of(kind, scope).get(number)
         if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
             raise location.refuse(f"{kind} {number} is not defined{where}")

@@ -163,7 +163,7 @@ class Deck:
                 held[support.rows.indices] = True
         rows = [link.rows for link in links]
         forces = multipliers(reaction.ravel(), rows, held)
-        linked = sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(held.size))
+        linked = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(held.size))
         return reaction - linked.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:

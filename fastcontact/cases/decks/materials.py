@@ -266,5 +266,5 @@ def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
         "pretension sections": bool(content.pretensions),
         "incompatible modes": any(law.incompatible_modes for law in laws),
     }
-    why = [name for name, there in reasons.items() if there]
-    return ("small", why[0]) if why else ("finite", "")
+    present = [name for name, given in reasons.items() if given]
+    return ("small", present[0]) if present else ("finite", "")

@@ -46,7 +46,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
     for keyword, line in words:
         if keyword.upper() == "FIN":
             try:
-                return mesh_of(content.found())
+                return mesh_of(content.plain())
             except MeshError as error:
                 raise MeshError(f"'{path}': {error}") from None
         content.add(keyword.upper(), line, _block(path, keyword, line, words))
@@ -107,7 +107,7 @@ class _Content:
             known = ", ".join([*COORDINATES, *KINDS, *self._groups])
             raise self._refusal(line, f"{keyword[:40]} is not known; a mesh has {known}")
 
-    def found(self) -> dict[str, Any]:
+    def plain(self) -> dict[str, Any]:
         """Return points, cells and groups in the format of `meshio_process.plain_content`."""
         cells: list[Any] = []
         sets: dict[str, Any] = {}
