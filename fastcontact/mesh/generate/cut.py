@@ -53,13 +53,13 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     facets = {name: block for name, block in mesh.cells_of(group).items() if elements.get(name).dim == mesh.dim - 1}
     if not facets:
         raise MeshError(f"group '{group}' holds no facets, so nothing can be cut along it")
-    section = {frozenset(map(int, facet)) for block in facets.values() for facet in block}
+    section = _as_sets(facets)
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     direction = _direction(mesh, group, points, normal)
     beyond = _cells_beyond(mesh, group, section, points, direction)
     new_node = np.full(mesh.n_points, -1, np.int32)
     new_node[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
-    return _opened(mesh, group, section, facets, beyond, new_node)
+    return _opened(mesh, group, facets, beyond, new_node)
 
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
@@ -73,6 +73,11 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
     if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
         raise MeshError(f"the normal {normal} of section '{group}' must be {mesh.dim} numbers, not all zero")
     return np.asarray(vector / length)
+
+
+def _as_sets(facets: dict[str, Numbers]) -> set[Facet]:
+    """Return the nodes of facets (n, k), by element, as sets."""
+    return {frozenset(facet) for block in facets.values() for facet in block.tolist()}
 
 
 def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
@@ -133,17 +138,12 @@ def _sides_of_parts(
 
 
 def _opened(
-    mesh: Mesh,
-    group: str,
-    section: set[Facet],
-    facets: dict[str, Numbers],
-    beyond: dict[str, list[int]],
-    new_node: Numbers,
+    mesh: Mesh, group: str, facets: dict[str, Numbers], beyond: dict[str, list[int]], new_node: Numbers
 ) -> Mesh:
     """Return the mesh with each `new_node` (n_points,), -1 where there is none, in the cells beyond the section."""
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
     moved = [_with_nodes(cells, name, np.array(rows), new_node) for name, rows in beyond.items()]
-    outer = {facet for sides in moved for facet in sides} - section
+    outer = {facet for sides in moved for facet in sides} - _as_sets(facets)
     for name, block in mesh.facets.items():
         rows = np.flatnonzero((new_node[block] >= 0).any(axis=1))
         follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
