@@ -1,4 +1,8 @@
-"""Connectivity of a mesh: outer facets, bodies, orientation, nodes in order along a line."""
+"""Connectivity of a mesh: outer facets, bodies, their rigid parts, orientation, nodes in order along a line.
+
+Rigid parts are connected by hinges, a single node or nodes on one line. Cells with a common facet belong to one part, and so
+do parts with two common nodes in 2D, or with three non-collinear ones in 3D. The other common nodes of parts are hinges.
+"""
 
 from __future__ import annotations
 
@@ -292,11 +296,11 @@ class RigidParts:
     hinge_part: Indices
 
     def hinges_of(self, number: int) -> Indices:
-        """Return the nodes at which a part is attached to others, ascending."""
+        """Return the nodes (k,) of int at which a part is attached to others, ascending."""
         return self.hinge_node[self.hinge_part == number]
 
     def nodes_of(self, number: int) -> Indices:
-        """Return the nodes of a part, ascending, with those at hinges."""
+        """Return the nodes (k,) of int of a part, ascending, with those at hinges."""
         nodes, hinges = np.flatnonzero(self.part == number), self.hinges_of(number)
         return np.union1d(nodes, hinges) if len(hinges) else nodes
 
