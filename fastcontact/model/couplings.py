@@ -1,7 +1,8 @@
-"""Couplings of a reference point with a group: rigid (all nodes follow it) and distributing (it follows their mean motion).
+"""Reference points coupled with groups, and forces and moments distributed over groups.
 
-A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same position
-[radian]: about x, y and z in three dimensions, about z as the first component in two.
+In a rigid coupling all nodes follow the reference point, in a distributing one it follows their mean motion. A reference
+point has no cells. Its rotation, for small angles, is the displacement of a second point at the same position [radian]:
+about x, y and z in three dimensions, about z as the first component in two.
 """
 
 from __future__ import annotations
