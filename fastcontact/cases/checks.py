@@ -11,17 +11,12 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.contact_resultants import contact_moment
-from fastcontact.cases.keys import NUMBER
+from fastcontact.cases.keys import NUMBER, keys_of
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
-# Keys of a check in a case file.
-CHECK: dict[str, Any] = {
-    **dict.fromkeys(("name", "quantity", "theory", "of", "source"), str),
-    **dict.fromkeys(("value", "factor", "tolerance"), NUMBER),
-}
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
 # Quantities that need an option of the pair, and the message where it is missing.
 NEEDED = {
@@ -144,6 +139,9 @@ class Check:
         return f"{self.quantity} against {against} within {self.tolerance:g}"
 
 
+CHECK = keys_of(Check)
+
+
 def read_check(
     where: str,
     entry: Mapping[str, Any],
@@ -164,16 +162,9 @@ def read_check(
     if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
     of = field.split(".")[0] if owner in pairs else "pressure_max"
-    check = Check(
-        name=entry.get("name", entry["quantity"]),
-        quantity=entry["quantity"],
-        tolerance=float(entry["tolerance"]),
-        theory=entry.get("theory", ""),
-        of=entry.get("of", of),
-        value=float(entry["value"]) if "value" in entry else None,
-        source=entry.get("source", ""),
-        factor=float(entry.get("factor", _whole(field, theories.get(entry.get("theory", ""), {})))),
-    )
+    factor = _whole(field, theories.get(entry.get("theory", ""), {}))
+    numbers = {key: float(entry[key]) for key in ("tolerance", "value", "factor") if key in entry}
+    check = Check(**{"name": entry["quantity"], "of": of, "factor": factor, **entry, **numbers})
     if not 0.0 < check.tolerance < math.inf:
         raise CaseError(
             f"{where}.tolerance = {check.tolerance:g} must be a positive number, e.g. 0.01 for one per cent"

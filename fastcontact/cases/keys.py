@@ -5,23 +5,46 @@ from __future__ import annotations
 import contextlib
 import inspect
 import re
+import types
+import typing
+from collections import abc
 from collections.abc import Callable, Iterator, Mapping
 from reprlib import repr
 from typing import Any
 
+from fastcontact._tools.argument_types import types_of
+from fastcontact.analysis.criteria import Criteria
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
+# Numbers, functions of the position and time series in a case file.
+_TOML: dict[Any, tuple[type, ...]] = {
+    float: NUMBER,
+    abc.Callable: (dict,),
+    **dict.fromkeys((abc.Sequence, abc.Iterable), (list,)),
+}
+
+
+def toml_types(annotation: Any) -> tuple[type, ...]:
+    """Return the case-file types that an annotated argument takes; a function is given as a table."""
+    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
+    if kind in (typing.Union, types.UnionType):
+        return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in toml_types(member)))
+    if kind in (bool, int, str):
+        return (kind,)
+    return _TOML.get(kind, ())
+
+
+def keys_of(described: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
+    """Return the case-file types of the fields of a class, or the arguments of a function, by name."""
+    return {name: toml_types(annotation) for name, annotation in types_of(described).items()}
+
+
 _ARGUMENT = re.compile(r"the argument (?P<key>\w+) of [\w.]+ must be (?P<kinds>.*), not (?P<given>.*)")
 AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
-SOLVE: dict[str, Any] = {
-    "linear_solver": str,
-    "keep_pairing": bool,
-    **dict.fromkeys(("linear_tolerance", "relative", "absolute", "geometry", "friction_while_touching"), NUMBER),
-    **dict.fromkeys(("geometry_updates", "max_geometry_updates", "max_active_set_iterations", "max_halvings"), int),
-}
+SOLVE: dict[str, Any] = {"linear_solver": str, "linear_tolerance": NUMBER, **keys_of(Criteria)}
 # A rigid surface: the facets of a group, in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
 # Rotation of a rigid obstacle or a support.

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import functools
 import inspect
-import types
-import typing
-from collections import abc
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from reprlib import repr
 from typing import Any
 
 from fastcontact._tools.argument_types import types_of
-from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables
+from fastcontact.cases.keys import AXES, FIELD, NUMBER, ROTATION, SURFACE, at, called, check_keys, tables, toml_types
 from fastcontact.contact.obstacles import SHAPES, MeshedSurface, Obstacle
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.initial_states import COMPONENTS
@@ -26,7 +23,7 @@ from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import cut
-from fastcontact.mesh.generate.reference_points import with_reference_points
+from fastcontact.mesh.generate.transform import with_reference_points
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -120,39 +117,31 @@ def _constants() -> dict[str, tuple[type, ...]]:
     for law in _LAWS:
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
             if key in inspect.signature(law).parameters:
-                known.setdefault(key, set()).update(_toml_types(annotation))
+                known.setdefault(key, set()).update(toml_types(annotation))
     return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
-# Functions by kind of table, in the order in which the tables are added to the model.
-_ADD: dict[str, Callable[..., None]] = {
+# Functions by kind of table that are not called like it.
+_NAMED: dict[str, Callable[..., None]] = {
     "material": _add_material,
     "support": Model.prescribe,
-    "pressure": Model.add_pressure,
-    "traction": Model.add_traction,
-    "body_force": Model.add_body_force,
-    "gravity": Model.add_gravity,
-    "centrifugal": Model.add_centrifugal,
     "temperature": _add_temperature,
     "fixed_temperature": Model.fix_temperature,
-    "heat_flux": Model.add_heat_flux,
-    "heat_source": Model.add_heat_source,
-    "nodal_heat": Model.add_nodal_heat,
-    "film": Model.add_film,
-    "initial_stress": Model.add_initial_stress,
-    "initial_strain": Model.add_initial_strain,
-    "force": Model.add_force,
-    "moment": Model.add_moment,
-    "hydrostatic_pressure": Model.add_hydrostatic_pressure,
     "coupling": _add_coupling,
     "couple": Model.couple,
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
-    "periodicity": Model.add_periodicity,
-    "cyclic_symmetry": Model.add_cyclic_symmetry,
-    "spring": Model.add_spring,
-    "pretension": Model.add_pretension,
 }
+# Functions by kind of table, in the order in which the tables are added to the model.
+_ADD: dict[str, Callable[..., None]] = {
+    kind: _NAMED.get(kind) or getattr(Model, f"add_{kind}")
+    for kind in (
+        "material", "support", "pressure", "traction", "body_force", "gravity", "centrifugal", "temperature",
+        "fixed_temperature", "heat_flux", "heat_source", "nodal_heat", "film", "initial_stress", "initial_strain", "force",
+        "moment", "hydrostatic_pressure", "coupling", "couple", "relation", "group_relation", "periodicity",
+        "cyclic_symmetry", "spring", "pretension",
+    )
+}  # fmt: skip
 # Tables that refer to contact pairs, to be added after these.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
 
@@ -164,31 +153,13 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
     for add in adding:
         annotated = types_of(inspect.unwrap(add))
         for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # without the model
-            kinds = _toml_types(annotated[key])
+            kinds = toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
                 known |= AXES
             else:
                 known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
                 needed += [key] * (parameter.default is parameter.empty)
     return {**known, **further}, needed
-
-
-# Numbers, functions of the position and time series in a case file.
-_TOML: dict[Any, tuple[type, ...]] = {
-    float: NUMBER,
-    abc.Callable: (dict,),
-    **dict.fromkeys((abc.Sequence, abc.Iterable), (list,)),
-}
-
-
-def _toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the case-file types that an annotated argument takes; a function is given as a table."""
-    kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
-    if kind in (typing.Union, types.UnionType):
-        return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in _toml_types(member)))
-    if kind in (bool, int, str):
-        return (kind,)
-    return _TOML.get(kind, ())
 
 
 # By kind of table: the value types of its keys, and its required keys.

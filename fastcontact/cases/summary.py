@@ -245,10 +245,8 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
 def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
     """Return lines of frequencies, one for each number of nodal diameters; pairs of modes are listed once."""
     frequencies = table["frequencies"]
-    diameters, twins = (
-        table.get("nodal_diameters", [None] * len(frequencies)),
-        table.get("twins", range(len(frequencies))),
-    )
+    diameters = table.get("nodal_diameters", [None] * len(frequencies))
+    twins = table.get("twins", range(len(frequencies)))
     for d in dict.fromkeys(diameters):
         modes = [k for k, other in enumerate(diameters) if other == d and k <= twins[k]]
         shown = ", ".join(f"{frequencies[k]:.6g}" for k in modes)

@@ -11,7 +11,7 @@ from fastcontact.mesh import elements
 
 
 def facets_with_nodes(
-    solids: Mapping[str, Numbers], chosen: Mask, between: bool, own: Mapping[str, Mask] | None = None
+    solids: Mapping[str, Numbers], chosen: Mask, between: bool, among: Mapping[str, Mask] | None = None
 ) -> dict[str, Numbers]:
     """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all chosen, by facet element.
 
@@ -24,29 +24,29 @@ def facets_with_nodes(
     chosen : ndarray of bool (n_points,)
     between : bool
         Whether to return facets between two cells; otherwise those of a single cell.
-    own : mapping of str to ndarray of bool (n_cells,), optional
+    among : mapping of str to ndarray of bool (n_cells,), optional
         Cells to which the facets must belong, by default all.
     """
     candidates: dict[str, list[Numbers]] = {}
-    owned: dict[str, list[Mask]] = {}
+    flags: dict[str, list[Mask]] = {}
     for name, block in solids.items():
-        element = elements.get(name)
+        element, counted = elements.get(name), np.ones(len(block), bool) if among is None else among[name]
         for facet, kind in zip(element.facets, element.facet_elements, strict=True):
             nodes = block[:, list(facet)]
             inside = chosen[nodes].all(axis=1)
             candidates.setdefault(kind, []).append(nodes[inside])
-            owned.setdefault(kind, []).append(np.ones(int(inside.sum()), bool) if own is None else own[name][inside])
-    found, wanted = {}, 2 if between else 1
+            flags.setdefault(kind, []).append(counted[inside])
+    facets_by_kind, n_cells = {}, 2 if between else 1
     for kind, blocks in candidates.items():
-        facets, is_own = np.concatenate(blocks), np.concatenate(owned[kind])
+        facets, is_among = np.concatenate(blocks), np.concatenate(flags[kind])
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        count_own = np.bincount(group.ravel(), is_own, len(count))
-        rows = np.sort(first[(count == wanted) & (count_own == wanted)])
+        count_among = np.bincount(group.ravel(), is_among, len(count))
+        rows = np.sort(first[(count == n_cells) & (count_among == n_cells)])
         if len(rows):
-            found[kind] = facets[rows]
-    return found
+            facets_by_kind[kind] = facets[rows]
+    return facets_by_kind
 
 
 def added(block: Numbers, facets: Numbers) -> tuple[Numbers, Indices]:

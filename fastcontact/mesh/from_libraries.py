@@ -13,9 +13,8 @@ import numpy as np
 from fastcontact.arrays import REFUSAL, is_masked
 from fastcontact.errors import FileError, MeshError, warn
 from fastcontact.mesh import elements, topology
-from fastcontact.mesh.files.blocks import VERTEX
 from fastcontact.mesh.files.mesh_files import read_mesh
-from fastcontact.mesh.files.meshio_content import UNFIT, mesh_of
+from fastcontact.mesh.files.meshio_content import UNFIT, VERTEX, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
 from fastcontact.mesh.mesh import Mesh
 

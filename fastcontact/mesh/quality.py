@@ -16,6 +16,11 @@ from fastcontact.mesh.mesh import Mesh
 _FLAT = 1e-12
 # Limits for poor cells: smallest over largest Jacobian, largest angle [degrees], volume over the cube of the longest edge.
 EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
+# What to do about bad cells.
+REMEDIES = {
+    "degenerate": "remove it or merge its points differently",
+    "inverted": "reorient it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
+}
 
 
 @dataclass(frozen=True)
@@ -101,18 +106,11 @@ def check_cells(mesh: Mesh) -> None:
         _check_nodes(mesh, name)
         _check_twice(mesh, name)
         measure, flat, inverted = _bad_cells(mesh, name)
-        for bad, fault, remedy in (
-            (flat, "degenerate", "remove it or merge its points differently"),
-            (
-                inverted,
-                "inverted",
-                "reorient it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
-            ),
-        ):
+        for fault, bad in (("degenerate", flat), ("inverted", inverted)):
             if bad.any():
                 row = int(np.flatnonzero(bad)[0])
                 cell = _described(mesh, name, row, measure[row])
-                raise MeshError(f"{cell} is {fault}, one of {int(bad.sum())} such cells: {remedy}")
+                raise MeshError(f"{cell} is {fault}, one of {int(bad.sum())} such cells: {REMEDIES[fault]}")
 
 
 def poorest_cell(mesh: Mesh) -> str:

@@ -1,27 +1,206 @@
-"""Couplings of a reference point with a group: rigid (all nodes follow it) and distributing (it follows their mean motion).
+"""Reference points coupled with groups, and forces and moments distributed over groups.
 
-A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same position
-[radian]: about x, y and z in three dimensions, about z as the first component in two.
+In a rigid coupling all nodes follow the reference point, in a distributing one it follows their mean motion. A reference
+point has no cells. Its rotation, for small angles, is the displacement of a second point at the same position [radian]:
+about x, y and z in three dimensions, about z as the first component in two.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.elasticity.loads import Load, Table
+from fastcontact.elasticity.loads import Load, Table, Traction, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError, ModelError, check_known
+from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.spread_forces import Spread, mean_rotation, shares_of, turned
+from fastcontact.round_off import ROUND_OFF, TINY
 
 Term = tuple[int, int, float]  # point, component, coefficient
 KINDS = ("rigid", "distributing")
+# Weights as functions of the distance over the radius, from 1 at the centre to 0 at the radius.
+WEIGHTINGS: dict[str, Callable[[Array], Array]] = {
+    "uniform": np.ones_like,
+    "linear": lambda s: 1.0 - s,
+    "quadratic": lambda s: 1.0 - s**2,
+    "cubic": lambda s: 1.0 - 3.0 * s**2 + 2.0 * s**3,
+}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Weighting of a group by the distance from a point.
+
+    Attributes
+    ----------
+    place : tuple of float (dim,)
+        [length]
+    weighting : str
+        ``"uniform"``, ``"linear"``, ``"quadratic"`` or ``"cubic"``.
+    radius : float or None
+        Distance beyond which weights are zero [length]; None: that of the farthest node.
+    """
+
+    place: tuple[float, ...]
+    weighting: str = "uniform"
+    radius: float | None = None
+
+    def check(self, name: str, dim: int) -> None:
+        """Raise ModelError, with the `name` of the load, if it is not admissible."""
+        if len(self.place) != dim:
+            raise ModelError(f"{name}: the place {self.place} it is spread about must be {dim} numbers")
+        for number in self.place:
+            check_number(f"a coordinate of the place of {name}", number)
+        check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
+        if self.radius is not None:
+            check_number(f"the radius of {name}", self.radius)
+            if not self.radius > 0.0:
+                raise ModelError(f"the radius of {name} = {self.radius:g} must be positive")
+
+    def weights(self, places: Array, radius: float) -> Array:
+        """Return the weights (n,) [-] at `places` (n, dim) [length], zero beyond the radius."""
+        s = np.linalg.norm(places - np.array(self.place), axis=1) / radius
+        return np.where(s <= 1.0, WEIGHTINGS[self.weighting](np.minimum(s, 1.0)), 0.0)
+
+
+def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
+    """Return the weighting about a point, None without one; ModelError if only weighting or radius are given."""
+    if point is None:
+        if weighting != "uniform" or radius is not None:
+            raise ModelError(
+                f"{name} has a weighting or a radius, but no place from which distances count: give at=..."
+            )
+        return None
+    return Spread(tuple(float(v) for v in point), weighting, radius)
+
+
+def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Indices, Array]:
+    """Return the points (n,) of a group, and their shares (n,) of a distributed load [-].
+
+    Shares are proportional to area, if the group has facets, times the weights of `spread`. Raises ModelError if nothing lies
+    inside its radius.
+    """
+    points, radius = mesh.points_of(group).astype(np.intp), 0.0
+    if spread is not None and len(points):
+        away = float(np.linalg.norm(mesh.points[points] - np.array(spread.place), axis=1).max())
+        radius = away if spread.radius is None else spread.radius
+
+    def weigh(places: Array) -> Array:
+        return np.ones(len(places)) if spread is None or not radius else spread.weights(places, radius)
+
+    if group in mesh.cell_groups and mesh.cells_of(group, dim=mesh.dim - 1):
+        shares = Traction(group, {0: weigh}, None).vector(mesh, kinematics)[points, 0]
+    else:
+        shares = weigh(mesh.points[points])
+    total = float(shares.sum())
+    if len(points) and not total > 0.0:
+        raise ModelError(
+            f"no part of '{group}' lies within the radius it is spread over: take a larger radius, or another place"
+        )
+    return points, shares / total if len(points) else shares
+
+
+def mean_rotation(weight: Array, arms: Array) -> Array:
+    """Return the coefficients (n_rotations, n, dim) of the displacements of n points in their mean rotation [1 / length].
+
+    The points have `weight` (n,) [-] and `arms` (n, dim) from their centroid [length]. Products with moments are forces
+    at the points with this moment, and no resultant.
+    """
+    motion = by_rotation(arms)
+    inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)
+    if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
+        raise ModelError(
+            "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
+        )
+    return np.einsum("kl,ndl,n->knd", np.linalg.inv(inertia), motion, weight)
+
+
+def by_rotation(arms: Array) -> Array:
+    """Return the displacement (..., dim, n_rotations) of the ends of `arms` (..., dim) by each unit rotation [length]."""
+    if arms.shape[-1] == 2:
+        return np.asarray((np.array([-1.0, 1.0]) * arms[..., ::-1])[..., None])
+    return np.cross(arms[..., None, :], np.eye(3))
+
+
+def turned(weight: Array, places: Array, moment: Array) -> Array:
+    """Return forces (n, dim) [force] at points with a `moment` (1,) or (3,) and no resultant.
+
+    They are proportional to `weight` (n,) [-] and the arms of `places` (n, dim) [length]; see `mean_rotation`.
+    """
+    return np.asarray(np.einsum("k,knd->nd", moment, mean_rotation(weight, places - weight @ places)))
+
+
+@dataclass(frozen=True)
+class SpreadForce(Load):
+    """Components of a force [force], distributed over a group by the distance from its point of application."""
+
+    KIND = "the force"
+    CONSTANT = True
+    group: str
+    components: Mapping[int, float]
+    spread: Spread
+    ramp: Table | None = None
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        if kinematics == "axisymmetric":
+            raise ModelError(f"{self.name}: in axisymmetry no force acts through a place: give a traction that varies")
+        if not len(mesh.points_of(self.group)):
+            raise MeshError(f"{self.name}: the group is empty")
+        self.spread.check(self.name, mesh.dim)
+        self.vector(mesh, kinematics)
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        force = np.zeros(mesh.dim)
+        for axis, value in self.components.items():
+            force[axis] = value
+        points, weight = shares_of(mesh, kinematics, self.group, self.spread)
+        places = mesh.points[points]
+        nodal = weight[:, None] * force
+        arm = np.array(self.spread.place) - weight @ places
+        moment = force @ by_rotation(arm)
+        size = float(np.ptp(mesh.points, axis=0).max())
+        if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
+            try:
+                nodal = nodal + turned(weight, places, moment)
+            except ModelError as error:
+                raise ModelError(f"{self.name}: {error}") from error
+        forces[points] += nodal
+
+
+@dataclass(frozen=True)
+class Moment(Load):
+    """Components of a moment [force times length] by the axis they turn about, on a reference point or over a group."""
+
+    KIND = "the moment"
+    CONSTANT = True
+    group: str
+    components: Mapping[int, float]
+    ramp: Table | None = None
+
+    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
+        if kinematics == "axisymmetric":
+            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model, over the circle it is zero")
+        if not len(mesh.points_of(self.group)):
+            raise MeshError(f"{self.name}: the group is empty")
+
+    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
+        moment = np.zeros(1 if mesh.dim == 2 else 3)
+        for axis, value in self.components.items():
+            moment[0 if mesh.dim == 2 else axis] = value
+        if self.group + ROTATION in mesh.point_groups:
+            forces[mesh.point(self.group + ROTATION), : len(moment)] += moment
+            return
+        points, weight = shares_of(mesh, kinematics, self.group)
+        try:
+            forces[points] += turned(weight, mesh.points[points], moment)
+        except ModelError as error:
+            raise ModelError(f"{self.name}: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -33,8 +212,21 @@ class ReferencePoint:
     place: tuple[float, ...]
 
 
-def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) -> MultiPointConstraint:
-    """Return equations, lists of terms that sum to zero, as a constraint of a mesh of `shape` (n_points, dim)."""
+def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
+    """Return a reference point by the name of its group; ModelError if there is none of that name."""
+    if name + ROTATION not in mesh.point_groups:
+        raise ModelError(
+            f"'{name}' is not a reference point: make the model of "
+            f"fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
+        )
+    point = mesh.point(name)
+    return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))
+
+
+def relation(
+    name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int], value: float = 0.0, ramp: Table | None = None
+) -> MultiPointConstraint:
+    """Return equations, lists of terms whose sum is `value`, as a constraint of a mesh of `shape` (n_points, dim)."""
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
     column = [point * dim + axis for terms in rows for point, axis, _ in terms]
@@ -42,19 +234,11 @@ def relation(name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int]) 
     matrix = csr_array((values, (row, column)), shape=(len(rows), n_points * dim))
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
-    return MultiPointConstraint(name, matrix)
+    return MultiPointConstraint(name, matrix, value, ramp)
 
 
-def _turn(dim: int, axis: int, arm: Array) -> list[tuple[int, float]]:
-    """Return the rotation components, with factors, that move the end of an arm (dim,) along an axis."""
-    if dim == 2:
-        return [(0, -arm[1] if axis == 0 else arm[0])]
-    after, last = (axis + 1) % 3, (axis + 2) % 3
-    return [(after, arm[last]), (last, -arm[after])]
-
-
-def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: Sequence[int]) -> list[list[Term]]:
-    """Return the equations of a rigid coupling: points follow the translation and rotation of a reference point.
+def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, directions: Array, n_dofs: int) -> csr_array:
+    """Return the rows (n k, n_dofs) of a rigid coupling: points follow the translation and rotation of a reference point.
 
     Parameters
     ----------
@@ -62,19 +246,22 @@ def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, axes: 
     points : ndarray of int (n,)
     places : ndarray (n, dim)
         Their reference coordinates [length].
-    axes : sequence of int
-        Components of the displacement that follow.
+    directions : ndarray (n, k, dim)
+        Unit vectors along which each point follows [-].
+    n_dofs : int
     """
-    dim, rows = places.shape[1], []
-    for point, arm in zip(points.tolist(), places - np.array(reference.place), strict=True):
-        for axis in axes:
-            turns = [(reference.rotation, k, -factor) for k, factor in _turn(dim, axis, arm) if factor]
-            rows.append([(point, axis, 1.0), (reference.point, axis, -1.0), *turns])
-    return rows
+    n, k, dim = directions.shape
+    nodes = np.column_stack([points, np.tile([reference.point, reference.rotation], (n, 1))])
+    turns = directions @ by_rotation(places - np.array(reference.place))
+    turns = np.pad(turns, ((0, 0), (0, 0), (0, dim - turns.shape[2])))
+    values = np.stack([directions, -directions, -turns], axis=2)
+    return nodal_rows(np.repeat(nodes, k, axis=0), values.reshape(n * k, 3, dim), n_dofs)
 
 
-def distributing_rows(reference: ReferencePoint, points: Indices, places: Array, weight: Array) -> list[list[Term]]:
-    """Return the equations of a distributing coupling: a reference point follows the mean motion of points.
+def distributing_rows(
+    reference: ReferencePoint, points: Indices, places: Array, weight: Array, directions: Array, n_dofs: int
+) -> csr_array:
+    """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
     The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the points.
 
@@ -86,31 +273,19 @@ def distributing_rows(reference: ReferencePoint, points: Indices, places: Array,
         Their reference coordinates [length].
     weight : ndarray (n,)
         Weights of sum 1 [-].
+    directions : ndarray (k, dim)
+        Unit vectors along which the reference point follows [-].
+    n_dofs : int
     """
-    dim = places.shape[1]
-    middle = weight @ places
-    turn = mean_rotation(weight, places - middle)
-    rows = []
-    for k in range(turn.shape[0]):
-        terms = [(int(p), axis, -float(turn[k, i, axis])) for i, p in enumerate(points) for axis in range(dim)]
-        rows.append([(reference.rotation, k, 1.0), *terms])
-    offset = np.array(reference.place) - middle
-    for axis in range(dim):
-        terms = [(int(p), axis, -float(w)) for p, w in zip(points, weight, strict=True)]
-        turns = [(reference.rotation, k, -f) for k, f in _turn(dim, axis, offset) if f]
-        rows.append([(reference.point, axis, 1.0), *terms, *turns])
-    return rows
-
-
-def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
-    """Return a reference point by the name of its group; ModelError if there is none of that name."""
-    if name + ROTATION not in mesh.point_groups:
-        raise ModelError(
-            f"'{name}' is not a reference point: make the model of "
-            f"fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
-        )
-    point = mesh.point(name)
-    return ReferencePoint(point, mesh.point(name + ROTATION), tuple(mesh.points[point].tolist()))
+    middle, dim = weight @ places, places.shape[1]
+    rotation = mean_rotation(weight, places - middle)
+    turns = directions @ by_rotation(np.array(reference.place) - middle)
+    heads = np.zeros((len(rotation) + len(directions), 2, dim))  # the reference point and its rotation
+    heads[: len(rotation), 1] = np.eye(len(rotation), dim)
+    heads[len(rotation) :, 0], heads[len(rotation) :, 1, : len(rotation)] = directions, -turns
+    means = np.concatenate([rotation, directions[:, None] * weight[:, None]])
+    nodes = np.tile([reference.point, reference.rotation, *points], (len(heads), 1))
+    return nodal_rows(nodes, np.concatenate([heads, -means], axis=1), n_dofs)
 
 
 def coupling(
@@ -155,43 +330,11 @@ def coupling(
     reference_nodes = np.isin(points, (reference.point, reference.rotation))
     if reference_nodes.any() or not len(points):
         raise ModelError(f"{name}: the group needs points, without the reference point itself")
-    places = mesh.points[points]
+    places, directions, n_dofs = mesh.points[points], np.eye(mesh.dim)[list(axes)], mesh.points.size
+    if kind == "rigid":
+        each = np.tile(directions, (len(points), 1, 1))
+        return MultiPointConstraint(name, rigid_rows(reference, points, places, each, n_dofs))
     try:
-        rows = (
-            rigid_rows(reference, points, places, axes)
-            if kind == "rigid"
-            else distributing_rows(reference, points, places, weight)
-        )
+        return MultiPointConstraint(name, distributing_rows(reference, points, places, weight, directions, n_dofs))
     except ModelError as error:
         raise ModelError(f"{name}: {error}") from error
-    return relation(name, rows, mesh.points.shape)
-
-
-@dataclass(frozen=True)
-class Moment(Load):
-    """Components of a moment [force times length] by the axis they turn about, on a reference point or over a group."""
-
-    KIND = "the moment"
-    CONSTANT = True
-    group: str
-    components: Mapping[int, float]
-    ramp: Table | None = None
-
-    def _check_place(self, mesh: Mesh, kinematics: str) -> None:
-        if kinematics == "axisymmetric":
-            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model, over the circle it is zero")
-        if not len(mesh.points_of(self.group)):
-            raise MeshError(f"{self.name}: the group is empty")
-
-    def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
-        moment = np.zeros(1 if mesh.dim == 2 else 3)
-        for axis, value in self.components.items():
-            moment[0 if mesh.dim == 2 else axis] = value
-        if self.group + ROTATION in mesh.point_groups:
-            forces[mesh.point(self.group + ROTATION), : len(moment)] += moment
-            return
-        points, weight = shares_of(mesh, kinematics, self.group)
-        try:
-            forces[points] += turned(weight, mesh.points[points], moment)
-        except ModelError as error:
-            raise ModelError(f"{self.name}: {error}") from error

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
 from fastcontact.elasticity.loads import listed
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
@@ -30,12 +29,7 @@ def sentences(model: Any) -> Iterator[str]:
     yield f"{article} {KINDS[model.kinematics]} of {mesh.n_points} points, {cells}: {model.n_dofs} degrees of freedom."
     if named := [f"{kind} in {unit}" for kind, unit in model.units.items() if unit not in ("", "-")]:
         yield f"Units: {', '.join(named)}."
-    for material, groups in model.materials:
-        modes = (
-            material.incompatible_modes
-            and model.kinematics != "axisymmetric"
-            and any(name in BENDING for name in mesh.solids)
-        )
+    for (material, groups), modes in zip(model.materials, model.bending(), strict=True):
         locking = ", with a mean dilatation against locking" if material.averaged and not modes else ""
         locking += ", with incompatible modes" if modes else ""
         yield f"Material: {material.described} in {listed(groups)}{locking}."

@@ -17,7 +17,6 @@ from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.materials import LinearElastic, Material
 from fastcontact.elasticity.varying_constants import Varying
 from fastcontact.heat.loads import TemporaryHeat
@@ -37,8 +36,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     Keys are the names of the parts in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
-    elements = model.kinematics != "axisymmetric" and any(name in BENDING for name in mesh.solids)
-    bends = [elements and material.incompatible_modes for material, _ in model.materials]
+    bends = model.bending()
     inputs: dict[str, Any] = {
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),

@@ -54,10 +54,7 @@ def hanging_nodes_warning(model: Model) -> str:
     """Return a warning if nodes hang on facets of their own body without a contact or constraint between them."""
     mesh = model.mesh
     node, facet, outer = hanging_nodes(mesh)
-    relevant = np.ones(len(node), bool)
-    held = np.zeros(mesh.n_points, bool)
-    held[model.holding_rows().indices // mesh.dim] = True
-    relevant &= ~held[node]
+    relevant = ~model.related_points()[node]
     for pair in model.contact if len(node) else ():
         if pair.primary:
             relevant &= ~_joined(mesh, pair.secondary, pair.primary, node, outer.corners[facet])
@@ -130,8 +127,8 @@ def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> A
         J = np.einsum("nk,mnd->mdk", elements.get(element.linear).gradient(middle[None])[0], corners)
         away = np.einsum("mdk,md->mk", J, mesh.points[node[rows]] - corners.mean(axis=1))
         xi = middle + np.linalg.solve(np.einsum("mdk,mdl->mkl", J, J), away[..., None])[..., 0]
-        there = np.einsum("mn,mnd->md", element.shape(xi), x)
-        height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], there - outer.centre[facet[rows]])
+        curved = np.einsum("mn,mnd->md", element.shape(xi), x)
+        height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], curved - outer.centre[facet[rows]])
     return np.asarray(height)
 
 
@@ -182,24 +179,23 @@ def _outer(mesh: Mesh) -> OuterFacets:
     facets = outer_facets(mesh)
     most = max((block.shape[1] for block in facets.values()), default=1)
     n_corners = 2 if mesh.dim == 2 else 4
-    nodes = [np.full((0, most), -1, np.int32)]
-    corners = [np.full((0, n_corners), -1, np.int32)]
-    rises = [np.zeros(0)]
+    nodes, corners, centres, rises = [], [], [], []
     for name, block in facets.items():
-        element = elements.get(name)
+        element, x = elements.get(name), mesh.points[block]
         nodes.append(np.pad(block, ((0, 0), (0, most - block.shape[1])), constant_values=-1))
         # A triangle repeats its last corner.
         corners.append(block[:, np.minimum(np.arange(n_corners), element.n_corners - 1)])
-        rises.append(_rise(element, mesh.points[block]))
-    corner = np.concatenate(corners)
+        centres.append(x[:, : element.n_corners].mean(axis=1))
+        rises.append(_rise(element, x))
+    corner = np.concatenate([np.full((0, n_corners), -1, np.int32), *corners])
     x = mesh.points[corner]
     normal = flat_area_vectors(x)
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
-    centre = 0.5 * (x[:, 0] + x[:, 1]) if mesh.dim == 2 else _middles(x)
     return OuterFacets(
-        np.concatenate(nodes), corner, centre, normal, np.concatenate(rises), np.linalg.norm(np.ptp(x, axis=1), axis=1),
-        tuple(facets), np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()]),
+        np.concatenate([np.full((0, most), -1, np.int32), *nodes]), corner, np.concatenate([x[:, 0][:0], *centres]),
+        normal, np.concatenate([np.zeros(0), *rises]), np.linalg.norm(np.ptp(x, axis=1), axis=1), tuple(facets),
+        np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()]),
     )  # fmt: skip
 
 
@@ -209,12 +205,6 @@ def _rise(element: Element, x: Array) -> Array:
         return np.zeros(len(x))
     straight = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
     return np.asarray(np.linalg.norm(x - straight, axis=2).max(axis=1))
-
-
-def _middles(x: Array) -> Array:
-    """Return the mean corners (n, 3) of faces (n, 4, 3), in which triangles repeat the last."""
-    weight = np.where((x[:, 3] == x[:, 2]).all(axis=1), 0.0, 1.0)[:, None]
-    return np.asarray((x[:, 0] + x[:, 1] + x[:, 2] + weight * x[:, 3]) / (3.0 + weight))
 
 
 def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:

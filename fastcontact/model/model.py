@@ -167,7 +167,7 @@ class Model(ModelSupports):
             check_turns(self.contact, ramp)
             check_locks(self.pretensions, ramp.instants)
         self._check_relations(fixed, prescribed, ramp or Ramp((1.0,)))
-        check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self._related())
+        check_supports(self.mesh, [(s.name, s.group) for s in self.supports], self.related_points())
         bound = [(pair, self.bind(pair)) for pair in self.contact]
         for pair, formulation in bound:
             check_penetration(pair.name, formulation)

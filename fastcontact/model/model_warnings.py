@@ -58,16 +58,10 @@ def model_warnings(model: Model, ramp: Ramp) -> list[str]:
     pairs, pushed = [(pair, model.bind(pair)) for pair in model.contact], _pushed(supports)
     texts = [*_moduli(model), *_named_units(model), *_proportions(model, float(pushed.max())), poorest_cell(model.mesh)]
     texts += [hanging_nodes_warning(model), _coincident(model), *_friction(model), *_penetrating(model, pairs, pushed)]
-    texts += [*_unramped(model, ramp), *_prescribed_overlaps(pairs, supports), *_lost_loads(model)]
+    texts += [*_unramped(model, ramp), *prescribed_overlap_warnings(pairs, supports), *_lost_loads(model)]
     texts += [*_split_sides(model, pairs), *_wetted_twice(model), _stiffness(model.mesh)]
     texts += [text for load in model.loads for text in _load_integral(model, load)]
     return [text for text in texts if text]
-
-
-def _prescribed_overlaps(pairs: Pairs, supports: Supports) -> list[str]:
-    """Return a warning for each contact with nodes whose prescribed displacements cause penetration."""
-    supported = [(pair, bound) for pair, bound in pairs if supports.fixed[bound.secondary.points].any()]
-    return prescribed_overlap_warnings(supported, supports)
 
 
 def _split_sides(model: Model, pairs: Pairs) -> Iterator[str]:
@@ -169,7 +163,7 @@ def _coincident(model: Model) -> str:
     for pair in model.contact:
         for group in (pair.secondary, pair.primary):
             lone[mesh.points_of(group) if group else []] = False
-    lone[model.holding_rows().indices // mesh.dim] = False
+    lone[model.related_points()] = False
     numbers = np.flatnonzero(lone)
     pairs = numbers[close_pairs(mesh.points[numbers], SINGLE_PRECISION * size)]
     apart = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
@@ -243,9 +237,9 @@ def _unramped(model: Model, ramp: Ramp) -> Iterator[str]:
     ramps = [(item.name, item.ramp) for item in items]
     ramps += [(f"the motion of obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.motion)]
     turning = {s.group: s.rotation_ramp or s.ramp for s in model.supports if s.rotation is not None}
-    ramps += [(f"the rotation of '{group}'", own) for group, own in turning.items()]
+    ramps += [(f"the rotation of '{group}'", history) for group, history in turning.items()]
     ramps += [(f"the force on obstacle '{pair.name}'", pair.ramp) for pair in model.contact if any(pair.force)]
-    without = [name for name, own in ramps if own is None]
+    without = [name for name, history in ramps if history is None]
     if 0 < len(without) < len(ramps):
         yield (
             f"{', '.join(without)} {'has' if len(without) == 1 else 'have'} no ramp, as others have: at load factor {top:g} "

@@ -18,11 +18,13 @@ KEYS = ("angle", "centre", "axis", "ramp")
 LARGEST_TURN = 1.0
 
 
-def rotation_of(caption: str, given: Mapping[str, Any], kinematics: str) -> tuple[Rotation, Table | None]:
-    """Return a rotation, called `caption` in messages, and its history, None for that of the motion.
+def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
+    """Return a rotation, called `caption` in messages, None without one; and its history, None for that of the motion.
 
     Raises ModelError if they are not admissible.
     """
+    if given is None:
+        return None, None
     for key in given:
         check_known(f"key of {caption}", key, KEYS, ModelError)
     if kinematics == "axisymmetric":

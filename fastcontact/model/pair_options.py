@@ -1,12 +1,13 @@
-"""Conversion and checks of the user's options of a contact pair that do not depend on its formulation."""
+"""The options of a contact pair: their types, and the conversion and checks of those of all formulations."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fastcontact._tools.argument_types import finite_vector
 from fastcontact.arrays import Array, Mask
@@ -15,10 +16,10 @@ from fastcontact.contact.conductance import Conductance
 from fastcontact.contact.overclosure import ExponentialLaw, OverclosureLaw, TabularLaw
 from fastcontact.contact.pair_options import KINDS, Field, PairOptions
 from fastcontact.contact.surface import Surface
-from fastcontact.elasticity.loads import check_number, check_value, evaluated
+from fastcontact.elasticity.loads import Value, check_number, check_value, evaluated
 from fastcontact.errors import ContactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.ramp import Table, table_of
+from fastcontact.model.ramp import History, Table, table_of
 
 
 def pair_options(
@@ -261,3 +262,47 @@ def _function(name: str, value: Any) -> Field | None:
         return None
     check_value(name, value)
     return partial(evaluated, value, name=name)
+
+
+class FormulationOptions(TypedDict, total=False):
+    """Options of formulations: those of all first, then those of single ones."""
+
+    friction: float | None
+    surface_smoothing: bool | None
+    slip: str | None
+    normals: str | ArrayLike | None
+    projection_tolerance: float | None
+    opposite: str | None
+    multipliers: str | None
+    augmentation: float | None
+    integration: str | None
+    n_gauss: int | None
+
+
+class SharedOptions(TypedDict, total=False):
+    """Options of every contact pair, whatever its formulation."""
+
+    kind: str | None
+    clearance: Value | None
+    clearance_primary: Value | None
+    clearance_ramp: History
+    friction_ramp: History
+    excluded: str | Sequence[str] | None
+    frictionless: str | Sequence[str] | None
+    frictionless_along: ArrayLike | None
+    penalty: float | Sequence[tuple[float, float]] | Mapping[str, float] | None
+    tangential_penalty: Value | None
+    cohesion: Mapping[str, float | str] | None
+    adhesion: Mapping[str, float] | None
+    wear: float | None
+    conductance: Any
+    friction_heat: float | None
+    obstacle_temperature: float | None
+    search_distance: float | None
+
+
+class ContactOptions(FormulationOptions, SharedOptions, total=False):
+    """Options of `add_contact` other than the sides."""
+
+
+SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))

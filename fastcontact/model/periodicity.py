@@ -18,7 +18,7 @@ from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
-from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.linear.sparse_rows import nodal_rows, shapes_at
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import less_first, matched
@@ -48,9 +48,8 @@ def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indice
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))
-    label = connected_components(csr_array((np.ones(len(ends[0])), ends), shape=(n_points, n_points)), directed=False)[
-        1
-    ]
+    graph = csr_array((np.ones(len(ends[0])), ends), shape=(n_points, n_points))
+    label = connected_components(graph, directed=False)[1]
     return np.unique(label, return_index=True)[1][label]
 
 
@@ -123,7 +122,7 @@ def cyclic(
         raise ModelError(f"{name}: one of the groups is empty")
     rotation = Rotation(tuple(map(float, origin)), tuple(map(float, direction)), 2.0 * math.pi / sectors)  # type: ignore[arg-type]
     turns = [_turned(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
-    distance, match, turn = min(turns, key=lambda one: float(one[0].max()))
+    distance, match, turn = min(turns, key=lambda candidate: float(candidate[0].max()))
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
     if len(first) == len(second) == len(np.unique(match)) and distance[far] <= SINGLE_PRECISION * size:
@@ -166,10 +165,7 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
         return None
     on = places(other, near.facet, near.xi)
     m, dim, n = len(nodes), mesh.dim, mesh.n_points
-    weights = csr_array(
-        (on.shape.ravel(), (np.repeat(np.arange(m), on.nodes.shape[1]), on.nodes.ravel())), shape=(m, n)
-    )
-    identity = csr_array((np.ones(m), (np.arange(m), nodes)), shape=(m, n))
+    weights, identity = shapes_at(on.shape, on.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
 
 

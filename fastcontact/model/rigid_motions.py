@@ -17,8 +17,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.stiffness import rigid_modes
 from fastcontact.errors import ModelError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.rigid_parts import RigidParts, rigid_parts
-from fastcontact.mesh.topology import bodies
+from fastcontact.mesh.topology import RigidParts, bodies, rigid_parts
 
 MODE_NAMES = {
     "axisymmetric": ("translation along y (the axis)",),
@@ -162,12 +161,12 @@ def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Ar
             f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
         )
     ends = np.cumsum([0] + [motion.shape[2] for _, motion in moving])
-    there = np.zeros((len(rigid.hinge_node), mesh.dim, width))
+    at_hinges = np.zeros((len(rigid.hinge_node), mesh.dim, width))
     for row, (node, number) in enumerate(zip(rigid.hinge_node, rigid.hinge_part, strict=True)):
         members, motion = moving[number]
-        there[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
+        at_hinges[row, :, ends[number] : ends[number + 1]] = motion[np.searchsorted(members, node)]
     same = rigid.hinge_node[1:] == rigid.hinge_node[:-1]
-    return _null_space((there[1:] - there[:-1])[same].reshape(int(same.sum()) * mesh.dim, width))
+    return _null_space((at_hinges[1:] - at_hinges[:-1])[same].reshape(int(same.sum()) * mesh.dim, width))
 
 
 def node_at(mesh: Mesh, node: int) -> str:
@@ -216,18 +215,8 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     else:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
         around = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
-    edges = [
-        csr_array(
-            sum(
-                (
-                    T.multiply((weight * constraints.friction)[:, None])
-                    for T, weight in zip(constraints.tangents, parts)
-                ),
-                start=constraints.B,
-            )
-        )
-        for parts in around
-    ]
+    shear = [T.multiply(constraints.friction[:, None]) for T in constraints.tangents]
+    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, parts)) for parts in around]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 

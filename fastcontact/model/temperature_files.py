@@ -10,12 +10,8 @@ import numpy as np
 from fastcontact._tools.paths import PathLike
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ModelError
-from fastcontact.mesh.files.file_fields import read_file_field
-from fastcontact.mesh.files.mesh_fields import at_points_of
+from fastcontact.mesh.files.mesh_fields import at_points_of, read_file_field, row_of
 from fastcontact.mesh.mesh import Mesh
-
-# Tolerance of the times of a file, relative to the latest.
-SAME_TIME = 1e-9
 
 
 def read_temperatures(
@@ -46,12 +42,5 @@ def read_temperatures(
     values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
     if instant is None:
         return values, time
-    if time is None:
-        raise ModelError(f"field '{field}' of '{files[0]}' has no times: leave out instant")
-    row = int(np.abs(time - instant).argmin())
-    if abs(time[row] - instant) > SAME_TIME * np.abs(time).max():
-        raise ModelError(
-            f"field '{field}' of '{files[0]}' has no instant {instant:g}, the next is {time[row]:g}, of {time[0]:g} to "
-            f"{time[-1]:g}"
-        )
+    row = row_of(instant, time, f"field '{field}' of '{files[0]}'", ModelError)
     return values[row : row + 1], None

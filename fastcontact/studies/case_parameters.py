@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from fastcontact.errors import CaseError, unknown
-from fastcontact.model.contact_options import SHARED_OPTIONS
+from fastcontact.model.pair_options import SHARED_OPTIONS
 
 _PART = re.compile(r"([^.\[\]]+)((?:\[\d{1,9}\])*)$")
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"

@@ -28,8 +28,8 @@ from fastcontact.cases.input_files import digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.contact_options import SHARED_OPTIONS
 from fastcontact.model.fingerprint import digest_of_mesh
+from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh, recipe

@@ -12,7 +12,7 @@ from fastcontact.cases import checks, keys
 from fastcontact.cli._main import parser
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.linear import choice as linear
-from fastcontact.model import contact_options
+from fastcontact.model import pair_options
 
 PATH = re.compile(r"`((?:fastcontact|tests|bench|data|docs)/[\w./-]+)`")
 MADE = ("docs/_build",)
@@ -81,7 +81,7 @@ def test_every_quantity_of_checks_is_listed():
 
 def test_every_option_of_contact_pairs_is_listed():
     page = text("howto/contact-options.md")
-    for option in (*contact_options.SHARED_OPTIONS, "formulation", "friction", "normals", "projection_tolerance"):
+    for option in (*pair_options.SHARED_OPTIONS, "formulation", "friction", "normals", "projection_tolerance"):
         assert f"| `{option}` |" in page, option
 
 

@@ -19,7 +19,7 @@ from fastcontact.cases import case as cases
 from fastcontact.cli import _outputs, _results
 from fastcontact.cli._outputs import write_json
 from fastcontact.mesh.files import abaqus
-from fastcontact.mesh.files.blocks import build_mesh
+from fastcontact.mesh.files.meshio_content import build_mesh
 from fastcontact.mesh.generate import block, block_on_block
 
 

@@ -6,7 +6,7 @@ from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.model.spread_forces import WEIGHTINGS
+from fastcontact.model.couplings import WEIGHTINGS
 
 pytestmark = pytest.mark.pairwise
 

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.cases.decks.blocks import Location, folded
+from fastcontact.cases.decks.blocks import Location, defined, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
-from fastcontact.cases.decks.refusals import defined
 from fastcontact.mesh import elements
 
 # Number of set names that a message lists, and number of characters that it shows of each.
@@ -54,7 +53,7 @@ Face = tuple[Element, int]
 
 
 @dataclass
-class Assembled:
+class Assembly:
     """Points and elements of a deck with all its instances.
 
     Attributes
@@ -147,19 +146,18 @@ class Assembled:
         numbers = entry.numbers
         if not isinstance(numbers, range):
             return self._all_existing(kind, scope, entry)
-        there = self._there(kind, scope)
-        numbers_there = [
-            n for n in (numbers if len(numbers) <= len(there) else sorted(there)) if n in there and n in numbers
-        ]
-        if len(numbers_there) < len(numbers):
-            absent = f"{len(numbers) - len(numbers_there)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
+        items = self._items_of(kind, scope)
+        candidates = numbers if len(numbers) <= len(items) else sorted(items)
+        known = [n for n in candidates if n in items and n in numbers]
+        if len(known) < len(numbers):
+            absent = f"{len(numbers) - len(known)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry, f"{absent} are no {kind}s and left out")
-        return (there[n] for n in numbers_there)
+        return (items[n] for n in known)
 
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
-        there = self._there(kind, scope)
+        items = self._items_of(kind, scope)
         for number in entry.numbers:
-            item = there.get(number)
+            item = items.get(number)
             yield self._existing(kind, scope, number, entry.place_of(number)) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
@@ -172,12 +170,12 @@ class Assembled:
             )
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
-    def _there(self, kind: str, scope: str) -> Mapping[int, Any]:
+    def _items_of(self, kind: str, scope: str) -> Mapping[int, Any]:
         """Return the points or elements of an instance by number."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
     def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
-        item = self._there(kind, scope).get(number)
+        item = self._items_of(kind, scope).get(number)
         if item is None:
             where = f" in instance '{self.content.instances[scope].name}'" if scope else ""
             raise location.refuse(f"{kind} {number} is not defined{where}")
@@ -345,17 +343,17 @@ def matching(element: str) -> tuple[int, ...]:
     return MATCHING[element]
 
 
-def assembled(content: Content) -> Assembled:
-    """Return the points and elements of all instances; raises CaseError if an element uses an undefined node."""
-    made, total, counts = Assembled(content), 0, {}  # type: tuple[Assembled, int, dict[str, int]]
+def assemble(assembly: Assembly) -> None:
+    """Add the points and elements of all instances; raises CaseError if an element uses an undefined node."""
+    content, total, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
     places = []
-    for scope in made.scopes:
-        part = made.part(scope)
+    for scope in assembly.scopes:
+        part = assembly.part(scope)
         places.append(_placed(part, content.instances.get(scope)))
         index = {number: total + row for number, row in part.nodes.items()} if total else part.nodes
-        made.index[scope] = index
+        assembly.index[scope] = index
         total += len(index)
-        elements = made.elements[scope] = {}
+        elements = assembly.elements[scope] = {}
         for number, cell in part.cells.items():
             points = tuple(index.get(node, -1) for node in cell.nodes)
             if -1 in points:
@@ -365,8 +363,7 @@ def assembled(content: Content) -> Assembled:
             if kind is not None:
                 counts[kind.element] += 1
             elements[number] = Element(scope, number, cell, kind, points, row)
-    made.points = np.concatenate(places) if len(places) > 1 else places[0]
-    return made
+    assembly.points = np.concatenate(places) if len(places) > 1 else places[0]
 
 
 def _placed(part: Part, instance: Instance | None) -> Array:

@@ -1,14 +1,15 @@
-"""Keyword blocks of a deck: keyword, parameters and data lines, with file and line numbers; included files in place."""
+"""Keyword blocks of a deck: keyword, parameters and data lines; errors with file and line; included files in place."""
 
 from __future__ import annotations
 
 from codecs import BOM_UTF8
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
-from fastcontact.errors import CaseError, FileError
+from fastcontact.errors import CaseError, FastcontactError, FileError
 
 # Largest number of bytes of a deck with all included files, and of such files: a deck with more is taken for an error.
 LARGEST = 1 << 28
@@ -51,10 +52,16 @@ class Located:
 
 
 @dataclass(frozen=True, slots=True)
-class Row(Located):
-    """A data line: its entries without surrounding blanks, and its location."""
+class Item(Located):
+    """A deck item that does not change once it is read."""
 
     location: Location
+
+
+@dataclass(frozen=True, slots=True)
+class Row(Item):
+    """A data line: its entries without surrounding blanks, and its location."""
+
     entries: tuple[str, ...]
     goes_on: bool = False
 
@@ -102,10 +109,9 @@ class Lines:
 
 
 @dataclass(frozen=True, slots=True)
-class Block(Located):
+class Block(Item):
     """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
 
-    location: Location
     parameters: dict[str, str | None]
     lines: Iterable[Row] = ()
 
@@ -353,3 +359,33 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"
         raise block.refuse(f"{target_name} includes itself")
     yield from _blocks(target, given, source)
+
+
+Entry = TypeVar("Entry")
+
+
+@contextmanager
+def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
+    """Re-raise errors of the package as CaseError at a location of the deck; the message begins with `about`."""
+    try:
+        yield
+    except CaseError:  # has a location already
+        raise
+    except FastcontactError as error:
+        raise at.refuse(f"{about}{error}") from error
+
+
+def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
+    """Add an entry to a table under its name and return it; raises CaseError if the name is in the table already."""
+    if folded(name) in table:
+        raise at.refuse(f"{kind} '{name}' is defined twice")
+    table[folded(name)] = entry
+    return entry
+
+
+def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
+    """Return the entry of a table with a name; raises CaseError with the names of all entries if there is none."""
+    if folded(name) not in table:
+        known = ", ".join(entry.name for entry in table.values()) or "none"
+        raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")
+    return table[folded(name)]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,32 +11,35 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element, assembled
-from fastcontact.cases.decks.blocks import folded
-from fastcontact.cases.decks.cohesive import cohesion_of
-from fastcontact.cases.decks.conditions import Acting, Component, Conditions, Distributed
-from fastcontact.cases.decks.content import Content, Interaction, Material, Pair, Section, Step
+from fastcontact.cases.decks.assembled import Element
+from fastcontact.cases.decks.blocks import defined, folded, refusing
+from fastcontact.cases.decks.conditions import Acting, Component, Conditions
+from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
-from fastcontact.cases.decks.heat import HELD, conductance_of, friction_heat_of, perfect_conductance
-from fastcontact.cases.decks.histories import JUMP, ByShape, Histories
+from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.cases.decks.initial_stresses import add_initial_stresses
+from fastcontact.cases.decks.interactions import (
+    cohesion_of,
+    conductance_of,
+    friction_heat_of,
+    friction_of,
+    perfect_conductance,
+)
 from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
-from fastcontact.cases.decks.meshing import DeckMesh, begun, group_of_surface, secondary_group
-from fastcontact.cases.decks.nonlinear import strain_of
+from fastcontact.cases.decks.materials import law_of, strain_of
+from fastcontact.cases.decks.meshing import begun, group_of_surface, secondary_group
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
-from fastcontact.cases.decks.refusals import defined, refusing
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
-from fastcontact.cases.decks.temperatures import add_temperatures, conductivity_of
+from fastcontact.cases.decks.targets import Target
+from fastcontact.cases.decks.temperatures import add_temperatures
 from fastcontact.contact.integration import all_nodes_carry
-from fastcontact.elasticity.anisotropic_materials import Orthotropic
 from fastcontact.elasticity.material_axes import CylindricalAxes
-from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
-from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
+from fastcontact.model.relation_rows import along
 
 # Largest gap between the undeformed sides that counts as closed, relative to the size of the model.
 TOUCHING = 1e-6
@@ -49,7 +51,8 @@ class Building:
 
     Attributes
     ----------
-    made, found : the assembly and its mesh under construction
+    assembly : DeckMesh
+        The assembly, and its mesh under construction.
     model : Model
     thickness : float
         Thickness of a plane model; the forces of the model are per unit thickness [length].
@@ -65,22 +68,21 @@ class Building:
 
     def __init__(self, content: Content, case_text: str) -> None:
         self.content = content
-        self.made: Assembled = assembled(content)
-        self.found: DeckMesh = begun(self.made)
+        self.assembly = begun(content)
         alone = content.heat == "alone"
         if not alone:
-            make_rotations(self.found)
+            make_rotations(self.assembly)
         materials, self.thickness = self._materials()
-        conditions = Conditions(self.found)
+        conditions = Conditions(self.assembly)
         self._check_pairs()
         conditions.run()
-        groups = self._groups(conditions)
+        pressures = self._pressures(conditions)
         heat = conditions.heat.loads(self.thickness)
-        gaps = [] if alone else gap_groups(self.found)
-        mesh = self.found.mesh() if alone else cut_sections(self.found, self.found.mesh())
+        gaps = [] if alone else gap_groups(self.assembly)
+        mesh = self.assembly.mesh() if alone else cut_sections(self.assembly, self.assembly.mesh())
         strain, self.linearised = strain_of(content, [law for law, _ in materials])
         reference = conditions.heat.reference
-        self.model = Model(mesh, self.found.kinematics, case_text, strain=strain, reference_temperature=reference)
+        self.model = Model(mesh, self.assembly.kinematics, case_text, strain=strain, reference_temperature=reference)
         for material, group in materials:
             self.model.add_material(material, group)
         self.local_supports: list[MultiPointConstraint] = []
@@ -88,38 +90,39 @@ class Building:
         self.links: list[MultiPointConstraint] = []
         if alone:
             self.model.fix(self._point_group("held", range(mesh.n_points)), "xyz"[: mesh.dim])
-            add_sectors(self.model, self.found)
+            add_sectors(self.model, self.assembly)
         else:
-            self._mechanics(conditions, groups)
+            self._mechanics(conditions, pressures)
         for add in heat:
             add(self.model)
         self._contact()
         self.gap_ends: dict[str, dict[int, int]] = {}
         for gap in gaps:
-            self.gap_ends.update(add_gap(self.model, self.found, gap, conditions))
+            self.gap_ends.update(add_gap(self.model, self.assembly, gap, conditions))
         self.ramp = self._ramp(conditions)
 
-    def _mechanics(self, conditions: Conditions, groups: list[tuple[str, Any, Table]]) -> None:
+    def _mechanics(self, conditions: Conditions, pressures: list[Callable[[Model], None]]) -> None:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
-        self.links += relations_of(self.found, self.model.mesh)
+        self.links += relations_of(self.assembly, self.model.mesh)
         self.model.relations += self.links
-        self.links += add_sections(self.model, self.found, conditions.locks)
-        self.links += add_sectors(self.model, self.found)
+        self.links += add_sections(self.model, self.assembly, conditions.locks)
+        self.links += add_sectors(self.model, self.assembly)
         self._forces(conditions)
-        self._pressures(groups)
+        for add in pressures:
+            add(self.model)
         self._body_forces(conditions)
         add_temperatures(self.model, conditions.temperatures)
-        add_initial_stresses(self.model, self.found)
+        add_initial_stresses(self.model, self.assembly)
         self._springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
         """Return the materials with their groups of solids, and the thickness; every solid needs a section."""
         thickness: float | None = None
-        for scope in self.made.scopes:
-            for section in self.made.part(scope).sections:
+        for scope in self.assembly.scopes:
+            for section in self.assembly.part(scope).sections:
                 self._material(section)
-                if self.found.dim == 2 and self.found.kinematics != "axisymmetric":
+                if self.assembly.dim == 2 and self.assembly.kinematics != "axisymmetric":
                     section_thickness = 1.0 if section.thickness is None else section.thickness
                     if thickness is not None and section_thickness != thickness:
                         raise section.refuse(
@@ -127,7 +130,7 @@ class Building:
                         )
                     thickness = section_thickness
                 name = f"{scope}.{section.elements}" if scope else section.elements
-                for element in self.made.elements_of(name, section.location):
+                for element in self.assembly.elements_of(name, section.location):
                     if element.section not in (None, section):
                         raise section.refuse(
                             f"element {element.number} has a section already, in line {element.section.location.line}"
@@ -135,7 +138,7 @@ class Building:
                     element.section = section
         self._check_sections()
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
-        for element in self.made.solids:
+        for element in self.assembly.solids:
             given = element.given_section
             key = (folded(given.material), folded(given.orientation), element.solid.modes)
             by_material.setdefault(key, []).append(element)
@@ -145,12 +148,8 @@ class Building:
             axes = self._axes(members[0].given_section, members)
             group = f"material {material.name}" + (f" along {turned.lower()}" if turned else "")
             group += " with incompatible modes" if modes else ""
-            materials.append(
-                (
-                    _law(self.content, material, axes, modes),
-                    self.found.add_solids(group, members),
-                )
-            )
+            law = law_of(self.content, material, axes, modes)
+            materials.append((law, self.assembly.add_solids(group, members)))
         return materials, thickness or 1.0
 
     def _axes(self, section: Section, members: Sequence[Element]) -> Any:
@@ -159,12 +158,12 @@ class Building:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
         for element in members:
-            if axes.part is not self.content.root and self.made.turned(element.scope):
+            if axes.part is not self.content.root and self.assembly.turned(element.scope):
                 raise axes.refuse(
                     "axes of a part whose instance is turned are not supported: give them in the assembly"
                 )
         if axes.distribution:
-            return axes_by_cell(self.made, axes, members)
+            return axes_by_cell(self.assembly, axes, members)
         if axes.cylindrical:
             a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
             return CylindricalAxes(tuple(a.tolist()), tuple((b - a).tolist()))
@@ -177,7 +176,7 @@ class Building:
         return material
 
     def _check_sections(self) -> None:
-        without = [element for element in self.made.solids if element.section is None]
+        without = [element for element in self.assembly.solids if element.section is None]
         if without:
             cell = without[0].cell
             many = "1 element" if len(without) == 1 else f"{len(without)} elements"
@@ -188,31 +187,34 @@ class Building:
         """Refuse pairs with undefined surfaces or an undefined interaction."""
         seen: set[str] = set()
         for pair in self.content.pairs:
-            secondary_group(self.found, pair.secondary, pair.location)
-            self.made.faces(pair.primary, pair.location)
+            secondary_group(self.assembly, pair.secondary, pair.location)
+            self.assembly.faces(pair.primary, pair.location)
             if not pair.tied:
                 defined("surface interaction", pair.interaction, self.content.interactions, pair)
             if folded(pair.name) in seen:
                 raise pair.refuse(f"the pair {pair.name} is given twice")
             seen.add(folded(pair.name))
 
-    def _groups(self, conditions: Conditions) -> list[tuple[str, Any, Table]]:
-        """Make groups of the facets whose pressures have the same history; return them with values and histories."""
+    def _pressures(self, conditions: Conditions) -> list[Callable[[Model], None]]:
+        """Make groups of the facets whose pressures have the same history; return functions that add these to a model."""
         alike = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
             for name in names:
-                for cell, rows in self.found.facet_rows([name.face] if name.face else []).items():
+                for cell, rows in self.assembly.facet_rows([name.face] if name.face else []).items():
                     alike.add((name.keyword, cell), table, rows)
-        loads = [(f"pressure {number}", *load) for number, load in enumerate(alike, start=1)]
-        self.found.groups |= {group: {cell: rows.tolist()} for group, (_, cell), rows, _, _ in loads}
-        return [(group, value, table) for group, _, _, value, table in loads]
+        pressures: list[Callable[[Model], None]] = []
+        for number, ((_, cell), facets, value, table) in enumerate(alike, start=1):
+            self.assembly.groups[group := f"pressure {number}"] = {cell: facets.tolist()}
+            if any(factor for _, factor in table):
+                pressures.append(partial(Model.add_pressure, group=group, value=value, ramp=table))
+        return pressures
 
     def _point_group(self, kind: str, points: Iterable[int]) -> str:
         """Return the name of a group of points of the mesh; it is made if there is none."""
-        before = len(self.found.point_groups)
-        name = self.found.add_points(f"{kind} {before}", points)
+        before = len(self.assembly.point_groups)
+        name = self.assembly.add_points(f"{kind} {before}", points)
         if name not in self.model.mesh.point_groups:
-            self.model.mesh = self.model.mesh.with_groups(points={name: self.found.point_groups[name]})
+            self.model.mesh = self.model.mesh.with_groups(points={name: self.assembly.point_groups[name]})
         return name
 
     def _supports(self, conditions: Conditions) -> None:
@@ -220,8 +222,8 @@ class Building:
         temporary = conditions.temporary()
         self._temporary_supports(conditions, temporary)
         at_times = {name for name, _ in temporary}
-        ends = {e.points[1] for e in self.made.discrete if e.cell.type == "GAPUNI"}
-        alone = ends - self.made.of_solids if ends else ends
+        ends = {e.points[1] for e in self.assembly.discrete if e.cell.type == "GAPUNI"}
+        alone = ends - self.assembly.of_solids if ends else ends
         for table, names in conditions.supports.alike():
             for name in (name for name in names if name not in at_times):
                 point, axis, local = name
@@ -237,8 +239,8 @@ class Building:
                 self.model.prescribe(group, ramp=table, **{"xyz"[axis]: value})
             else:
                 self.model.fix(group, "xyz"[axis])
-        if mesh.dim == 2 and self.found.rotations:
-            self.model.fix(self._point_group("rotation", self.found.rotations.values()), "y")
+        if mesh.dim == 2 and self.assembly.rotations:
+            self.model.fix(self._point_group("rotation", self.assembly.rotations.values()), "y")
 
     def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
         """Add the supports that do not act in all steps; those with the same times become one constraint."""
@@ -258,17 +260,15 @@ class Building:
         label = f"the support of {conditions.named(name)} on local axes"
         self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
 
-    def _relate_support(self, made: MultiPointConstraint) -> None:
-        self.local_supports.append(made)
-        self.model.relations.append(made)
+    def _relate_support(self, constraint: MultiPointConstraint) -> None:
+        self.local_supports.append(constraint)
+        self.model.relations.append(constraint)
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) of the displacement that a support prescribes [-]."""
         point, axis, local = name
-        dim = self.found.dim
-        direction = (conditions.directions[point] if local else np.eye(3))[axis][:dim]
-        columns = point * dim + np.arange(dim)
-        return csr_array((direction, (np.zeros(dim, int), columns)), shape=(1, self.model.n_dofs))
+        direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
+        return along(np.array([point]), direction, self.model.n_dofs)
 
     def _forces(self, conditions: Conditions) -> None:
         alike = ByShape[int]()
@@ -276,7 +276,7 @@ class Building:
             along: dict[tuple[int, float], list[int]] = {}
             for point, axis, local in names:
                 direction = conditions.directions[point][axis] if local else np.eye(3)[axis]
-                for k in np.flatnonzero(np.abs(direction[: self.found.dim]) > 1e-12).tolist():
+                for k in np.flatnonzero(np.abs(direction[: self.assembly.dim]) > 1e-12).tolist():
                     along.setdefault((k, float(direction[k])), []).append(point)
             for (k, cosine), points in along.items():
                 scaled = tuple((t, v * cosine / self.thickness) for t, v in table)
@@ -285,11 +285,6 @@ class Building:
             if any(factor for _, factor in table):
                 group = self._point_group("force", nodes)
                 self.model.add_force(group, distribute=False, ramp=table, **{"xyz"[axis]: value})
-
-    def _pressures(self, groups: list[tuple[str, Any, Table]]) -> None:
-        for group, value, table in groups:
-            if any(factor for _, factor in table):
-                self.model.add_pressure(group, value, ramp=table)
 
     def _body_forces(self, conditions: Conditions) -> None:
         alike = ByShape[tuple[str, tuple[float, ...], str]]()
@@ -302,13 +297,13 @@ class Building:
                         by_density.setdefault((cell, density), []).append(self.model.mesh.offsets[cell] + element.row)
                 for (cell, density), cells in by_density.items():
                     scaled = tuple((time, density * value) for time, value in table)
-                    alike.add((name.kind, name.vector, cell), scaled, cells)
+                    alike.add((name.kind, name.numbers, cell), scaled, cells)
         loads = [(f"load {number}", *load) for number, load in enumerate(alike, start=1)]
         self.model.mesh = self.model.mesh.with_groups(cells={group: cells for group, _, cells, _, _ in loads})
         for group, (kind, vector, _), _, value, table in loads:
-            self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.found.dim))
+            self.model.add_body_force(group, ramp=table, **_body_force(kind, vector, value, self.assembly.dim))
 
-    def _density(self, element: Element, name: Distributed, conditions: Conditions) -> float:
+    def _density(self, element: Element, name: Target, conditions: Conditions) -> float:
         if name.kind[0] == "B":
             return 1.0
         material = self._material(element.given_section)
@@ -319,25 +314,25 @@ class Building:
 
     def _springs(self) -> None:
         for name, (location, stiffness) in self.content.springs.items():
-            for element in self.made.elements_of(name, location):
+            for element in self.assembly.elements_of(name, location):
                 if element.cell.type != "SPRINGA":
                     raise location.refuse(f"element {element.number} is not a spring of type SPRINGA")
                 self.model.add_spring(element.points[0], element.points[1], axial=stiffness / self.thickness)
-        check_discrete(self.made, "SPRINGA", self.content.springs, "*SPRING")
+        check_discrete(self.assembly, "SPRINGA", self.content.springs, "*SPRING")
 
     def _contact(self) -> None:
         for pair in self.content.pairs:
-            secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
+            secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
             with refusing(pair):
                 options = self._tied(pair) if pair.tied else self._options(pair)
-                if secondary in self.found.loose:
+                if secondary in self.assembly.loose:
                     options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
         """Return the options that restrict contact to some nodes of the facets around them."""
-        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.found.loose[secondary])}
-        if all(map(all_nodes_carry, self.found.groups[secondary])):
+        options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.loose[secondary])}
+        if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
             pair, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
@@ -358,7 +353,7 @@ class Building:
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
-        options.update(_friction(law, len(self.content.steps)))
+        options.update(friction_of(law, len(self.content.steps)))
         if "friction" in options and self.content.heat:
             options.update(friction_heat_of(self.content, law))
         return {**options, **self._fitted(pair)}
@@ -377,8 +372,8 @@ class Building:
         """
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
-        secondary, primary = (group_of_surface(self.found, name) for name in (pair.secondary, pair.primary))
-        gaps, places = nodal_gaps(self.model, secondary, primary, self.found.loose.get(secondary, []))
+        secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
+        gaps, places = nodal_gaps(self.model, secondary, primary, self.assembly.loose.get(secondary, []))
         size = TOUCHING * float(np.ptp(self.model.mesh.points, axis=0).max())
         if glued:
             if gaps.max() > size or pair.clearance is not None:
@@ -423,74 +418,6 @@ class Building:
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
-
-
-def _friction(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the friction options of a pair; *CHANGE FRICTION changes them at the beginning of steps."""
-    table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
-    for before, changed in law.changes:
-        if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
-        table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
-        sticks |= {changed.stick} if changed.friction else set()
-    largest = max(value for _, value in table)
-    if not largest:
-        return {}
-    if len(sticks) > 1:
-        raise law.changes[0][1].refuse("a stick slope that changes is not supported: give the same one")
-    options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
-    if law.changes:
-        points = {**dict(table), float(n_steps): table[-1][1]}
-        options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
-    return options
-
-
-def _law(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model along axes, with its expansion, and with incompatible modes if elements have them."""
-    if content.heat == "alone":
-        return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
-    assert material.law is not None
-    law, expansion = material.law(axes), material.expansion
-    law = replace(law, density=material.density)
-    if isinstance(law, NonlinearElastic) and modes:
-        content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
-    elif modes:
-        law = replace(law, incompatible_modes=True)
-    if content.heat or material.conductivity is not None:
-        law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
-    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
-    if expansion is None:
-        if heated:
-            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
-        return replace(law, expansion=0.0) if heated else law
-    if not heated:
-        content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
-    return _with_axes(material, law, axes, expansion=expansion)
-
-
-def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; raises CaseError if heat is computed and there is none."""
-    block = material.conductivity
-    if content.heat:
-        if block is None:
-            raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
-        return conductivity_of(material, block)
-    if block is not None:
-        content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
-    return None
-
-
-def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
-    """Return a material with further constants; it becomes orthotropic where they differ along the axes."""
-    if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
-        if isinstance(law, NonlinearElastic):
-            raise material.refuse(
-                f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
-            )
-        G = law.E / (2.0 * (1.0 + law.nu))
-        others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
-        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
-    return replace(law, **constants)
 
 
 def _parts(step: Step) -> list[float]:

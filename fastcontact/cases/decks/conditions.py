@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fastcontact.cases.decks.assembled import Element, Face
 from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
@@ -14,6 +13,7 @@ from fastcontact.cases.decks.histories import Histories
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
+from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.cases.decks.temperatures import give as give_temperatures
 from fastcontact.cases.decks.temperatures import initial_temperatures
 from fastcontact.round_off import LENGTH_ROUND_OFF
@@ -21,17 +21,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
 # Point and component, counted from 0; supports on local axes have True as a third entry.
 Component = tuple[int, int, bool]
-
-
-@dataclass(frozen=True, slots=True)
-class Distributed:
-    """Target of a distributed load: its kind, its facets or elements, and its direction or axis."""
-
-    keyword: str
-    kind: str
-    face: Face | None = None
-    elements: tuple[Element, ...] = ()
-    vector: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,32 +39,30 @@ ALWAYS = Acting(None, 0.0)
 class Conditions:
     """Supports and loads of a deck with their histories."""
 
-    def __init__(self, mesh: DeckMesh) -> None:
-        self.mesh = mesh
-        self.made = mesh.made
-        content = self.made.content
+    def __init__(self, assembly: DeckMesh) -> None:
+        self.assembly, content = assembly, assembly.content
         self.supports: Histories[Component] = Histories(content)
         self.forces: Histories[Component] = Histories(content)
-        self.loads: Histories[Distributed] = Histories(content)
-        initial = initial_temperatures(self.made, content.initial)
+        self.loads: Histories[Target] = Histories(content)
+        initial = initial_temperatures(assembly, content.initial)
         self.temperatures: Histories[int] = Histories(content, rest=initial)
         self.acting: dict[Component, Acting] = {}  # supports that do not act from the start
         self.over: list[tuple[Component, Acting]] = []
         self.keeping: set[Component] = set()
-        self.heat = HeatConditions(mesh, initial)
-        self.locks = Locks(self.made)
-        self.directions = local_directions(self.made)
+        self.heat = HeatConditions(assembly, initial)
+        self.locks = Locks(assembly)
+        self.directions = local_directions(assembly)
 
     def run(self) -> None:
         """Go through all steps."""
-        content = self.made.content
+        content = self.assembly.content
         for given in content.supports:
             self._supports(given, before=True)
         self.supports.begin()
         self.heat.temperatures.begin()
         self.acting.update((name, replace(ALWAYS, keeps=True)) for name in self.keeping)
         for number, step in enumerate(content.steps, start=1):
-            self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.made)
+            self.locks.begin(number, [g for g in step.given if g.block.keyword == "BOUNDARY"], self.assembly)
             for given in step.given:
                 self._take(given)
             self._change(number)
@@ -88,7 +75,7 @@ class Conditions:
     def _take(self, given: Given) -> None:
         keyword = given.block.keyword
         if keyword == "TEMPERATURE":
-            give_temperatures(self.made, self.temperatures, given)
+            give_temperatures(self.assembly, self.temperatures, given)
         elif keyword in OF_HEAT:
             self.heat.take(given)
         else:
@@ -120,9 +107,9 @@ class Conditions:
     def named(self, component: Component) -> str:
         """Return the name of a component of a point in the deck."""
         point, axis, _ = component
-        if point >= sum(map(len, self.made.index.values())):
+        if point >= sum(map(len, self.assembly.index.values())):
             return f"rotation {axis + 1} of a reference node"
-        return f"component {axis + 1} of node {self.made.number_of(point)}"
+        return f"component {axis + 1} of node {self.assembly.number_of(point)}"
 
     def _supports(self, given: Given, before: bool = False) -> None:
         block = given.block
@@ -137,7 +124,7 @@ class Conditions:
             if row.text(1) == "11":
                 self.heat.prescribe(given, row)
                 continue
-            points = self.made.nodes(row.text(0), row.location)
+            points = self.assembly.nodes(row.text(0), row.location)
             named = NAMED.get(row.text(1).upper())
             if row.text(1).upper() in ("XASYMM", "YASYMM", "ZASYMM"):
                 raise row.refuse(f"{row.text(1)} is not supported: give the components")
@@ -152,7 +139,7 @@ class Conditions:
                 for component in components:
                     self._support(given, row, point, component, value)
         if driven:
-            self.made.content.note(block, "a displacement before the first step is reached in that step")
+            self.assembly.content.note(block, "a displacement before the first step is reached in that step")
 
     def _support(self, given: Given, row: Row, point: int, component: int, value: float) -> None:
         name = self._component(point, component)
@@ -174,19 +161,19 @@ class Conditions:
 
     def _component(self, point: int, component: int) -> Component | None:
         """Return the displacement component of a point, or of its rotation point; None if there is none."""
-        dim = self.mesh.dim
+        dim = self.assembly.dim
         if component <= dim:
             return point, component - 1, False
-        if point in self.mesh.rotations and component > 3:
+        if point in self.assembly.rotations and component > 3:
             axis = component - 4 if dim == 3 else {6: 0}.get(component, -1)
-            return (self.mesh.rotations[point], axis, False) if axis >= 0 else None
+            return (self.assembly.rotations[point], axis, False) if axis >= 0 else None
         return None
 
     def _local(self, point: int, component: int) -> tuple[Component, float]:
         """Return the component along a local axis: a global component with its sign where the axis is parallel to it."""
         direction = self.directions[point][component - 1]
         axis = int(np.argmax(np.abs(direction)))
-        if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.mesh.dim:
+        if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, component - 1, True), 1.0
 
@@ -195,7 +182,7 @@ class Conditions:
             self.forces.forget()
         for row in given.block.each():
             component, value = row.whole(1), row.number(2)
-            for point in self.made.nodes(row.text(0), row.location):
+            for point in self.assembly.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
                 if name is None:
                     raise row.refuse(f"a force cannot act on component {component} of this node")
@@ -208,24 +195,5 @@ class Conditions:
         if given.new:
             self.loads.forget(lambda name: name.keyword == keyword)
         for row in given.block.each():
-            for name, value in self._distributed(keyword, row):
-                self.loads.give(name, value, given.amplitude, row.location)
-
-    def _distributed(self, keyword: str, row: Row) -> list[tuple[Distributed, float]]:
-        label = row.text(1).upper()
-        if keyword == "DSLOAD":
-            if label != "P":
-                raise row.refuse(f"load {label[:40]} on a surface is not supported, only P")
-            faces, value = self.made.faces(row.text(0), row.location), row.number(2)
-            return [(Distributed(keyword, "P", face), value) for face in faces]
-        elements = self.made.elements_of(row.text(0), row.location) if row.text(0) else self.made.solids
-        if label[:1] == "P" and label[1:].isdigit():
-            facets = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in elements]
-            return [(Distributed(keyword, "P", face), row.number(2)) for face in facets]
-        size = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}.get(label)
-        if size is None:
-            raise row.refuse(f"load {label[:40]} is not supported; known are P1, P2, ..., GRAV, CENTRIF, BX, BY, BZ")
-        vector = tuple(row.number(3 + i, 0.0) for i in range(size))
-        if size and not any(vector[-3:]):
-            raise row.refuse(f"the direction of {label} is missing")
-        return [(Distributed(keyword, label, None, tuple(elements), vector), row.number(2))]
+            for target in targets(self.assembly, row):
+                self.loads.give(target, row.number(2), given.amplitude, row.location)

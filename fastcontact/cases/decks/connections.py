@@ -1,13 +1,13 @@
-"""Keywords of contact pairs, ties, equations, rigid bodies, couplings and local axes of nodes."""
+"""Keywords of contact pairs, ties, equations, rigid bodies and couplings."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, unquoted
-from fastcontact.cases.decks.content import Axes, Content, Equation, Link, MultiPoint, Pair, Pin
+from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint, Pair, Pin
 from fastcontact.cases.decks.cyclic_symmetry import sector_ends
-from fastcontact.cases.decks.multi_points import LEAST
+from fastcontact.cases.decks.relating import LEAST
 
 # Largest number of terms of an equation: more would couple everything to everything.
 MOST_TERMS = 100_000
@@ -136,12 +136,3 @@ def coupling(content: Content, block: Block, inner: Block) -> None:
             orientation=block.get("ORIENTATION"),
         )
     )  # fmt: skip
-
-
-def transform(content: Content, block: Block) -> None:
-    """*TRANSFORM: local axes of nodes."""
-    cylindrical = block.choice("TYPE", ("R", "C")) == "C"
-    if len(block.rows) != 1:
-        raise block.refuse("one data line with six coordinates is needed")
-    points = tuple(block.rows[0].number(i) for i in range(6))
-    content.axes.append(Axes(block.location, block.required("NSET"), cylindrical, points))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from fastcontact.cases.decks.blocks import Block, Located, Location, folded
+from fastcontact.cases.decks.blocks import Block, Item, Located, Location, folded
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,13 +28,12 @@ class Cell(Located):
 
 
 @dataclass(frozen=True, slots=True)
-class Members(Located):
+class Members(Item):
     """Entries of a set: numbers, or the name of another set, in an instance (empty: that of the definition).
 
     The numbers may come from several lines: `lines` holds the index of the first number and the line of each further one.
     """
 
-    location: Location
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
@@ -72,10 +71,9 @@ class SurfaceDefinition(Located):
 
 
 @dataclass(frozen=True)
-class Section(Located):
+class Section(Item):
     """Material and thickness (None: not given) of the elements of a set."""
 
-    location: Location
     elements: str
     material: str
     thickness: float | None = None
@@ -165,55 +163,49 @@ class Pair(Located):
 
 
 @dataclass(frozen=True)
-class SectorEnds(Located):
+class SectorEnds(Item):
     """The two end surfaces of a cyclic sector, and the name of their tie."""
 
-    location: Location
     name: str
     surfaces: tuple[str, str]
 
 
 @dataclass(frozen=True)
-class Sectors(Located):
+class Sectors(Item):
     """Number of cyclic sectors, two points of their axis, and the name of the tie of their ends."""
 
-    location: Location
     count: int
     tie: str
     points: tuple[float, ...]
 
 
 @dataclass(frozen=True)
-class Equation(Located):
+class Equation(Item):
     """A linear equation: node, component and coefficient of each term."""
 
-    location: Location
     terms: tuple[tuple[str, int, float], ...]
 
 
 @dataclass(frozen=True)
-class Pin(Located):
+class Pin(Item):
     """Nodes that follow the displacement of another node, or each of them that of a node in another set."""
 
-    location: Location
     first: str
     second: str
 
 
 @dataclass(frozen=True)
-class MultiPoint(Located):
+class MultiPoint(Item):
     """Nodes that stay in a plane or on a line, or whose mean rotation is that of the last node."""
 
-    location: Location
     kind: str
     nodes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class Link(Located):
+class Link(Item):
     """A reference node with the nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
 
-    location: Location
     reference: str
     group: str
     kind: str  # nodes, elements or surface
@@ -224,20 +216,18 @@ class Link(Located):
 
 
 @dataclass(frozen=True)
-class PretensionSection(Located):
+class PretensionSection(Item):
     """A pretension section of a bolt: its surface, the node that carries its shortening and force, and its normal."""
 
-    location: Location
     surface: str
     node: str
     normal: tuple[float, ...] | None
 
 
 @dataclass(frozen=True)
-class Axes(Located):
+class Axes(Item):
     """Local axes of nodes or materials: rectangular, by a point on the first axis and one in the plane, or cylindrical."""
 
-    location: Location
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Block, folded, unquoted
+from fastcontact.cases.decks.blocks import Block, folded, refusing, unquoted
 from fastcontact.cases.decks.content import Content, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
-from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.model import Model
 
@@ -38,7 +37,7 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
     """Add the cyclic symmetries of the deck to the model; return their constraints."""
-    content, before = deck_mesh.made.content, len(model.relations)
+    content, before = deck_mesh.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
         ends = _ends(content, sectors)
@@ -48,7 +47,7 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
             raise sectors.refuse("the axis of a plane model is along z: give two points above each other")
         for name in ends.surfaces:
-            deck_mesh.made.faces(name, ends.location)
+            deck_mesh.faces(name, ends.location)
         groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
         with refusing(sectors):
             model.add_cyclic_symmetry(

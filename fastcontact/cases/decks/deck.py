@@ -20,7 +20,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.decks.blocks import Location, read_blocks
 from fastcontact.cases.decks.building import Building
 from fastcontact.cases.decks.content import Content
-from fastcontact.cases.decks.reading import read_content
+from fastcontact.cases.decks.keywords import read_content
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
@@ -117,11 +117,11 @@ class Deck:
 
         MeshError if there is no such node.
         """
-        made = self.building.made
-        scope, rest = made.place_of(str(number))
-        if not rest.isdecimal() or int(rest[:19]) not in made.index[scope]:
+        assembly = self.building.assembly
+        scope, rest = assembly.place_of(str(number))
+        if not rest.isdecimal() or int(rest[:19]) not in assembly.index[scope]:
             raise MeshError(f"node '{number}' is not defined in '{self.path.name}'")
-        return made.index[scope][int(rest[:19])]
+        return assembly.index[scope][int(rest[:19])]
 
     def finished(self, step: StepResult) -> StepResult:
         """Return a step of the model with the reactions of supports alone and forces of the whole thickness."""
@@ -160,10 +160,10 @@ class Deck:
         held = self.model.prescribed()[0].ravel()
         for support in self.building.local_supports:
             if not isinstance(support, TemporaryConstraint) or support.acts_from(instant):
-                held[support.rows.indices[support.rows.data != 0.0]] = True
+                held[support.rows.indices] = True
         rows = [link.rows for link in links]
         forces = multipliers(reaction.ravel(), rows, held)
-        linked = sum((own.T @ force for own, force in zip(rows, forces, strict=True)), np.zeros(held.size))
+        linked = sum((R.T @ force for R, force in zip(rows, forces, strict=True)), np.zeros(held.size))
         return reaction - linked.reshape(reaction.shape)
 
     def _largest_strain(self, step: StepResult) -> float:

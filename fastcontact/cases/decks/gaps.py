@@ -1,4 +1,4 @@
-"""Gap elements of a deck: contact of the faces around their nodes with a rigid plane, or with the faces of another body."""
+"""Gap elements and springs of a deck: contact of the faces around nodes with a rigid plane or the faces of another body."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.cases.decks.assembled import Assembled, facet_points
-from fastcontact.cases.decks.blocks import Located, Location
+from fastcontact.cases.decks.assembled import Assembly, facet_points
+from fastcontact.cases.decks.blocks import Block, Located, Location, folded, refusing
 from fastcontact.cases.decks.conditions import Conditions
+from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.meshing import DeckMesh
-from fastcontact.cases.decks.refusals import refusing
 from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
@@ -49,25 +49,44 @@ class GapGroup(Located):
     opposite: str
 
 
-def check_discrete(made: Assembled, kind: str, given: Mapping[str, Any], needed: str) -> None:
+def gap(content: Content, block: Block) -> None:
+    """*GAP: clearance and direction of gap elements."""
+    row = block.only()
+    direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
+    if not any(direction):
+        raise row.refuse("the direction of the gap elements is missing")
+    content.gaps[folded(block.required("ELSET"))] = (block.location, row.number(0), direction)
+
+
+def spring(content: Content, block: Block) -> None:
+    """*SPRING: stiffness of springs along their axis."""
+    rows = block.rows
+    if len(rows) != 1:
+        raise block.refuse("linear springs along their line need an empty line and then one with the stiffness")
+    if rows[0].text(1):
+        raise rows[0].refuse("only linear springs are supported: one stiffness")
+    content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
+
+
+def check_discrete(assembly: Assembly, kind: str, given: Mapping[str, Any], needed: str) -> None:
     """Refuse springs and gap elements without properties."""
-    with_one = {element for name, entry in given.items() for element in made.elements_of(name, entry[0])}
-    for element in made.discrete:
+    with_one = {element for name, entry in given.items() for element in assembly.elements_of(name, entry[0])}
+    for element in assembly.discrete:
         if element.cell.type == kind and element not in with_one:
             raise element.cell.refuse(f"element {element.number} of type {kind} has no {needed}")
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
     """Make groups of the facets around the nodes of gap elements; raises CaseError if these do not fill whole facets."""
-    made, groups = deck_mesh.made, []
-    check_discrete(made, "GAPUNI", made.content.gaps, "*GAP")
-    for name, (location, clearance, vector) in made.content.gaps.items():
-        gap_elements = made.elements_of(name, location)
+    groups = []
+    check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
+    for name, (location, clearance, vector) in deck_mesh.content.gaps.items():
+        gap_elements = deck_mesh.elements_of(name, location)
         if any(element.cell.type != "GAPUNI" for element in gap_elements):
             raise location.refuse("acts on elements of type GAPUNI only")
-        shown = made.content.root.set_names.get(name, name)
+        shown = deck_mesh.content.root.set_names.get(name, name)
         ends = np.array([element.points for element in gap_elements], np.intp)
-        bodies = all(point in made.of_solids for point in ends[:, 1].tolist())
+        bodies = all(point in deck_mesh.of_solids for point in ends[:, 1].tolist())
         groups.append(
             GapGroup(
                 shown, location, clearance, np.array(vector)[: deck_mesh.dim] / np.linalg.norm(vector), ends,
@@ -81,7 +100,7 @@ def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
 def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
     """Make a group of the facets with all nodes among points; raises CaseError if a point belongs to none of them."""
     chosen = set(points.tolist())
-    faces = deck_mesh.made.faces_within(chosen)
+    faces = deck_mesh.faces_within(chosen)
     if {p for face in faces for p in facet_points(*face)} != chosen:
         raise location.refuse(
             "gap elements are supported on all nodes of whole faces only, from a body to another or to held nodes"
@@ -98,11 +117,8 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
-        if (
-            np.ptp(along) > size
-            or np.abs(between - np.outer(along, gap.direction)).max() > size
-            or along.mean() < -size
-        ):
+        off = np.abs(between - np.outer(along, gap.direction)).max()
+        if max(np.ptp(along), off, -along.mean()) > size:
             raise gap.refuse(
                 "gap elements between bodies are supported along their direction, in planes across it only"
             )

@@ -1,4 +1,4 @@
-"""Keywords of the geometry: nodes, elements, sets, surfaces, parts, instances."""
+"""Keywords of the geometry: nodes, elements, sets, surfaces, sections, parts, instances."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from array import array
 from collections.abc import Iterator
 from itertools import groupby
 
-from fastcontact.cases.decks.blocks import Block, Row, folded, unquoted
-from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, SurfaceDefinition
+from fastcontact.cases.decks.blocks import Block, Row, defined, folded, registered, unquoted
+from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import described, element_type
-from fastcontact.cases.decks.refusals import defined, registered
 from fastcontact.mesh import elements
 
 # Numbers of nodes of the supported elements that are not solids.
@@ -119,29 +118,43 @@ def _members(block: Block) -> list[Members]:
 def surface(content: Content, part: Part, block: Block) -> None:
     """*SURFACE: faces of elements, or nodes."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
-    made = registered("surface", name, part.surfaces, SurfaceDefinition(name, block.location, kind == "NODE"), block)
+    definition = SurfaceDefinition(name, block.location, kind == "NODE")
+    registered("surface", name, part.surfaces, definition, block)
     for row in block.each():
         label = row.text(1).upper()
-        if not made.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
+        if not definition.of_nodes and label and not (label[0] == "S" and label[1:].isdigit()):
             raise row.refuse(f"face '{row.text(1)[:40]}' is not supported: faces of solids are S1, S2, ...")
-        made.faces.append(Face(row.location, row.text(0), "" if made.of_nodes else label))
+        definition.faces.append(Face(row.location, row.text(0), "" if definition.of_nodes else label))
 
 
 def instance(content: Content, block: Block) -> Instance:
     """*INSTANCE: a part placed in the assembly."""
     name, of = block.required("NAME"), block.required("PART")
-    made = Instance(name, defined("part", of, content.parts, block))
+    placed = Instance(name, defined("part", of, content.parts, block))
     rows = block.rows
     if rows:
-        made.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
+        placed.translation = tuple(rows[0].number(i, 0.0) for i in range(3))
     if len(rows) > 1:
-        made.rotation = tuple(rows[1].number(i) for i in range(7))
+        placed.rotation = tuple(rows[1].number(i) for i in range(7))
     if len(rows) > 2:
         raise rows[2].refuse("an instance has at most two data lines: a translation and a rotation")
-    return registered("instance", name, content.instances, made, block)
+    return registered("instance", name, content.instances, placed, block)
 
 
 def new_part(content: Content, block: Block) -> Part:
     """*PART."""
     name = block.required("NAME")
     return registered("part", name, content.parts, Part(unquoted(name)), block)
+
+
+def section(content: Content, part: Part, block: Block) -> None:
+    """*SOLID SECTION: the material of the elements of a set."""
+    thickness = None
+    for row in block.rows[:1]:
+        thickness = row.number(0, 1.0)
+        if not thickness > 0:
+            raise row.refuse(f"the thickness {thickness:g} must be positive")
+    orientation = block.get("ORIENTATION")
+    part.sections.append(
+        Section(block.location, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)
+    )

@@ -1,24 +1,20 @@
-"""Heat conduction of a deck: conductivity and conductance; temperatures, fluxes and films of its steps as loads."""
+"""Heat conduction of a deck: temperatures, fluxes and films of its steps as loads of the model."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import Any, Generic
 
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element, Face
-from fastcontact.cases.decks.blocks import Block, Location, Row
-from fastcontact.cases.decks.content import Content, Given, Interaction, Material, Step
+from fastcontact.cases.decks.assembled import Assembly, Face
+from fastcontact.cases.decks.blocks import Block, Row
+from fastcontact.cases.decks.content import Content, Given, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
-from fastcontact.cases.decks.refusals import refusing
-from fastcontact.contact.conductance import Conductance
-from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -26,99 +22,11 @@ from fastcontact.model.ramp import Table
 OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 # Number of the temperature degree of freedom.
 TEMPERATURE = 11
-# The bodies in steps of pure heat conduction, which are fixed.
-HELD = LinearElastic(E=1.0, nu=0.0)
-# Conductance of ties relative to conductivity over model size: the sides differ in temperature by about its inverse.
-PERFECT = 1e8
-# Clearance, relative to the last one of a table, beyond which no heat is conducted.
-BEYOND = 1.0 + 1e-9
-
-
-def conductivity(content: Content, current: Material, block: Block) -> None:
-    """*CONDUCTIVITY: stored until it is known whether heat is computed."""
-    current.conductivity = block
-
-
-def specific_heat(content: Content, current: Material, block: Block) -> None:
-    """*SPECIFIC HEAT: without effect in static and steady-state steps."""
-    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def physical_constants(content: Content, block: Block) -> None:
     """*PHYSICAL CONSTANTS: constants of radiation, without effect."""
     content.note(block, "no effect: there is no radiation")
-
-
-def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP CONDUCTANCE: stored until it is known whether heat is computed."""
-    current.conductance.append(block)
-
-
-def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP HEAT GENERATION: the fraction of the friction work that becomes heat, half of it on each side."""
-    row = block.rows[0] if block.rows else Row(block.location, ())
-    share, secondary = row.number(0, 1.0), row.number(1, 0.5)
-    if not 0.0 <= share <= 1.0:
-        raise row.refuse(f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1")
-    if secondary != 0.5:
-        raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
-    if row.number(2, 0.0) > 0.0:
-        raise row.refuse("a given velocity is not supported: sides slide by their displacements")
-    current.friction_heat = block.location, share
-
-
-def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the conductance options of a contact pair, by pressure or clearance; none without a table."""
-    tables: dict[str, Any] = {}
-    for block in law.conductance:
-        rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
-        if len({row.number(2, 0.0) for row in block.rows}) > 1:
-            raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
-        if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.refuse("needs conductances with pressures or clearances that ascend")
-        if len(rows) == 1:
-            tables["number"] = rows[0][1]
-            continue
-        pressure = "PRESSURE" in block.parameters
-        by = "pressure" if pressure or rows[-1][1] >= rows[0][1] else "gap"
-        if not pressure:
-            meant = (
-                "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
-            )
-            content.note(block, f"the conductance is by what it {meant}")
-        end = (rows[-1][0] * BEYOND, 0.0)
-        tables[by] = rows if by == "pressure" else [*rows, end]
-        if by == "pressure" and content.heat == "alone":
-            content.note(block, "steps of heat alone have no pressures: sides that touch conduct as without any")
-    given = tables.pop("number", None)
-    if given is not None and tables:
-        raise law.conductance[0].refuse("one conductance, and a table besides: give one of them")
-    if given is None and not tables:
-        return {}
-    with refusing(law.conductance[0]):
-        Conductance(law.name, tables or given)
-    return {"conductance": tables or given}
-
-
-def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option for frictional heating of both sides, with the step length as time."""
-    if law.friction_heat is None:
-        if law.conductance:
-            content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
-        return {}
-    location, share = law.friction_heat
-    periods = {step.period for step in content.steps}
-    if len(periods) > 1:
-        raise location.refuse("heat of friction is supported in steps of the same length only, which is their time")
-    return {"friction_heat": share / periods.pop()}
-
-
-def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie, independent of pressure and gap."""
-    largest = max(np.max(material.conductivity) for material, _ in model.materials)
-    h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
-    content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
-    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h
 
 
 def check_steps(content: Content) -> None:
@@ -140,16 +48,6 @@ def check_steps(content: Content) -> None:
                 raise block.refuse(
                     "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
                 )
-
-
-@dataclass(frozen=True)
-class Exchange:
-    """Target of a flux or a film: a face or elements; the coefficient of a film, None for a flux."""
-
-    keyword: str
-    face: Face | None
-    elements: tuple[Element, ...] = ()
-    coefficient: float | None = None
 
 
 class Spans(Generic[Name]):
@@ -179,19 +77,18 @@ class Spans(Generic[Name]):
 class HeatConditions:
     """Prescribed temperatures, nodal heat, fluxes and films of a deck, with their histories."""
 
-    def __init__(self, deck_mesh: DeckMesh, initial: Mapping[int, float]) -> None:
-        self.found, self.made = deck_mesh, deck_mesh.made
-        content = self.made.content
-        self.reference = _reference(self.made, initial) if content.heat else 0.0
-        self.rest: dict[Exchange, float] = {}
-        of_points = dict.fromkeys(range(len(self.made.points)), self.reference) if content.heat else {}
+    def __init__(self, assembly: DeckMesh, initial: Mapping[int, float]) -> None:
+        self.assembly, content = assembly, assembly.content
+        self.reference = _reference(assembly, initial) if content.heat else 0.0
+        self.rest: dict[Target, float] = {}
+        of_points = dict.fromkeys(range(len(assembly.points)), self.reference) if content.heat else {}
         self.temperatures: Histories[int] = Histories(content, rest=of_points)
         self.powers: Histories[int] = Histories(content)
-        self.fluxes: Histories[Exchange] = Histories(content)
-        self.films: Histories[Exchange] = Histories(content, rest=self.rest)
+        self.fluxes: Histories[Target] = Histories(content)
+        self.films: Histories[Target] = Histories(content, rest=self.rest)
         self.fixed: Spans[int] = Spans()
-        self.blown: Spans[Exchange] = Spans()
-        self.film_of: dict[tuple[str, Face | None], Exchange] = {}
+        self.blown: Spans[Target] = Spans()
+        self.film_of: dict[tuple[str, Face | None], Target] = {}
         self.begun = False
 
     @property
@@ -201,7 +98,7 @@ class HeatConditions:
 
     def prescribe(self, given: Given, row: Row) -> None:
         """Prescribe the temperature of nodes from a line of *BOUNDARY."""
-        if not self.made.content.heat:
+        if not self.assembly.content.heat:
             raise row.refuse("component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE")
         if "FIXED" in given.block.parameters:
             raise row.refuse("FIXED is not supported for temperatures: give them")
@@ -210,10 +107,10 @@ class HeatConditions:
 
     def _of_solids(self, row: Row) -> list[int]:
         """Return the points of the node set in a line; raises CaseError if one belongs to no solid."""
-        points = self.made.nodes(row.text(0), row.location)
+        points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
-            if point not in self.made.of_solids:
-                raise row.refuse(f"node {self.made.number_of(point)} belongs to no solid, so it has no temperature")
+            if point not in self.assembly.of_solids:
+                raise row.refuse(f"node {self.assembly.number_of(point)} belongs to no solid, so it has no temperature")
         return points
 
     def take(self, given: Given) -> None:
@@ -233,39 +130,22 @@ class HeatConditions:
             film = history is self.films
             if film and row.number(3) < 0.0:
                 raise row.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
-            for name in self._places(keyword, row, row.number(3) if film else None):
+            for target in targets(self.assembly, row, (row.number(3),) if film else ()):
                 if film:
-                    self._in_place_of_others(name, row)
-                history.give(name, row.number(2), given.amplitude, row.location)
+                    self._in_place_of_others(target, row)
+                history.give(target, row.number(2), given.amplitude, row.location)
 
-    def _in_place_of_others(self, film: Exchange, row: Row) -> None:
+    def _in_place_of_others(self, film: Target, row: Row) -> None:
         """Replace a film that has another coefficient on the same face."""
         self.rest[film] = self.reference
         before = self.film_of.get((film.keyword, film.face))
         if before is not None and before != film:
             if before in self.films.changing:
-                raise row.refuse(
-                    f"{film.coefficient:g} is the second coefficient here in one step, after {before.coefficient:g}"
-                )
+                (new,), (old,) = film.numbers, before.numbers
+                raise row.refuse(f"{new:g} is the second coefficient here in one step, after {old:g}")
             if before in self.films.tracks and self.films.tracks[before].alive:
                 self.films.dying[before] = None
         self.film_of[film.keyword, film.face] = film
-
-    def _places(self, keyword: str, row: Row, coefficient: float | None) -> list[Exchange]:
-        """Return the targets of a line of fluxes or films."""
-        label, letter = row.text(1).upper(), "S" if coefficient is None else "F"
-        if keyword in ("DSFLUX", "SFILM"):
-            if label != letter:
-                raise row.refuse(f"{label[:40]} on a surface is not supported, only {letter}")
-            return [Exchange(keyword, face, (), coefficient) for face in self.made.faces(row.text(0), row.location)]
-        elements = self.made.elements_of(row.text(0), row.location)
-        if label[:1] == letter and label[1:].isdigit():
-            faces = [(element, self.made.facet(element, int(label[1:]), row.location)) for element in elements]
-            return [Exchange(keyword, face, (), coefficient) for face in faces]
-        if label == "BF" and keyword == "DFLUX":
-            return [Exchange(keyword, None, tuple(elements))]
-        known = f"{letter}1, {letter}2, ..." + (", BF" if keyword == "DFLUX" else "")
-        raise row.refuse(f"{label[:40]} is not supported; known are {known}")
 
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
@@ -278,7 +158,7 @@ class HeatConditions:
 
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
         """Make the mesh groups of all heat loads; return functions that add them to a model."""
-        found, made = self.found, []  # type: DeckMesh, list[Callable[[Model], None]]
+        assembly, adders = self.assembly, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
         risen = ByShape[int]()
         for table, names in self.temperatures.alike():
@@ -286,37 +166,37 @@ class HeatConditions:
                 spans += [span] * (span not in spans)
                 risen.add(spans.index(span), self._risen(table), points)
         for number, nodes, value, table in risen:
-            group = found.add_points(f"temperature {len(made)}", nodes)
+            group = assembly.add_points(f"temperature {len(adders)}", nodes)
             fixed = {"value": _above(value, self.reference), "ramp": table, **_between(spans[number])}
-            made.append(partial(Model.fix_temperature, group=group, **fixed))
+            adders.append(partial(Model.fix_temperature, group=group, **fixed))
         for _, nodes, value, table in ByShape.of(self.powers.alike()):
-            group = found.add_points(f"heat {len(made)}", nodes)
+            group = assembly.add_points(f"heat {len(adders)}", nodes)
             powers = tuple((time, power / thickness) for time, power in table)
-            made.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
+            adders.append(partial(Model.add_nodal_heat, group=group, value=value, ramp=powers))
         sources = ByShape[str]()
         on_faces = ByShape[tuple[str, str]]()
         for table, fluxes in self.fluxes.alike():
             for flux in fluxes:
-                for cell, rows in found.facet_rows([flux.face] if flux.face else []).items():
+                for cell, rows in assembly.facet_rows([flux.face] if flux.face else []).items():
                     on_faces.add((flux.keyword, cell), table, rows)
                 for cell, rows in rows_by_type(flux.elements).items():
                     sources.add(cell, table, rows)
         for cell, indices, value, table in sources:
-            found.groups[group := f"heat source {len(made)}"] = {cell: indices.tolist()}
-            made.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
+            assembly.groups[group := f"heat source {len(adders)}"] = {cell: indices.tolist()}
+            adders.append(partial(Model.add_heat_source, value=value, groups=group, ramp=table))
         for (keyword, cell), indices, value, table in on_faces:
-            found.groups[group := f"{keyword.lower()} {len(made)}"] = {cell: indices.tolist()}
-            made.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
+            assembly.groups[group := f"{keyword.lower()} {len(adders)}"] = {cell: indices.tolist()}
+            adders.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
         blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
         for table, films in self.films.alike():
             for span, members in self.blown.of(films).items():
                 for film in members:
                     assert film.face is not None
-                    blown.setdefault((table, film.coefficient or 0.0, span), []).append(film.face)
+                    blown.setdefault((table, film.numbers[0], span), []).append(film.face)
         for (table, coefficient, span), faces in blown.items():
-            group = found.add_facets(f"film {len(made)}", faces)
-            made.append(partial(self._film(group, coefficient, table), **_between(span)))
-        return made
+            group = assembly.add_facets(f"film {len(adders)}", faces)
+            adders.append(partial(self._film(group, coefficient, table), **_between(span)))
+        return adders
 
     def _risen(self, table: Table) -> Table:
         """Return a temperature history relative to the reference temperature."""
@@ -344,10 +224,10 @@ def _above(value: Any, reference: float) -> Any:
     return risen if callable(value) else value + reference
 
 
-def _reference(made: Assembled, initial: Mapping[int, float]) -> float:
+def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
     """Return the initial temperature of all solids; zero if it varies and no material expands."""
-    content = made.content
-    values = {initial.get(point, 0.0) for point in made.of_solids}
+    content = assembly.content
+    values = {initial.get(point, 0.0) for point in assembly.of_solids}
     if len(values) == 1:
         return values.pop()
     location = content.initial[0].location

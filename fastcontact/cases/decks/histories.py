@@ -266,10 +266,10 @@ class ByShape(Generic[Name]):
     @staticmethod
     def of(alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
         """Return the histories of points without axis; the axis is 0."""
-        made = ByShape[int]()
+        by_shape = ByShape[int]()
         for table, points in alike:
-            made.add(0, table, points)
-        return made
+            by_shape.add(0, table, points)
+        return by_shape
 
     def __iter__(self) -> Iterator[tuple[Name, Indices, Any, Table]]:
         for (axis, shape), (table, sizes, members) in self._members.items():

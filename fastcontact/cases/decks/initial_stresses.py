@@ -16,7 +16,7 @@ ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     """Add the initial stresses to a model; of several lines for an element, the last one counts."""
-    content, names = deck_mesh.made.content, ORDER[deck_mesh.dim]
+    content, names = deck_mesh.content, ORDER[deck_mesh.dim]
     if not content.stresses:
         return
     starts = starts_of(model.mesh.solids)
@@ -29,7 +29,7 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
                     f"{', '.join(names)} of its stress; stresses by integration point are not supported"
                 )
             numbers = [row.number(index) for index in range(1, 1 + len(names))]
-            for element in deck_mesh.made.elements_of(row.text(0), row.location):
+            for element in deck_mesh.elements_of(row.text(0), row.location):
                 if element.type is None:
                     raise row.refuse(f"element {element.number} is not a solid, so it has no initial stress")
                 if element.section is not None and element.section.orientation:

@@ -1,25 +1,27 @@
-"""The keywords of decks: their context, the function that reads them, their parameters; and the unsupported keywords."""
+"""The keywords of decks: their context, the function that reads them, their parameters; and the reader of all blocks."""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from fastcontact.cases.decks import (
-    cohesive,
     connections,
     cyclic_symmetry,
+    gaps,
     geometry,
     heat,
-    nonlinear,
+    interactions,
+    local_axes,
+    materials,
     pretension,
-    properties,
     stepping,
     temperatures,
 )
 from fastcontact.cases.decks.blocks import Block
+from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 
 # Placeholder for a keyword that accepts any parameter.
 ANYTHING = "*"
@@ -45,127 +47,109 @@ STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXD
 # Supported keywords.
 TRANSLATED = {
     # Keywords handled by the reader itself.
-    "ASSEMBLY": Keyword("deck", None, "NAME"),
+    **dict.fromkeys(("ASSEMBLY", "MATERIAL", "PART", "SURFACE INTERACTION"), Keyword("deck", None, "NAME")),
+    **dict.fromkeys(("END ASSEMBLY", "END INSTANCE", "END PART", "END STEP"), Keyword("deck")),
+    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("deck")),
     "CHANGE FRICTION": Keyword("deck", None, "INTERACTION"),
     "COUPLING": Keyword("deck", None, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
-    "DISTRIBUTING": Keyword("deck"),
-    "END ASSEMBLY": Keyword("deck"),
-    "END INSTANCE": Keyword("deck"),
-    "END PART": Keyword("deck"),
-    "END STEP": Keyword("deck"),
     "HEADING": Keyword("deck", None, ANYTHING),
     "INSTANCE": Keyword("deck", None, "NAME; PART"),
-    "KINEMATIC": Keyword("deck"),
-    "MATERIAL": Keyword("deck", None, "NAME"),
-    "PART": Keyword("deck", None, "NAME"),
     "STEP": Keyword(
         "deck", None, "NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
     ),
-    "SURFACE INTERACTION": Keyword("deck", None, "NAME"),
     # In parts, or in decks without parts.
-    "DISTRIBUTION": Keyword("part", properties.distribution, "NAME; LOCATION", "TABLE"),
-    "DISTRIBUTION TABLE": Keyword("part", properties.distribution_table, ANYTHING),
+    "DISTRIBUTION": Keyword("part", local_axes.distribution, "NAME; LOCATION", "TABLE"),
+    "DISTRIBUTION TABLE": Keyword("part", local_axes.distribution_table, ANYTHING),
     "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
     "ELSET": Keyword("part", geometry.element_set, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "NODE": Keyword("part", geometry.nodes, "NSET; SYSTEM"),
     "NSET": Keyword("part", geometry.node_set, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
-    "ORIENTATION": Keyword("part", properties.orientation, "NAME; SYSTEM; DEFINITION"),
-    "SOLID SECTION": Keyword("part", properties.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
+    "ORIENTATION": Keyword("part", local_axes.orientation, "NAME; SYSTEM; DEFINITION"),
+    "SOLID SECTION": Keyword("part", geometry.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
     "SURFACE": Keyword("part", geometry.surface, "NAME; TYPE", "INTERNAL"),
     # Below *MATERIAL.
-    "CONDUCTIVITY": Keyword("material", heat.conductivity, ANYTHING),
-    "DENSITY": Keyword("material", properties.density),
-    "ELASTIC": Keyword("material", properties.elastic, "TYPE"),
-    "EXPANSION": Keyword("material", temperatures.expansion, "TYPE", "ZERO"),
-    "HYPERELASTIC": Keyword("material", nonlinear.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
-    "PLASTIC": Keyword("material", nonlinear.plastic, "HARDENING"),
-    "SPECIFIC HEAT": Keyword("material", heat.specific_heat, ANYTHING),
+    "CONDUCTIVITY": Keyword("material", materials.conductivity, ANYTHING),
+    "DENSITY": Keyword("material", materials.density),
+    "ELASTIC": Keyword("material", materials.elastic, "TYPE"),
+    "EXPANSION": Keyword("material", materials.expansion, "TYPE", "ZERO"),
+    "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
+    "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
+    "SPECIFIC HEAT": Keyword("material", materials.specific_heat, ANYTHING),
     # Below *SURFACE INTERACTION.
-    "COHESIVE BEHAVIOR": Keyword("interaction", cohesive.keep, "TYPE; ELIGIBILITY"),
+    "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
-        "interaction", cohesive.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
+        "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
-    "DAMAGE INITIATION": Keyword("interaction", cohesive.keep, "CRITERION"),
-    "DAMAGE STABILIZATION": Keyword("interaction", cohesive.stabilization, ANYTHING),
-    "FRICTION": Keyword("interaction", properties.friction),
-    "GAP CONDUCTANCE": Keyword("interaction", heat.gap_conductance, "PRESSURE"),
-    "GAP HEAT GENERATION": Keyword("interaction", heat.gap_heat_generation),
-    "SURFACE BEHAVIOR": Keyword("interaction", properties.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
+    "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
+    "DAMAGE STABILIZATION": Keyword("interaction", interactions.stabilization, ANYTHING),
+    "FRICTION": Keyword("interaction", interactions.friction),
+    "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
+    "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
+    "SURFACE BEHAVIOR": Keyword("interaction", interactions.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
     # In the whole model.
-    "AMPLITUDE": Keyword("model", properties.amplitude, "NAME; TIME; DEFINITION; VALUE"),
+    "AMPLITUDE": Keyword("model", stepping.amplitude, "NAME; TIME; DEFINITION; VALUE"),
     "CLEARANCE": Keyword("model", connections.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
     "CONTACT PAIR": Keyword("model", connections.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
     "EQUATION": Keyword("model", connections.equation),
-    "GAP": Keyword("model", properties.gap, "ELSET"),
+    "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", temperatures.initial_conditions, "TYPE"),
     "MPC": Keyword("model", connections.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", connections.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
-    "SPRING": Keyword("model", properties.spring, "ELSET"),
+    "SPRING": Keyword("model", gaps.spring, "ELSET"),
     "TIE": Keyword("model", connections.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
-    "TRANSFORM": Keyword("model", connections.transform, "NSET; TYPE"),
+    "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
     "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
-    "CFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "CLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "DFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "DLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "DSFLUX": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "DSLOAD": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "FILM": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "SFILM": Keyword("step", stepping.given, "OP; AMPLITUDE"),
-    "TEMPERATURE": Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    **dict.fromkeys(
+        ("CFLUX", "CLOAD", "DFLUX", "DLOAD", "DSFLUX", "DSLOAD", "FILM", "SFILM", "TEMPERATURE"),
+        Keyword("step", stepping.given, "OP; AMPLITUDE"),
+    ),
     # Procedures of steps.
-    "COUPLED TEMPERATURE-DISPLACEMENT": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
+    **dict.fromkeys(
+        ("COUPLED TEMPERATURE-DISPLACEMENT", "HEAT TRANSFER", "UNCOUPLED TEMPERATURE-DISPLACEMENT"),
+        Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
+    ),
     "FREQUENCY": Keyword("procedure", stepping.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
-    "HEAT TRANSFER": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
     "STATIC": Keyword("procedure", stepping.static, "", STEERING),
-    "UNCOUPLED TEMPERATURE-DISPLACEMENT": Keyword("procedure", stepping.heated, "STEADY STATE", STEERING),
 }
 # Output requests, since results contain all output, and convergence controls, since the package has its own criteria.
-OUTPUT = (
-    "CONTACT FILE", "CONTACT OUTPUT", "CONTACT PRINT", "EL FILE", "EL PRINT", "ELEMENT OUTPUT", "ENERGY FILE",
-    "ENERGY OUTPUT",
-    "ENERGY PRINT", "FACE PRINT", "FILE FORMAT", "FILE OUTPUT", "MONITOR", "NODE FILE", "NODE OUTPUT", "NODE PRINT", "OUTPUT",
-    "PREPRINT", "PRINT", "RESTART", "SECTION FILE", "SECTION PRINT", "TIME POINTS", "CONTROLS",
-)  # fmt: skip
-# Reasons why other keywords of the format are refused.
-LINEAR = "is outside the scope of fastcontact (elastic, elastic-plastic and hyperelastic materials)"
-STATIC = "is outside the scope of fastcontact (quasi-static: *STATIC, steady heat, and *FREQUENCY behind them)"
-SOLIDS = "is outside the scope of fastcontact (solid elements only)"
-HEAT = "is outside the scope of fastcontact (steady conduction of heat, without radiation)"
-NOT_YET = "is not supported"
-REFUSED = {
-    **dict.fromkeys(
-        ("HYPERFOAM", "CREEP", "CYCLIC HARDENING",
-         "DEFORMATION PLASTICITY", "DRUCKER PRAGER", "MOHR COULOMB", "VISCOELASTIC", "USER MATERIAL", "DEPVAR",
-         "CONCRETE DAMAGED PLASTICITY", "GASKET BEHAVIOR", "RATE DEPENDENT", "NO COMPRESSION"), LINEAR),
-    **dict.fromkeys(
-        ("DYNAMIC", "BUCKLE", "MODAL DYNAMIC", "STEADY STATE DYNAMICS", "VISCO", "ELECTROMAGNETICS",
-         "COMPLEX FREQUENCY", "SENSITIVITY",
-         "DAMPING", "MODAL DAMPING", "GREEN", "CRACK PROPAGATION", "GEOSTATIC", "CONTACT DAMPING",
-         "FEASIBLE DIRECTION"), STATIC),
-    **dict.fromkeys(
-        ("SHELL SECTION", "BEAM SECTION", "MEMBRANE SECTION", "BEAM GENERAL SECTION", "SHELL GENERAL SECTION",
-         "FLUID SECTION",
-         "CONNECTOR SECTION", "COHESIVE SECTION", "GASKET SECTION", "MASS", "ROTARY INERTIA", "DASHPOT", "NODAL THICKNESS",
-         "SURFACE SECTION", "RIGID SURFACE", "TRANSVERSE SHEAR STIFFNESS"), SOLIDS),
-    **dict.fromkeys(
-        ("RADIATE", "SRADIATE", "CAVITY DEFINITION", "FILM PROPERTY", "CFILM", "GAP RADIATION"), HEAT),
-    **dict.fromkeys(
-        ("CONTACT", "CONTACT INCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
-         "BASE MOTION",
-         "SUBMODEL", "MODEL CHANGE", "CHANGE CONTACT TYPE", "CONTACT CONTROLS", "FRACTURE CRITERION", "DEBOND",
-         "CONTACT INITIALIZATION DATA", "CONTACT STABILIZATION", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY",
-         "ELCOPY", "PARAMETER", "MATRIX INPUT", "SUPER ELEMENT", "USER ELEMENT", "DISTRIBUTING COUPLING",
-         "KINEMATIC COUPLING",
-         "CONNECTOR BEHAVIOR", "EMBEDDED ELEMENT", "FIELD", "VALUES AT INFINITY", "FILTER", "IMPERFECTION",
-         "IMPORT"), NOT_YET),
-}  # fmt: skip
-
-
+_OUTPUT = (
+    "CONTACT FILE; CONTACT OUTPUT; CONTACT PRINT; EL FILE; EL PRINT; ELEMENT OUTPUT; ENERGY FILE; ENERGY OUTPUT; "
+    "ENERGY PRINT; FACE PRINT; FILE FORMAT; FILE OUTPUT; MONITOR; NODE FILE; NODE OUTPUT; NODE PRINT; OUTPUT; "
+    "PREPRINT; PRINT; RESTART; SECTION FILE; SECTION PRINT; TIME POINTS; CONTROLS"
+)
+OUTPUT = _OUTPUT.split("; ")
+# Other keywords of the format, by the reason why they are refused.
+_REASONS = {
+    "is outside the scope of fastcontact (elastic, elastic-plastic and hyperelastic materials)": (
+        "HYPERFOAM; CREEP; CYCLIC HARDENING; DEFORMATION PLASTICITY; DRUCKER PRAGER; MOHR COULOMB; VISCOELASTIC; "
+        "USER MATERIAL; DEPVAR; CONCRETE DAMAGED PLASTICITY; GASKET BEHAVIOR; RATE DEPENDENT; NO COMPRESSION"
+    ),
+    "is outside the scope of fastcontact (quasi-static: *STATIC, steady heat, and *FREQUENCY behind them)": (
+        "DYNAMIC; BUCKLE; MODAL DYNAMIC; STEADY STATE DYNAMICS; VISCO; ELECTROMAGNETICS; COMPLEX FREQUENCY; "
+        "SENSITIVITY; DAMPING; MODAL DAMPING; GREEN; CRACK PROPAGATION; GEOSTATIC; CONTACT DAMPING; "
+        "FEASIBLE DIRECTION"
+    ),
+    "is outside the scope of fastcontact (solid elements only)": (
+        "SHELL SECTION; BEAM SECTION; MEMBRANE SECTION; BEAM GENERAL SECTION; SHELL GENERAL SECTION; FLUID SECTION; "
+        "CONNECTOR SECTION; COHESIVE SECTION; GASKET SECTION; MASS; ROTARY INERTIA; DASHPOT; NODAL THICKNESS; "
+        "SURFACE SECTION; RIGID SURFACE; TRANSVERSE SHEAR STIFFNESS"
+    ),
+    "is outside the scope of fastcontact (steady conduction of heat, without radiation)": (
+        "RADIATE; SRADIATE; CAVITY DEFINITION; FILM PROPERTY; CFILM; GAP RADIATION"
+    ),
+    "is not supported": (
+        "CONTACT; CONTACT INCLUSIONS; CONTACT PROPERTY ASSIGNMENT; BASE MOTION; SUBMODEL; MODEL CHANGE; "
+        "CHANGE CONTACT TYPE; CONTACT CONTROLS; FRACTURE CRITERION; DEBOND; CONTACT INITIALIZATION DATA; "
+        "CONTACT STABILIZATION; SYSTEM; NGEN; NFILL; ELGEN; NCOPY; ELCOPY; PARAMETER; MATRIX INPUT; SUPER ELEMENT; "
+        "USER ELEMENT; DISTRIBUTING COUPLING; KINEMATIC COUPLING; CONNECTOR BEHAVIOR; EMBEDDED ELEMENT; FIELD; "
+        "VALUES AT INFINITY; FILTER; IMPERFECTION; IMPORT"
+    ),
+}
+REFUSED = {name: reason for reason, names in _REASONS.items() for name in names.split("; ")}
 _SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFUSED)}
 
 
@@ -196,3 +180,134 @@ def checked(block: Block, about: str) -> Keyword:
             takes = ", ".join(sorted(known.parameters)) or "none"
             raise block.refuse(f"the parameter {name[:40]} of *{keyword} is not supported; it takes {takes}")
     return known
+
+
+# Keywords that belong below another one, by their place, and the message where they do not follow it.
+OWNERS = {
+    "material": "belongs below *MATERIAL",
+    "interaction": "belongs below *SURFACE INTERACTION",
+    "procedure": "belongs in a step",
+}
+# Damage keywords, which are supported for cohesive layers only.
+COHESIVE_DAMAGE = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATION")
+
+
+@dataclass
+class Reader:
+    """State while a deck is read: the open part, instance, material, interaction, step and coupling."""
+
+    content: Content = field(default_factory=Content)
+    part: Part | None = None
+    instance: Instance | None = None
+    material: Material | None = None
+    interaction: Interaction | None = None
+    step: Step | None = None
+    coupling: Block | None = None
+
+    def take(self, block: Block) -> None:
+        """Read one block."""
+        keyword, content = block.keyword, self.content
+        if keyword in OUTPUT:
+            content.outputs.append(block.location)
+            return
+        known = checked(block, f"material '{self.material.name}': " if self.material else "")
+        if self.coupling is not None and keyword not in ("KINEMATIC", "DISTRIBUTING"):
+            raise self.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+        if self.material is not None and keyword in COHESIVE_DAMAGE:
+            name = self.material.name
+            raise block.refuse(f"material '{name}': damage is supported for cohesive layers only, not in bodies")
+        owner = {
+            "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
+            "procedure": self.step, "step": self.step,
+        }.get(known.place)  # fmt: skip
+        if owner is None and known.place in OWNERS:
+            raise block.refuse(OWNERS[known.place])
+        if known.place != "material":
+            self.material = None
+        if known.place not in ("material", "interaction"):
+            self.interaction = None
+        if known.place in ("part", "model") and keyword != "AMPLITUDE":
+            self._not_in_step(block)
+        if known.place in ("model", "step"):
+            self._not_in_part(block)
+        if known.place == "part" and self.instance is not None:
+            raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
+        if known.read is None:
+            getattr(self, "_" + keyword.lower().replace(" ", "_"))(block)
+        else:
+            known.read(content, *([] if known.place == "model" else [owner]), block)
+
+    def _not_in_step(self, block: Block) -> None:
+        if self.step is not None:
+            raise block.refuse("cannot be inside a step")
+
+    def _not_in_part(self, block: Block) -> None:
+        if self.part is not None or self.instance is not None:
+            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
+
+    def _heading(self, block: Block) -> None:
+        self.content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
+
+    def _assembly(self, block: Block) -> None:
+        self.part = None
+
+    _end_part = _end_assembly = _assembly
+
+    def _part(self, block: Block) -> None:
+        self.part = geometry.new_part(self.content, block)
+
+    def _instance(self, block: Block) -> None:
+        self.instance = geometry.instance(self.content, block)
+
+    def _end_instance(self, block: Block) -> None:
+        self.instance = None
+
+    def _material(self, block: Block) -> None:
+        self._not_in_step(block)
+        self.material = materials.material(self.content, block)
+
+    def _surface_interaction(self, block: Block) -> None:
+        self._not_in_step(block)
+        self.interaction = interactions.interaction(self.content, block)
+
+    def _change_friction(self, block: Block) -> None:
+        if self.step is None:
+            raise block.refuse("belongs in a step")
+        self.interaction = interactions.changed_interaction(self.content, block)
+
+    def _coupling(self, block: Block) -> None:
+        self._not_in_step(block)
+        self.coupling = block
+
+    def _kinematic(self, block: Block) -> None:
+        if self.coupling is None:
+            raise block.refuse("belongs below *COUPLING")
+        connections.coupling(self.content, self.coupling, block)
+        self.coupling = None
+
+    _distributing = _kinematic
+
+    def _step(self, block: Block) -> None:
+        if self.step is not None:
+            raise block.refuse("the previous step has no *END STEP")
+        self._not_in_part(block)
+        self.step = stepping.new_step(self.content, block)
+
+    def _end_step(self, block: Block) -> None:
+        if self.step is None:
+            raise block.refuse("there is no step to end")
+        stepping.end_step(self.content, self.step)
+        self.step = None
+
+
+def read_content(blocks: Iterable[Block]) -> Content:
+    """Return the content of the blocks of a deck; raises CaseError with file, line and keyword if it is invalid."""
+    reader = Reader()
+    for block in blocks:
+        reader.take(spelled(block))
+    if reader.step is not None:
+        raise reader.step.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
+    if reader.coupling is not None:
+        raise reader.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
+    heat.check_steps(reader.content)
+    return reader.content

@@ -1,24 +1,71 @@
-"""Local axes of nodes and materials of a deck: *TRANSFORM and *ORIENTATION, rectangular or cylindrical."""
+"""Local axes of a deck, rectangular or cylindrical: *TRANSFORM of nodes; *ORIENTATION and *DISTRIBUTION of materials."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembled, Element
-from fastcontact.cases.decks.blocks import Location, folded
-from fastcontact.cases.decks.content import Axes, Content
+from fastcontact.cases.decks.assembled import Assembly, Element
+from fastcontact.cases.decks.blocks import Block, Location, folded, registered, unquoted
+from fastcontact.cases.decks.content import Axes, Content, Part
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
-def local_directions(made: Assembled) -> dict[int, Array]:
+def orientation(content: Content, part: Part, block: Block) -> None:
+    """*ORIENTATION: material axes."""
+    name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
+    block.choice("DEFINITION", ("COORDINATES",))
+    rows, key = block.rows, folded(name)
+    points: tuple[float, ...] = ()
+    if key in content.orientations:
+        raise block.refuse(
+            f"orientation '{name}' is defined twice, first in line {content.orientations[key].location.line}"
+        )
+    if not rows:
+        raise block.refuse("a data line with six coordinates is needed")
+    distribution = unquoted(rows[0].text(0)) if re.match("[A-Za-z_]", rows[0].text(0)) else ""
+    if distribution and system == "CYLINDRICAL":
+        raise block.refuse("a distribution of axes is supported with SYSTEM=RECTANGULAR only")
+    if not distribution:
+        points = tuple(rows[0].number(i) for i in range(6))
+        if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
+            raise rows[0].refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+    if len(rows) > 1 and rows[1].number(1, 0.0):
+        raise rows[1].refuse("a further rotation of the axes is not supported: turn the points of the first line")
+    content.orientations[key] = Axes(block.location, "", system == "CYLINDRICAL", points, distribution, part)
+
+
+def distribution_table(content: Content, part: Part, block: Block) -> None:
+    """*DISTRIBUTION TABLE: content of distributions; only axes of cells are supported."""
+    kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
+    if kinds != ["COORD3D", "COORD3D"]:
+        raise block.refuse(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
+
+
+def distribution(content: Content, part: Part, block: Block) -> None:
+    """*DISTRIBUTION: two points for the axes of each cell, relative to the origin; the line without a cell is the default."""
+    block.choice("LOCATION", ("ELEMENT",))
+    registered("distribution", block.required("NAME"), content.distributions, block, block)
+
+
+def transform(content: Content, block: Block) -> None:
+    """*TRANSFORM: local axes of nodes."""
+    cylindrical = block.choice("TYPE", ("R", "C")) == "C"
+    if len(block.rows) != 1:
+        raise block.refuse("one data line with six coordinates is needed")
+    points = tuple(block.rows[0].number(i) for i in range(6))
+    content.axes.append(Axes(block.location, block.required("NSET"), cylindrical, points))
+
+
+def local_directions(assembly: Assembly) -> dict[int, Array]:
     """Return the local axes (3, 3), as rows, of the points of all nodes with *TRANSFORM [-]."""
     return {
-        point: local_axes(axes, made.points[point])
-        for axes in made.content.axes
-        for point in made.nodes(axes.nodes, axes.location)
+        point: local_axes(axes, assembly.points[point])
+        for axes in assembly.content.axes
+        for point in assembly.nodes(axes.nodes, axes.location)
     }
 
 
@@ -35,15 +82,15 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
     return axes
 
 
-def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Array:
+def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> Array:
     """Return the axes (n, 3, 3) of the solids of the mesh, for `members` from a *DISTRIBUTION [-].
 
     Other solids have the axes of the mesh. Raises CaseError if an element has no axes and there is no default line.
     """
-    block = made.content.distributions.get(folded(axes.distribution))
+    block = assembly.content.distributions.get(folded(axes.distribution))
     if block is None:
         raise axes.refuse(f"distribution '{axes.distribution[:80]}' is not defined")
-    scopes = [scope for scope in made.scopes if made.part(scope) is axes.part]
+    scopes = [scope for scope in assembly.scopes if assembly.part(scope) is axes.part]
     default, given = None, {}  # type: Array | None, dict[int, Array]
     for row in block.each():
         points = tuple(row.number(index) for index in range(1, 7))
@@ -52,10 +99,10 @@ def axes_by_cell(made: Assembled, axes: Axes, members: Sequence[Element]) -> Arr
             default = frame
             continue
         for scope in scopes:
-            for element in made.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
+            for element in assembly.elements_of(f"{scope}.{row.text(0)}" if scope else row.text(0), row.location):
                 given[id(element)] = frame
-    first = dict(zip(made.by_kind, np.cumsum([0, *map(len, made.by_kind.values())]).tolist()))
-    frames = np.tile(np.eye(3), (len(made.solids), 1, 1))
+    first = dict(zip(assembly.by_kind, np.cumsum([0, *map(len, assembly.by_kind.values())]).tolist()))
+    frames = np.tile(np.eye(3), (len(assembly.solids), 1, 1))
     for element in members:
         axes_here = given.get(id(element), default)
         if axes_here is None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from fastcontact.arrays import Indices
-from fastcontact.cases.decks.assembled import Assembled, Element, Face, facet_points
+from fastcontact.cases.decks.assembled import Assembly, Element, Face, assemble, facet_points
 from fastcontact.cases.decks.blocks import Location, folded
-from fastcontact.cases.decks.content import SurfaceDefinition
+from fastcontact.cases.decks.content import Content, SurfaceDefinition
 from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
@@ -20,14 +21,11 @@ FLAT = 1e-9
 
 
 @dataclass
-class DeckMesh:
-    """A mesh under construction.
+class DeckMesh(Assembly):
+    """The assembly of a deck, and its mesh under construction.
 
     Attributes
     ----------
-    made : Assembled
-    kinematics : str
-    dim : int
     rotations : dict of int to int
         By reference point: the point whose displacement is its rotation [radian], in the plane its first component.
     facets : dict of str to list of tuple of int
@@ -40,15 +38,22 @@ class DeckMesh:
         By group of the facets around a surface of nodes: the facet points that are not in the surface.
     """
 
-    made: Assembled
-    kinematics: str
-    dim: int
     rotations: dict[int, int] = field(default_factory=dict)
     facets: dict[str, list[tuple[int, ...]]] = field(default_factory=dict)
     rows: dict[tuple[int, ...], int] = field(default_factory=dict)
     groups: dict[str, dict[str, list[int]]] = field(default_factory=dict)
     point_groups: dict[str, Indices] = field(default_factory=dict)
     loose: dict[str, list[int]] = field(default_factory=dict)
+
+    @cached_property
+    def kinematics(self) -> str:
+        """Kinematics of its solids."""
+        return self.solids[0].solid.kinematics
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the mesh."""
+        return 3 if self.kinematics == "3d" else 2
 
     def add_facets(self, group: str, faces: Iterable[Face]) -> str:
         """Make a group of facets, given as elements and indices of their facets; return its name."""
@@ -85,13 +90,13 @@ class DeckMesh:
     def rotation(self, point: int) -> int:
         """Return the point that carries the rotation of a reference point; it is made if there is none."""
         if point not in self.rotations:
-            self.rotations[point] = len(self.made.points)
-            self.made.points = np.concatenate([self.made.points, self.made.points[[point]]])
+            self.rotations[point] = len(self.points)
+            self.points = np.concatenate([self.points, self.points[[point]]])
         return self.rotations[point]
 
     def mesh(self) -> Mesh:
         """Return the mesh, with inverted solids reoriented."""
-        solids = {name: [element.points for element in own] for name, own in self.made.by_kind.items()}
+        solids = {name: [element.points for element in members] for name, members in self.by_kind.items()}
         cells = {name: np.array(block, np.int32) for name, block in {**solids, **self.facets}.items()}
         del solids
         starts = starts_of(cells)
@@ -99,11 +104,11 @@ class DeckMesh:
             group: np.concatenate([[], *(starts[name] + np.array(rows) for name, rows in members.items())]).astype(int)
             for group, members in self.groups.items()
         }
-        points = self.made.points[:, : self.dim]
+        points = self.points[:, : self.dim]
         mesh = Mesh(points, cells, groups, self.point_groups)
         mesh, turned = topology.oriented(mesh)
         if turned:
-            self.made.content.notes.append(f"{turned} elements were inside out and are turned")
+            self.content.notes.append(f"{turned} elements were inside out and are turned")
         return mesh
 
 
@@ -121,75 +126,77 @@ def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
     return rows
 
 
-def begun(made: Assembled) -> DeckMesh:
+def begun(content: Content) -> DeckMesh:
     """Return the mesh of a deck, still without facets, with groups for its sets.
 
     Raises CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
     """
-    if not made.solids:
-        raise made.content.steps[0].refuse("the deck has no solid elements")
-    first = made.solids[0].solid
-    for element in made.solids:
+    deck_mesh = DeckMesh(content)
+    assemble(deck_mesh)
+    if not deck_mesh.solids:
+        raise content.steps[0].refuse("the deck has no solid elements")
+    first = deck_mesh.solids[0].solid
+    for element in deck_mesh.solids:
         if element.solid.kinematics != first.kinematics:
             raise element.cell.refuse(
                 f"elements of type {element.solid.name} and {first.name} ({first.kinematics}) cannot be in one model"
             )
-        if element.solid.conducts and made.content.heat != "alone":
+        if element.solid.conducts and content.heat != "alone":
             raise element.cell.refuse(
                 f"elements of type {element.solid.name} conduct heat alone: they need steps with *HEAT TRANSFER, all of them"
             )
-    dim, points = 3 if first.kinematics == "3d" else 2, made.points
-    if dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
-        raise made.solids[0].cell.refuse(f"elements of type {first.name} lie in the plane z = const, but z differs")
-    deck_mesh = DeckMesh(made, first.kinematics, dim)
+    points = deck_mesh.points
+    if deck_mesh.dim == 2 and np.ptp(points[:, 2]) > FLAT * np.ptp(points[:, :2]):
+        raise deck_mesh.solids[0].cell.refuse(
+            f"elements of type {first.name} lie in the plane z = const, but z differs"
+        )
     _name_sets(deck_mesh)
     return deck_mesh
 
 
 def _name_sets(deck_mesh: DeckMesh) -> None:
     """Name groups after the sets and surfaces of the deck; those of parts after ``Instance.name``."""
-    made = deck_mesh.made
-    for scope in made.scopes:
-        part = made.part(scope)
-        prefix = f"{made.content.instances[scope].name}." if scope else ""
+    for scope in deck_mesh.scopes:
+        part = deck_mesh.part(scope)
+        prefix = f"{deck_mesh.content.instances[scope].name}." if scope else ""
         for name, members in part.node_sets.items():
-            points = made.members_of("node", scope, name, members[0].location) if members else []
+            points = deck_mesh.members_of("node", scope, name, members[0].location) if members else []
             deck_mesh.point_groups[prefix + part.set_names[name]] = ascending(points)
         for name, definition in part.surfaces.items():
             if definition.of_nodes and definition.faces:
                 _name_nodes(deck_mesh, prefix + definition.name, definition, scope)
             elif definition.faces:  # an unused surface may be empty
-                faces = made.faces(f"{scope}.{name}" if scope else name, definition.location)
+                faces = deck_mesh.faces(f"{scope}.{name}" if scope else name, definition.location)
                 deck_mesh.add_facets(prefix + definition.name, faces)
         for name, members in part.element_sets.items():
             if name not in part.surfaces and members:
                 deck_mesh.add_solids(
-                    prefix + part.set_names[name], made.members_of("element", scope, name, members[0].location)
+                    prefix + part.set_names[name], deck_mesh.members_of("element", scope, name, members[0].location)
                 )
 
 
 def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
     """Name the facets around the nodes of a surface; facet points that are not in the surface are `loose`."""
-    whole, further, left = deck_mesh.made.faces_of_nodes(definition, scope)
+    whole, further, left = deck_mesh.faces_of_nodes(definition, scope)
     if not (whole or further):  # the nodes belong to no solid
         return
     deck_mesh.add_facets(group, [*whole, *further])
     if left:
         points = {point for face in (*whole, *further) for point in facet_points(*face)}
-        deck_mesh.loose[group] = sorted(points.difference(deck_mesh.made.surface_nodes(definition, scope)))
+        deck_mesh.loose[group] = sorted(points.difference(deck_mesh.surface_nodes(definition, scope)))
 
 
 def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
     """Return the group of a surface, of faces or nodes, as secondary side; raises CaseError for nodes on no outer face."""
-    definition, scope = deck_mesh.made.surface(name, location)
+    definition, scope = deck_mesh.surface(name, location)
     if not definition.of_nodes:
         return group_of_surface(deck_mesh, name)
-    whole, further, _ = deck_mesh.made.faces_of_nodes(definition, scope)
+    whole, further, _ = deck_mesh.faces_of_nodes(definition, scope)
     carried = {point for face in (*whole, *further) for point in facet_points(*face)}
-    for point in deck_mesh.made.surface_nodes(definition, scope):
+    for point in deck_mesh.surface_nodes(definition, scope):
         if point not in carried:
             raise definition.refuse(
-                f"node {deck_mesh.made.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
+                f"node {deck_mesh.number_of(point)} of surface '{definition.name}' is on no outer face of a solid: "
                 "contact needs nodes of bodies, so leave it out"
             )
     return group_of_surface(deck_mesh, name)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.cases.decks.assembled import Assembled, facet_points
-from fastcontact.cases.decks.blocks import Block
+from fastcontact.cases.decks.assembled import Assembly, facet_points
+from fastcontact.cases.decks.blocks import Block, refusing
 from fastcontact.cases.decks.content import Content, Given, PretensionSection
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
-from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.mesh import Mesh
@@ -29,13 +28,12 @@ def pretension_section(content: Content, block: Block) -> None:
     )
 
 
-def section_points(made: Assembled) -> dict[int, PretensionSection]:
+def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
     """Return the sections by the point of their node; raises CaseError if it belongs to a body or another section."""
-    used = {point for solid in made.solids for point in solid.points}
     sections: dict[int, PretensionSection] = {}
-    for section in made.content.pretensions:
-        point = made.node(section.node, section.location)
-        if point in used:
+    for section in assembly.content.pretensions:
+        point = assembly.node(section.node, section.location)
+        if point in assembly.of_solids:
             raise section.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
         if point in sections:
             raise section.refuse(f"node {section.node} has a section already, in line {sections[point].location.line}")
@@ -46,17 +44,19 @@ def section_points(made: Assembled) -> dict[int, PretensionSection]:
 class Locks:
     """The load factors from which pretension sections keep their length."""
 
-    def __init__(self, made: Assembled) -> None:
-        self.points = section_points(made)
+    def __init__(self, assembly: Assembly) -> None:
+        self.points = section_points(assembly)
         self.begins: dict[int, float] = {}
         self.number = 0
 
-    def begin(self, number: int, supports: list[Given], made: Assembled) -> None:
+    def begin(self, number: int, supports: list[Given], assembly: Assembly) -> None:
         """Advance to a step; raises CaseError if it releases a section that was locked before."""
         self.number = number
         if not any(given.new for given in supports):
             return
-        named = {p for given in supports for row in given.block.each() for p in made.nodes(row.text(0), row.location)}
+        named = {
+            p for given in supports for row in given.block.each() for p in assembly.nodes(row.text(0), row.location)
+        }
         for point in self.begins:
             if point not in named:
                 location = next(given.block.location for given in supports if given.new)
@@ -75,8 +75,8 @@ class Locks:
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
     """Return the mesh cut along all pretension sections."""
     sections: set[str] = set()
-    for section in deck_mesh.made.content.pretensions:
-        deck_mesh.made.faces(section.surface, section.location)
+    for section in deck_mesh.content.pretensions:
+        deck_mesh.faces(section.surface, section.location)
         group = group_of_surface(deck_mesh, section.surface)
         if group in sections:
             raise section.refuse(f"surface '{group}' has a pretension section already")
@@ -110,7 +110,7 @@ def _side(deck_mesh: DeckMesh, section: PretensionSection) -> float:
     """
     if section.normal is None:
         return 1.0
-    points, outward = deck_mesh.made.points, np.zeros(3)
-    for solid, facet in deck_mesh.made.faces(section.surface, section.location):
+    points, outward = deck_mesh.points, np.zeros(3)
+    for solid, facet in deck_mesh.faces(section.surface, section.location):
         outward += points[list(facet_points(solid, facet))].mean(axis=0) - points[list(solid.points)].mean(axis=0)
     return float(np.copysign(1.0, outward @ np.array(section.normal)))

@@ -1,18 +1,18 @@
-"""Linear constraints of a deck: equations, rigid bodies and couplings, as rows over all displacement components."""
+"""Linear constraints of a deck: equations, multi-point constraints, rigid bodies and couplings, for small displacements."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
-from fastcontact.cases.decks.content import Equation, Link, Pin
+from fastcontact.cases.decks.blocks import refusing
+from fastcontact.cases.decks.content import Equation, Link, MultiPoint, Pin
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
-from fastcontact.cases.decks.meshing import DeckMesh
-from fastcontact.cases.decks.multi_points import multi_point_rows
-from fastcontact.cases.decks.refusals import refusing
+from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.loads import Traction
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.mesh import Mesh
@@ -21,10 +21,10 @@ from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows,
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
     """Add a rotation point for every reference node, before the mesh is made."""
-    for link in deck_mesh.made.content.links:
-        point = deck_mesh.made.node(link.reference, link.location)
+    for link in deck_mesh.content.links:
+        point = deck_mesh.node(link.reference, link.location)
         if link.rotation:
-            deck_mesh.rotations[point] = deck_mesh.made.node(link.rotation, link.location)
+            deck_mesh.rotations[point] = deck_mesh.node(link.rotation, link.location)
         elif deck_mesh.kinematics == "axisymmetric":
             raise link.refuse("is not supported in axisymmetric models: relate the nodes by *EQUATION")
         else:
@@ -33,23 +33,23 @@ def make_rotations(deck_mesh: DeckMesh) -> None:
 
 def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
     """Return the constraints of all equations, rigid bodies and couplings."""
-    content = deck_mesh.made.content
-    axes = local_directions(deck_mesh.made)
+    content = deck_mesh.content
+    axes = local_directions(deck_mesh)
     rows = [_equation(deck_mesh, equation, axes) for equation in content.equations]
     rows += [row for pin in content.pins for row in _pinned(deck_mesh, pin)]
     rows += [row for constraint in content.multi_points for row in multi_point_rows(deck_mesh, constraint)]
-    made = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
+    constraints = [relation("the equations of the deck", rows, mesh.points.shape)] if rows else []
     for link in content.links:
-        rows = _distributing(deck_mesh, mesh, link) if link.distributing else _rigid(deck_mesh, link)
-        made.append(relation(f"*{link.location.keyword} of line {link.location.line}", rows, mesh.points.shape))
-    return made
+        name = f"*{link.location.keyword} of line {link.location.line}"
+        constraints.append(MultiPointConstraint(name, _link_rows(deck_mesh, mesh, link)))
+    return constraints
 
 
 def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]) -> list[Term]:
     """Return the terms of an equation along the global axes; its components refer to the local `axes` of points."""
     terms: list[Term] = []
     for name, component, coefficient in equation.terms:
-        point = deck_mesh.made.node(name, equation.location)
+        point = deck_mesh.node(name, equation.location)
         if not 1 <= component <= deck_mesh.dim:
             raise equation.refuse(f"component {component} of '{name}' is not within 1 to {deck_mesh.dim}")
         along = axes.get(point, np.eye(3))[component - 1]
@@ -61,7 +61,7 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
 
 def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
     """Return the equations that set the displacements of nodes equal to those of others."""
-    first, second = (deck_mesh.made.nodes(name, pin.location) for name in (pin.first, pin.second))
+    first, second = (deck_mesh.nodes(name, pin.location) for name in (pin.first, pin.second))
     if len(second) == 1:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
@@ -76,79 +76,123 @@ def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
 
 def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
     """Return the points that follow a reference point, without the point itself."""
-    made = deck_mesh.made
     if link.kind == "nodes":
-        points = made.nodes(link.group, link.location)
+        points = deck_mesh.nodes(link.group, link.location)
     elif link.kind == "elements":
-        elements = made.elements_of(link.group, link.location)
+        elements = deck_mesh.elements_of(link.group, link.location)
         points = [p for element in elements if element.type is not None for p in element.points]
     else:
-        definition, scope = made.surface(link.group, link.location)
+        definition, scope = deck_mesh.surface(link.group, link.location)
         if definition.of_nodes:
-            points = made.surface_nodes(definition, scope)
+            points = deck_mesh.surface_nodes(definition, scope)
         else:
-            points = [p for face in made.faces(link.group, link.location) for p in facet_points(*face)]
-    reference = made.node(link.reference, link.location)
+            points = [p for face in deck_mesh.faces(link.group, link.location) for p in facet_points(*face)]
+    reference = deck_mesh.node(link.reference, link.location)
     kept = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not kept:
         raise link.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
     return kept
 
 
-def _reference(deck_mesh: DeckMesh, link: Link) -> ReferencePoint:
-    point = deck_mesh.made.node(link.reference, link.location)
-    return ReferencePoint(
-        point, deck_mesh.rotations[point], tuple(deck_mesh.made.points[point][: deck_mesh.dim].tolist())
+def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
+    """Return the rows that make nodes follow a reference point, or it the area-weighted mean motion of a surface."""
+    n_dofs = mesh.points.size
+    point = deck_mesh.node(link.reference, link.location)
+    reference = ReferencePoint(
+        point, deck_mesh.rotations[point], tuple(deck_mesh.points[point][: deck_mesh.dim].tolist())
     )
-
-
-def _rigid(deck_mesh: DeckMesh, link: Link) -> list[list[Term]]:
-    """Return the equations that make nodes follow the rigid motion of a reference point."""
-    points, dim = np.array(_points(deck_mesh, link), np.intp), deck_mesh.dim
-    rows = rigid_rows(_reference(deck_mesh, link), points, deck_mesh.made.points[points, :dim], range(dim))
-    along = [_directions(deck_mesh, link, point) for point in points.tolist()]
-    return [row for i, axes in enumerate(along) for row in _along(rows[i * dim : (i + 1) * dim], axes)]
+    points = np.array(_points(deck_mesh, link), np.intp)
+    places = deck_mesh.points[points, : deck_mesh.dim]
+    if not link.distributing:
+        directions = np.array([_directions(deck_mesh, link, follower) for follower in points.tolist()])
+        return rigid_rows(reference, points, places, directions, n_dofs)
+    deck_mesh.faces(link.group, link.location)
+    surface = Traction(group_of_surface(deck_mesh, link.group), {0: 1.0}, None)
+    areas = surface.vector(mesh, deck_mesh.kinematics)[:, 0]
+    weight = areas[points] / areas[points].sum()
+    with refusing(link):
+        return distributing_rows(reference, points, places, weight, _directions(deck_mesh, link, point), n_dofs)
 
 
 def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
     """Return the directions (n, dim) that a coupling constrains at a point [-]."""
     axes = np.eye(3)
     if link.orientation:
-        axes = local_axes(
-            orientation_of(deck_mesh.made.content, link.orientation, link.location), deck_mesh.made.points[point]
-        )
+        axes = local_axes(orientation_of(deck_mesh.content, link.orientation, link.location), deck_mesh.points[point])
     return axes[[component - 1 for component in link.components if component <= deck_mesh.dim], : deck_mesh.dim]
 
 
-def _along(rows: Sequence[Sequence[Term]], directions: Array) -> list[list[Term]]:
-    """Return equations for displacements along `directions` (n, dim) from those for each axis."""
+# Least numbers of nodes by kind.
+LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
+# Points closer to a line or point than this fraction of their extent have no direction from it.
+FLAT = 1e-9
+
+
+def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
+    """Return the equations of a multi-point constraint; raises CaseError if its nodes do not determine it."""
+    nodes = [point for name in constraint.nodes for point in deck_mesh.nodes(name, constraint.location)]
+    nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
+    nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
+    if len(nodes) < LEAST[constraint.kind] or deck_mesh.dim == 2:
+        raise constraint.refuse(f"{constraint.kind} needs {LEAST[constraint.kind]} different nodes or more, in 3D")
+    where = deck_mesh.points[nodes]
+    if constraint.kind == "MEANROT":
+        return [_mean_rotation(constraint, nodes, where)]
+    first = where[1] - where[0]
+    if constraint.kind == "STRAIGHT":
+        across = _normals_to(constraint, first)
+        along = (where - where[0]) @ first / (first @ first)
+        weights = np.column_stack([1.0 - along, along])
+    else:
+        across = np.cross(first, where[2] - where[0])[None]
+        if np.linalg.norm(across) <= FLAT * (first @ first):
+            raise constraint.refuse("the first three nodes of PLANE lie on a line")
+        edges = np.array([first, where[2] - where[0]])
+        inside = np.linalg.lstsq(edges.T, (where - where[0]).T, rcond=None)[0].T
+        weights = np.column_stack([1.0 - inside.sum(axis=1), inside])
+    k = weights.shape[1]
+    across = across / np.linalg.norm(across, axis=1, keepdims=True)
     return [
-        [
-            (point, axis, float(factor) * value)
-            for factor, row in zip(direction, rows, strict=True)
-            for point, axis, value in row
-        ]
-        for direction in directions
+        _terms([nodes[i], *nodes[:k]], np.outer([1.0, *-weights[i]], normal))
+        for i in range(k, len(nodes))
+        for normal in across
     ]
 
 
-def _distributing(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> list[list[Term]]:
-    """Return the equations that make a reference point follow the area-weighted mean motion of a surface."""
-    made = deck_mesh.made
-    group = deck_mesh.add_facets(f"coupling of line {link.location.line}", made.faces(link.group, link.location))
-    areas = Traction(_known(mesh, deck_mesh, group), {0: 1.0}, None).vector(mesh, deck_mesh.kinematics)[:, 0]
-    points = np.array(_points(deck_mesh, link), np.intp)
-    weight = areas[points] / areas[points].sum()
-    with refusing(link):
-        rows = distributing_rows(_reference(deck_mesh, link), points, made.points[points, : deck_mesh.dim], weight)
-    turns = len(rows) - deck_mesh.dim
-    return rows[:turns] + _along(rows[turns:], _directions(deck_mesh, link, made.node(link.reference, link.location)))
+def _normals_to(constraint: MultiPoint, line: Array) -> Array:
+    """Return two directions (2, 3) normal to a line [-]."""
+    if not line.any():
+        raise constraint.refuse("the first two nodes of STRAIGHT are at one place")
+    return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
-def _known(mesh: Mesh, deck_mesh: DeckMesh, group: str) -> str:
-    """Return a group of the mesh with the same facets as one added after the mesh was made."""
-    return next(
-        name
-        for name, members in deck_mesh.groups.items()
-        if members == deck_mesh.groups[group] and name in mesh.cell_groups
-    )
+def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
+    """Return the equation that sets the first component of the last node to the mean rotation of the others about an axis.
+
+    The mean rotation is the mean of the nodal angles about the centre, as in CalculiX: ``mean(a . (p x u) / p . p)`` with the
+    axis a and the offsets p from the centre normal to it. The coordinates of the last node are the direction of the axis.
+    """
+    axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
+    length = np.linalg.norm(axis)
+    if length == 0.0:
+        raise constraint.refuse(
+            "the coordinates of the last node of MEANROT are the direction of the axis, and all zero"
+        )
+    axis = axis / length
+    offset = places - np.outer(places @ axis, axis)
+    squared = np.einsum("nd,nd->n", offset, offset)
+    if squared.min() <= FLAT * squared.max():
+        raise constraint.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
+    arms = np.cross(axis, offset) / squared[:, None] / len(offset)
+    arms -= arms.mean(axis=0)
+    return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]
+
+
+def _terms(points: list[int], coefficients: Array) -> list[Term]:
+    """Return the terms of an equation with coefficients (n, 3) for the displacements of points."""
+    return [
+        (point, axis, value)
+        for point, row in zip(points, coefficients.tolist(), strict=True)
+        for axis, value in enumerate(row)
+        if value
+    ]

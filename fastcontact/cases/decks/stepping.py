@@ -1,9 +1,11 @@
-"""Keywords of steps: *STEP, *STATIC, *FREQUENCY, and the blocks of supports and loads in them."""
+"""Keywords of steps: *STEP, *STATIC, *FREQUENCY, *AMPLITUDE, and the blocks of supports and loads in them."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from fastcontact.cases.decks.blocks import Block, folded
-from fastcontact.cases.decks.content import Content, Given, Step
+from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 
 # Largest number of increments of a step with friction.
 MOST_PARTS = 20
@@ -87,10 +89,23 @@ def given(content: Content, step: Step | None, block: Block) -> None:
     if name and folded(name) not in content.amplitudes:
         known = ", ".join(content.amplitudes) or "none"
         raise block.refuse(f"amplitude '{name}' is not defined above this line; amplitudes: {known}")
-    made = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
+    conditions = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
-        step.given.append(made)
+        step.given.append(conditions)
     elif block.keyword == "BOUNDARY":
-        content.supports.append(made)
+        content.supports.append(conditions)
     else:
         raise block.refuse("loads belong in a step")
+
+
+def amplitude(content: Content, block: Block) -> None:
+    """*AMPLITUDE: pairs of time and multiplier."""
+    name = block.required("NAME")
+    block.choice("DEFINITION", ("TABULAR",))
+    block.choice("VALUE", ("RELATIVE",))
+    total = block.choice("TIME", ("STEP TIME", "TOTAL TIME")) == "TOTAL TIME"
+    numbers = block.numbers()
+    times, values = numbers[::2], numbers[1::2]
+    if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
+        raise block.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
+    content.amplitudes[folded(name)] = Amplitude(block.location, tuple(times), tuple(values), total)

@@ -1,21 +1,16 @@
-"""Reference elements: each is a table in one file; a new file here is a new element.
+"""Reference elements: each is an entry of the table of its shape; an entry there is a new element.
 
-Every module of this package whose name has no leading underscore defines one ``ELEMENT``.
+Every module of this package whose name has no leading underscore holds the elements of one shape, called ``ELEMENTS``.
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-
 from fastcontact.errors import MeshError, unknown
+from fastcontact.mesh.elements import hexahedra, lines, pyramids, quadrangles, tetrahedra, triangles, wedges
 from fastcontact.mesh.elements._element import Element
 
-ELEMENTS: dict[str, Element] = {
-    name: importlib.import_module(f"{__name__}.{name}").ELEMENT
-    for _, name, _ in pkgutil.iter_modules(__path__)
-    if not name.startswith("_")
-}
+_SHAPES = (hexahedra, lines, pyramids, quadrangles, tetrahedra, triangles, wedges)
+ELEMENTS: dict[str, Element] = {element.name: element for shape in _SHAPES for element in shape.ELEMENTS}
 BY_MESHIO = {element.meshio: element for element in ELEMENTS.values()}
 BY_MED = {element.med: element for element in ELEMENTS.values()}
 BY_VTK = {element.vtk: element for element in ELEMENTS.values()}

@@ -1,4 +1,4 @@
-"""A reference element: data, two functions and its default quadrature; product shape functions.
+"""A reference element: data, two functions and its default quadrature; shape functions of families of elements.
 
 Reference coordinates have no dimension.
 """
@@ -8,13 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices
+from fastcontact.arrays import Array
 
 Function = Callable[[Array], Array]
+# Nodes, shape functions and their derivatives.
+Functions = tuple[Array, Function, Function]
 
 # Names of facets by the dimension of the cell and the number of nodes of the facet.
 _FACETS = {
@@ -48,13 +50,13 @@ class Element:
         The name in meshio and the three-letter MED code.
     vtk : int
         The VTK cell type.
-    linear, quadratic : str
-        Name of the element on the same corners without, or with, mid nodes.
-    corner_shape : callable
-        Shape functions (m, n_corners) [-] of the linear element on the same corners.
+    quadratic : str
+        Name of the element on the same corners with mid nodes.
     dilatation : int, optional
         Degree, 0 or 1, up to which the dilatation of nearly incompressible materials has the whole bulk modulus; None
         where gradients are constant, so that nothing can be left out.
+    corner_element : Element, optional
+        The linear element on the same corners, None if it is linear itself.
     """
 
     name: str
@@ -67,10 +69,19 @@ class Element:
     meshio: str
     med: str
     vtk: int
-    linear: str
     quadratic: str
-    corner_shape: Function
     dilatation: int | None = None
+    corner_element: Element | None = None
+
+    @property
+    def linear(self) -> str:
+        """Name of the element on the same corners without mid nodes."""
+        return (self.corner_element or self).name
+
+    @property
+    def corner_shape(self) -> Function:
+        """Shape functions (m, n_corners) [-] of the linear element on the same corners."""
+        return (self.corner_element or self).shape
 
     @property
     def dim(self) -> int:
@@ -80,7 +91,7 @@ class Element:
     @property
     def order(self) -> int:
         """1 for linear, 2 for quadratic."""
-        return 1 if self.name == self.linear else 2
+        return 1 if self.corner_element is None else 2
 
     @property
     def facet_elements(self) -> tuple[str, ...]:
@@ -95,7 +106,7 @@ class Element:
     @property
     def n_corners(self) -> int:
         """Number of corner nodes."""
-        return self.corner_shape(self.nodes[:1]).shape[1]
+        return len((self.corner_element or self).nodes)
 
     @cached_property
     def reversed(self) -> tuple[int, ...]:
@@ -131,14 +142,37 @@ class Element:
         return self.corner_shape(self.nodes) @ np.linalg.pinv(self.corner_shape(points))
 
 
-def serendipity(box: ModuleType) -> tuple[Array, Function, Function]:
+def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -> Element:
+    """Return the element with the edges of a linear one, and with its facets extended by mid and centre nodes.
+
+    The `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions and their derivatives; `others` are
+    further arguments of `Element`.
+    """
+    nodes, shape, gradient = functions
+    facets = []
+    for facet in linear.facets:
+        corners = nodes[list(facet)]
+        middles = (corners + np.roll(corners, -1, axis=0)) / 2
+        on_facet = [np.flatnonzero((nodes == place).all(axis=1)) for place in (*middles, corners.mean(axis=0))]
+        facets.append(tuple(dict.fromkeys((*facet, *np.concatenate(on_facet).tolist()))))
+    return Element(
+        name, nodes, linear.edges, tuple(facets), shape, gradient, quadratic=name, corner_element=linear, **others
+    )
+
+
+def with_middles(linear: Element) -> Array:
+    """Return the nodes (n_nodes, dim) [-] of a linear element, and the middles of its edges."""
+    return np.vstack([linear.nodes, linear.nodes[np.array(linear.edges)].sum(axis=1) / 2])
+
+
+def serendipity(box: Element) -> Functions:
     """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear square or cube with mid nodes.
 
     In each coordinate x of a node at X, the function of a mid node has the factor 1 - x^2 along its edge, where X is 0, and
     (1 + x X) / 2 across it; that of a corner is its linear one times the sum of x X, less dim - 1 (Zienkiewicz and Taylor).
     """
-    corners, dim, (first, second) = box.NODES, box.NODES.shape[1], np.array(box.EDGES).T
-    middles = (corners[first] + corners[second]) / 2
+    nodes, dim = with_middles(box), box.dim
+    corners, middles = np.split(nodes, [box.n_nodes])
 
     def factors(xi: Array) -> Array:
         x = xi[:, None]
@@ -155,16 +189,18 @@ def serendipity(box: ModuleType) -> tuple[Array, Function, Function]:
         along = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
         return np.concatenate([corner, np.stack(along, axis=2)], axis=1)
 
-    return np.vstack([corners, middles]), shape, gradient
+    return nodes, shape, gradient
 
 
-def product_of_two(first: ModuleType, second: ModuleType, I: Indices, J: Indices) -> tuple[Function, Function]:  # noqa: E741
-    """Return shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of a product of two elements.
+def product(nodes: Array, first: Element, second: Element) -> Functions:
+    """Return the nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of a product of two elements.
 
-    Node i has function number I[i] of the first element in the first coordinates, times number J[i] of the second in the
-    others; `I` (n_nodes,) of int, `J` (n_nodes,) of int.
+    The function of each of the `nodes` (n_nodes, dim) [-] is one of the first element in the first coordinates, times one
+    of the second in the others: those of the nodes at the same coordinates.
     """
-    split = first.ELEMENT.dim
+    split = first.dim
+    I = np.abs(nodes[:, None, :split] - first.nodes).sum(axis=2).argmin(axis=1)  # noqa: E741
+    J = np.abs(nodes[:, None, split:] - second.nodes).sum(axis=2).argmin(axis=1)
 
     def shape(xi: Array) -> Array:
         return np.asarray(first.shape(xi[:, :split])[:, I] * second.shape(xi[:, split:])[:, J])
@@ -175,12 +211,12 @@ def product_of_two(first: ModuleType, second: ModuleType, I: Indices, J: Indices
         along_second = first.shape(x)[:, I, None] * second.gradient(y)[:, J]
         return np.concatenate([along_first, along_second], axis=2)
 
-    return shape, gradient
+    return nodes, shape, gradient
 
 
-def with_mid_nodes(simplex: ModuleType) -> tuple[Array, Function, Function]:
+def with_mid_nodes(simplex: Element) -> Functions:
     """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear simplex with mid nodes on its edges."""
-    corners, (first, second) = simplex.ELEMENT.nodes, np.array(simplex.ELEMENT.edges).T
+    first, second = np.array(simplex.edges).T
 
     def shape(xi: Array) -> Array:
         L = simplex.shape(xi)
@@ -191,4 +227,4 @@ def with_mid_nodes(simplex: ModuleType) -> tuple[Array, Function, Function]:
         along_edges = 4 * (L[:, first] * dL[:, second] + L[:, second] * dL[:, first])
         return np.concatenate([(4 * L - 1) * dL, along_edges], axis=1)
 
-    return np.vstack([corners, (corners[first] + corners[second]) / 2]), shape, gradient
+    return with_middles(simplex), shape, gradient

@@ -10,8 +10,7 @@ import numpy as np
 
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.files.blocks import VERTEX
-from fastcontact.mesh.files.meshio_content import mesh_of
+from fastcontact.mesh.files.meshio_content import VERTEX, mesh_of
 from fastcontact.mesh.mesh import Mesh
 
 # Cells by keyword; positions of our nodes among those of code_aster where the orders differ.
@@ -20,11 +19,8 @@ KINDS = {
     "QUAD9": "quad9", "TETRA4": "tet4", "TETRA10": "tet10", "PENTA6": "wedge6", "PENTA15": "wedge15", "PENTA18": "wedge18",
     "PYRAM5": "pyramid5", "PYRAM13": "pyramid13", "HEXA8": "hex8", "HEXA20": "hex20", "HEXA27": "hex27",
 }  # fmt: skip
-_BRICK_EDGES = (
-    *range(12),
-    *range(16, 20),
-    *range(12, 16),
-)  # code_aster: bottom, upright, top; here: bottom, top, upright
+# Edges of bricks in code_aster: bottom, upright, top; here: bottom, top, upright.
+_BRICK_EDGES = (*range(12), *range(16, 20), *range(12, 16))
 NODE_ORDER = {
     "PENTA15": (*range(9), *range(12, 15), *range(9, 12)),
     "PENTA18": (*range(9), *range(12, 15), *range(9, 12), 15, 16, 17),
@@ -50,10 +46,10 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
     for keyword, line in words:
         if keyword.upper() == "FIN":
             try:
-                return mesh_of(content.found())
+                return mesh_of(content.plain())
             except MeshError as error:
                 raise MeshError(f"'{path}': {error}") from None
-        content.add(keyword.upper(), line, list(_block(path, keyword, line, words)))
+        content.add(keyword.upper(), line, _block(path, keyword, line, words))
     raise FileError(f"'{path}' ends without FIN: it is cut off, or no mesh file of code_aster")
 
 
@@ -67,25 +63,18 @@ def _words(path: Path) -> Iterator[Word]:
         raise FileError(f"cannot read '{path}': {error}") from error
 
 
-def _block(path: Path, keyword: str, line: int, words: Iterator[Word]) -> Iterator[Word]:
-    """Yield the words of one block, without header entries such as ``NOM = x``, except for the name of a group."""
-    if keyword.upper() in IGNORED:
-        for word, _ in words:
-            if word.upper() == "FINSF":
-                return
-    held: list[Word] = []
+def _block(path: Path, keyword: str, line: int, words: Iterator[Word]) -> list[Word]:
+    """Return the words of one block, without header entries such as ``NOM = x``, except for the name of a group."""
+    kept: list[Word] = []
     for word, number in words:
         if word.upper() == "FINSF":
-            yield from held
-            return
-        held.append((word, number))
-        if len(held) > 2 and held[-2][0] == "=":
-            (name, _), _, value = held[-3:]
-            del held[-3:]
+            return kept
+        kept.append((word, number))
+        if len(kept) > 2 and kept[-2][0] == "=":
+            (name, _), _, value = kept[-3:]
+            del kept[-3:]
             if keyword.upper().startswith("GROUP") and name.upper() == "NOM":
-                held.append(value)
-        elif len(held) > 2:
-            yield held.pop(0)
+                kept.append(value)
     raise FileError(f"'{path}', line {line}: {keyword[:40]} has no FINSF: the file is cut off")
 
 
@@ -118,7 +107,7 @@ class _Content:
             known = ", ".join([*COORDINATES, *KINDS, *self._groups])
             raise self._refusal(line, f"{keyword[:40]} is not known; a mesh has {known}")
 
-    def found(self) -> dict[str, Any]:
+    def plain(self) -> dict[str, Any]:
         """Return points, cells and groups in the format of `meshio_process.plain_content`."""
         cells: list[Any] = []
         sets: dict[str, Any] = {}

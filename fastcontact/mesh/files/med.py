@@ -6,7 +6,8 @@ Only h5py is needed. Arrays are stored component by component ("no interlace"), 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
@@ -16,12 +17,10 @@ from fastcontact._tools.argument_types import typed
 from fastcontact._tools.hdf5 import attribute, check_size, opened, values
 from fastcontact._tools.hdf5_driver import new_hdf5
 from fastcontact._tools.paths import PathLike, replacing
-from fastcontact.arrays import AnyArray, Array, Indices
-from fastcontact.errors import FileError, MeshError, check_known
+from fastcontact.arrays import AnyArray, Array, Indices, Numbers
+from fastcontact.errors import FileError, MeshError, check_known, warn
 from fastcontact.mesh import elements
-from fastcontact.mesh.files import med_families
-from fastcontact.mesh.files.blocks import VERTEX, Block, build_mesh, check_kinds
-from fastcontact.mesh.files.med_families import Families, checked_name, decoded
+from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh, check_kinds
 from fastcontact.mesh.mesh import Mesh
 
 # Elements with different node orders in MED: our node k is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid
@@ -38,6 +37,8 @@ NO_STEP = -1
 FLOAT64 = 6
 
 AXES = ("X", "Y", "Z")
+# Suffixes of MED files, including code_aster's for meshes and results.
+MED_SUFFIXES = (".med", ".mmed", ".rmed")
 
 
 class MedContent(NamedTuple):
@@ -85,7 +86,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
     points = _read_points(step, group)
     name = group.name.rsplit("/", 1)[-1]
     folders = [folder for folder in (group.get("FAS"), file.get(f"FAS/{name}")) if folder is not None]
-    families = {number: names for folder in folders for number, names in med_families.read_families(folder).items()}
+    families = {number: names for folder in folders for number, names in read_families(folder).items()}
     blocks = list(_read_blocks(step, families))
     point_groups: dict[str, Any] = dict.fromkeys(_group_names(families, +1), ())
     point_groups.update(_members(step["NOE"], len(points), families))
@@ -152,7 +153,7 @@ def _members(entry: Any, count: int, families: Families) -> dict[str, Indices]:
     numbers = values(entry, "FAM")
     if numbers.shape != (count,):
         raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: write it anew")
-    return med_families.members(numbers, families)
+    return family_members(numbers, families)
 
 
 def _cell_count(entry: Any) -> int:
@@ -232,17 +233,17 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
 
 
 def _write_points(step: Any, mesh: Mesh, folder: Any) -> None:
-    numbers, families = med_families.families_of(mesh.point_groups, mesh.n_points, +1)
+    numbers, families = families_of(mesh.point_groups, mesh.n_points, +1)
     points = step.create_group("NOE")
     _set(points, CGT=1, CGS=1, PFL=NO_PROFILE)
     _write_array(points, "COO", mesh.points.T, mesh.n_points)
     _write_array(points, "FAM", numbers, mesh.n_points)
     if families:
-        med_families.write_families(folder.create_group("NOEUD"), families)
+        write_families(folder.create_group("NOEUD"), families)
 
 
 def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
-    numbers, families = med_families.families_of(mesh.cell_groups, mesh.n_cells, -1)
+    numbers, families = families_of(mesh.cell_groups, mesh.n_cells, -1)
     cells = step.create_group("MAI")
     _set(cells, CGT=1)
     for name, start in mesh.offsets.items():
@@ -254,7 +255,7 @@ def _write_cells(step: Any, mesh: Mesh, folder: Any) -> None:
         _write_array(entry, "NOD", block.T + np.int32(1), len(block))
         _write_array(entry, "FAM", numbers[start : start + len(block)], len(block))
     if families:
-        med_families.write_families(folder.create_group("ELEME"), families)
+        write_families(folder.create_group("ELEME"), families)
 
 
 def _write_array(group: Any, name: str, array: AnyArray, count: int) -> None:
@@ -313,24 +314,53 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     >>> import fastcontact as fc
     >>> times, displacements = fc.read_med_field("blocks.med", "DEPL")  # doctest: +SKIP
     """
-    times, values, _ = read_point_field(path, field)
-    return times, values
+    return read_field(path, field, at_points=True)[:2]
 
 
-def read_point_field(path: PathLike, field: str) -> tuple[Array, Array, Array | None]:
-    """Return the result of `read_med_field`, and the points (n_points, dim) [length], None if they are in another file."""
+def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Array, Array | None]:
+    """Return a field at points or cells from a file of MED 3 or later: times, values and places.
+
+    Times are (n_instants,) in the order of the file [-], values (n_instants, n, n_components), NaN where there are none [unit
+    of the field], places (n, dim) the points, None if they are in another file, or the middles of the cells [length].
+
+    Raises FileError if the file cannot be read, has no such field, or the field does not have one value per point or cell.
+    """
     with opened(path) as file:
-        group, _, mesh = _field_and_mesh(file, path, field)
-        instants = [entry for entry in group.values() if "NOE" in entry and "PDT" in entry.attrs]
+        group, name, mesh = _field_and_mesh(file, path, field)
+        if mesh is None and not at_points:
+            raise FileError(f"field '{field}' of '{path}' is on the mesh '{name}', which is in another file")
+        instants = sorted((e for e in group.values() if "PDT" in e.attrs and _supports(e, at_points)), key=_order)
         if not instants:
-            raise FileError(f"field '{field}' of '{path}' has no values at nodes in the layout of MED 3 or 4")
-        instants.sort(key=_order)
-        count, points = int(attribute(group, "NCO")), None if mesh is None else _read_points(_first_step(mesh), mesh)
-        profiles = [profile for entry in instants for profile in entry["NOE"].values()]
-        n_points = max(values(profile, "CO").size // count for profile in profiles) if points is None else len(points)
-        check_size(f"field '{field}' of '{path}'", (len(instants), n_points, count), file)
-        fields = [_read_instant(file, entry["NOE"], n_points, count) for entry in instants]
-        return np.array([attribute(entry, "PDT") for entry in instants], np.float64), np.stack(fields), points
+            where = "nodes" if at_points else "cells"
+            raise FileError(f"field '{field}' of '{path}' has no values at {where} in the layout of MED 3 or 4")
+        step = None if mesh is None else _first_step(mesh)
+        points, count = None if mesh is None else _read_points(step, mesh), int(attribute(group, "NCO"))
+        fields, places = [], []  # type: list[Array], list[Array]
+        for support in sorted({support for entry in instants for support in _supports(entry, at_points)}):
+            at = points if points is None or at_points else _middles(path, field, step, points, support)
+            sizes = [values(p, "CO").size // count for e in instants for p in e[support].values()] if at is None else []
+            n_values = max(sizes) if at is None else len(at)
+            check_size(f"field '{field}' of '{path}'", (len(instants), n_values, count), file)
+            fields.append(np.stack([_read_instant(file, entry.get(support), n_values, count) for entry in instants]))
+            places += [] if at is None else [at]
+        times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
+        return times, np.concatenate(fields, axis=1), np.concatenate(places) if places else None
+
+
+def _supports(entry: Any, at_points: bool) -> list[str]:
+    """Return the names of the groups with values of a field at the nodes, or at the cells of each kind."""
+    return [key for key in entry if (key == "NOE" if at_points else key.startswith("MAI."))]
+
+
+def _middles(path: PathLike, field: str, step: Any, points: Array, support: str) -> Array:
+    """Return the middles (n_cells, dim) of the cells of a kind with values of a field [length]."""
+    code = support.removeprefix("MAI.")
+    if code not in elements.BY_MED or code not in step.get("MAI", {}):
+        raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
+    nodes = _read_nodes(step["MAI"][code], code)
+    if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)):
+        raise FileError(f"a cell of '{path}' names a point that is not there: write the file anew")
+    return np.asarray(points[nodes].mean(axis=1))
 
 
 def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
@@ -341,66 +371,124 @@ def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, An
     return file["CHA"][field], name, file.get(f"ENS_MAA/{name}")
 
 
-def read_cell_field(path: PathLike, field: str) -> tuple[Array, Array, Array]:
-    """Return a field at cells from a file of MED 3 or later: times, values and middles of the cells.
-
-    Times are (n_instants,) in the order of the file [-], values (n_instants, n_cells, n_components), NaN where there are
-    none [unit of the field], middles (n_cells, dim) [length].
-
-    Raises FileError if the file cannot be read, has no such field, or the field does not have one value per cell.
-    """
-    with opened(path) as file:
-        group, name, mesh = _field_and_mesh(file, path, field)
-        if mesh is None:
-            raise FileError(f"field '{field}' of '{path}' is on the mesh '{name}', which is in another file")
-        step = _first_step(mesh)
-        points = _read_points(step, mesh)
-        instants = sorted((e for e in group.values() if "PDT" in e.attrs and _cell_supports(e)), key=_order)
-        codes = sorted({code for entry in instants for code in _cell_supports(entry)})
-        if not instants:
-            raise FileError(f"field '{field}' of '{path}' has no values at cells in the layout of MED 3 or 4")
-        middles, values, count = [], [], int(attribute(group, "NCO"))
-        for code in codes:
-            if code not in elements.BY_MED or code not in step.get("MAI", {}):
-                raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
-            nodes = _read_nodes(step["MAI"][code], code)
-            if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)):
-                raise FileError(f"a cell of '{path}' names a point that is not there: write the file anew")
-            middles.append(points[nodes].mean(axis=1))
-            check_size(f"field '{field}' of '{path}'", (len(instants), len(nodes), count), file)
-            values.append(np.stack([_of_cells(file, entry, code, len(nodes), count, path) for entry in instants]))
-        times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        return times, np.concatenate(values, axis=1), np.concatenate(middles)
-
-
-def _cell_supports(entry: Any) -> list[str]:
-    """Return the codes of the cells with values of a field."""
-    return [key[4:] for key in entry if key.startswith("MAI.")]
-
-
-def _of_cells(file: Any, entry: Any, code: str, n_cells: int, n_components: int, path: PathLike) -> Array:
-    """Return a field (n_cells, n_components) at the cells of one kind at an instant, NaN where it has no value."""
-    support = entry.get(f"MAI.{code}")
-    if support is None:
-        return np.full((n_cells, n_components), np.nan)
-    for profile in support.values():
-        if int(attribute(profile, "NGA", 1)) != 1:
+def _read_instant(file: Any, support: Any, n_values: int, n_components: int) -> Array:
+    """Return a field (n_values, n_components) at an instant, NaN where it has no value."""
+    field = np.full((n_values, n_components), np.nan)
+    for name, profile in () if support is None else support.items():
+        if (count := int(attribute(profile, "NGA", 1))) != 1:
             raise FileError(
-                f"a field of '{path}' has {int(attribute(profile, 'NGA'))} values in each cell, at integration points: "
-                "one a cell is needed"
+                f"a field of '{file.filename}' has {count} values in each cell, at integration points: one a cell is needed"
             )
-    return _read_instant(file, support, n_cells, n_components)
-
-
-def _read_instant(file: Any, support: Any, n_points: int, n_components: int) -> Array:
-    field = np.full((n_points, n_components), np.nan)
-    for name, profile in support.items():
         values_of_profile = values(profile, "CO").reshape(n_components, -1).T
         if name == NO_PROFILE:
             field[:] = values_of_profile
             continue
         rows = values(file["PROFILS"][name], "PFL").astype(np.int64) - 1
-        if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_points:
-            raise FileError(f"profile '{name}' refers to point {rows.max() + 1} of {n_points}: write the file anew")
+        if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_values:
+            raise FileError(f"profile '{name}' refers to point {rows.max() + 1} of {n_values}: write the file anew")
         field[rows] = values_of_profile
     return field
+
+
+GROUP_NAME_SIZE = 80
+FAMILY_NAME_SIZE = 64
+# Number of folder levels between a mesh and its families: one, for those of points or of cells.
+LEVELS = 2
+
+Families = dict[int, tuple[str, ...]]
+
+
+def checked_name(kind: str, name: str, size: int) -> bytes:
+    """Return a name encoded for MED; FileError if it is empty, too long, or cannot be read back unchanged."""
+    encoded = name.encode("utf-8")
+    if not encoded or len(encoded) > size:
+        raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, and MED takes 1 to {size}: rename it")
+    if name.endswith(" ") or "\0" in name:
+        raise FileError(f"{kind} name '{name}' ends with a blank, which MED does not keep: rename it")
+    return encoded
+
+
+def decoded(raw: bytes) -> str:
+    """Return the name in a field of fixed size, padded with blanks or zero bytes."""
+    name = raw.split(b"\0")[0].rstrip(b" ")
+    try:
+        return name.decode("utf-8")
+    except UnicodeDecodeError:
+        return name.decode("latin-1")
+
+
+def read_families(folder: Any, level: int = 0) -> Families:
+    """Return the group names of each family number, from an HDF5 group and its subfolders."""
+    families: Families = {}
+    for entry in folder.values():
+        if "NUM" in entry.attrs:
+            families[int(attribute(entry, "NUM"))] = _names_in(entry)
+        elif hasattr(entry, "values") and level < LEVELS:
+            families.update(read_families(entry, level + 1))
+    return families
+
+
+def _names_in(family: Any) -> tuple[str, ...]:
+    if "GRO" not in family:
+        return ()
+    raw = values(family["GRO"], "NOM").tobytes()
+    # MED 2 stores one string for all names, later versions a row for each: the same bytes, except for a zero.
+    count = -(-len(raw) // GROUP_NAME_SIZE)
+    if "NBR" in family["GRO"].attrs:
+        count = min(count, int(attribute(family["GRO"], "NBR")))
+    fields = (raw[i * GROUP_NAME_SIZE : (i + 1) * GROUP_NAME_SIZE] for i in range(count))
+    return tuple(name for name in map(decoded, fields) if name)
+
+
+def family_members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
+    """Return the rows of each group, from the family number of each row."""
+    members_by_group: dict[str, list[Indices]] = {}
+    order = np.argsort(np.abs(numbers), kind="stable")
+    starts = np.flatnonzero(np.diff(numbers[order])) + 1
+    for rows in np.split(order, starts) if len(numbers) else []:
+        number = int(numbers[rows[0]])
+        if number and number not in families:
+            warn(
+                f"{len(rows)} cells or points belong to family {number}, which the MED file does not "
+                "describe: they are in no group"
+            )
+        for name in families.get(number, ()):
+            members_by_group.setdefault(name, []).append(rows)
+    return {name: np.unique(np.concatenate(parts)) for name, parts in members_by_group.items()}
+
+
+def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[Numbers, Families]:
+    """Return the family number of each of `count` cells or points, and the groups of each family.
+
+    There is one family for each combination of groups that occurs, and one for all groups without members.
+    Numbers run from `sign`, +1 for points and -1 for cells, away from zero; 0 means no group.
+    """
+    labels = np.zeros(count, np.intp)
+    combinations: list[tuple[str, ...]] = [()]
+    for name, rows in groups.items():
+        # Only members change family: the cost is proportional to the size of the groups, not to that of the mesh.
+        before, position = np.unique(labels[rows], return_inverse=True)
+        labels[rows] = len(combinations) + position
+        combinations += [(*combinations[label], name) for label in before]
+    used, compact = np.unique(np.append(labels, 0), return_inverse=True)
+    families = {sign * number: combinations[label] for number, label in enumerate(used.tolist()) if number}
+    empty = tuple(name for name, rows in groups.items() if not len(rows))
+    if empty:
+        families[sign * len(used)] = empty
+    return (sign * compact[:-1]).astype(np.int32), families
+
+
+def write_families(folder: Any, families: Families) -> None:
+    """Write the families into an HDF5 group."""
+    for number, names in families.items():
+        label = re.sub(r"[^A-Za-z0-9_]", "_", f"FAM_{number}_" + "_".join(names)).replace("FAM__", "FAM_-", 1)
+        family = folder.create_group(label[:FAMILY_NAME_SIZE])
+        family.attrs["NUM"] = np.int32(number)
+        group = family.create_group("GRO")
+        group.attrs["NBR"] = np.int32(len(names))
+        rows = np.zeros((len(names), GROUP_NAME_SIZE), np.int8)
+        for row, name in zip(rows, names, strict=True):
+            encoded = checked_name("group", name, GROUP_NAME_SIZE)
+            row[: len(encoded)] = np.frombuffer(encoded, np.int8)
+        dataset = group.create_dataset("NOM", (len(names),), np.dtype((np.int8, (GROUP_NAME_SIZE,))))
+        dataset[...] = rows

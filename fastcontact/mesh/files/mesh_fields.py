@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.hdf5 import check_size, opened, values
 from fastcontact._tools.neighbours import nearest
-from fastcontact._tools.paths import PathLike
-from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.errors import FileError, MeshError, check_known
-from fastcontact.mesh.files.file_fields import FileField, read_file_field
+from fastcontact._tools.paths import PathLike, existing_file
+from fastcontact.arrays import AnyArray, Array, Indices, Numbers
+from fastcontact.errors import FastcontactError, FileError, MeshError, check_known, unknown
+from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.mesh import Mesh
 
 # Tolerance of the positions of points in a file and in a mesh, relative to its size.
@@ -71,11 +74,12 @@ def read_field(
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
     name = f"field '{field}' of '{file}'"
     cells, of_file = _cells(mesh, groups), read_file_field(file, field, over)
-    row = _row(of_file, instant, name)
+    if instant is None and len(of_file.values) != 1:
+        raise FileError(f"{name} has {len(of_file.values)} instants: say which with instant")
+    row = 0 if instant is None else row_of(instant, of_file.times, name)
     if over == "cells":
-        return at_cells(of_file, np.concatenate([mesh.points[block].mean(axis=1) for block in cells]), mesh, name)[row][
-            :, None
-        ]
+        middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
+        return at_cells(of_file, middles, mesh, name)[row][:, None]
     wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
     values = at_points_of(of_file, mesh, wanted, name)[row]
     return np.where(np.isfinite(values), values, values[wanted].mean())
@@ -95,17 +99,14 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
     return blocks
 
 
-def _row(field: FileField, instant: float | None, name: str) -> int:
-    """Return the row of the requested instant of a field."""
-    if instant is None:
-        if len(field.values) != 1:
-            raise FileError(f"{name} has {len(field.values)} instants: say which with instant")
-        return 0
-    if field.times is None:
-        raise FileError(f"{name} has no times: leave out instant")
-    row = int(np.abs(field.times - instant).argmin())
-    if abs(field.times[row] - instant) > SAME_TIME * np.abs(field.times).max():
-        raise FileError(f"{name} has no instant {instant:g}, the next is {field.times[row]:g}")
+def row_of(instant: float, times: Array | None, name: str, error: type[FastcontactError] = FileError) -> int:
+    """Return the row of an instant among the `times` (n_instants,) of a field; raises `error` if there is none."""
+    if times is None:
+        raise error(f"{name} has no times: leave out instant")
+    row = int(np.abs(times - instant).argmin())
+    if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
+        among = f"the next is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
+        raise error(f"{name} has no instant {instant:g}, {among}")
     return row
 
 
@@ -193,3 +194,86 @@ def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> Non
                 f"{name} has {len(members)} different values at {_in_space(point[None])[0]}, where bodies touch: write it on "
                 "the nodes of this mesh, in their order"
             )
+
+
+VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
+
+
+class FileField(NamedTuple):
+    """A scalar field at points or cells.
+
+    Attributes
+    ----------
+    times : ndarray (n_instants,) or None
+        Times of its instants [-]; None if the file has none.
+    values : ndarray (n_instants, n)
+        Values, NaN where there is none [unit of the field].
+    places : ndarray (n, 2) or (n, 3), or None
+        Coordinates of the points, or means of the nodes of the cells, if the file has them [length].
+    """
+
+    times: Array | None
+    values: Array
+    places: Array | None
+
+
+def read_file_field(path: PathLike, name: str, over: str) -> FileField:
+    """Read a scalar field `over` the ``"points"`` or ``"cells"`` of the file.
+
+    Raises FileError if the file cannot be read, has no such field, or the field has several components.
+    """
+    file, at_points = Path(existing_file(path)), over == "points"
+    suffix, times = file.suffix.lower(), None
+    if suffix in med.MED_SUFFIXES:
+        times, field, places = med.read_field(file, name, at_points)
+    elif suffix in VTKHDF_SUFFIXES:
+        times, field, places = _vtkhdf(file, name, at_points)
+    else:
+        field, places = meshio_files.read_data(file, name, at_points)
+        field = field[None]
+    count = int(np.prod(field.shape[2:], dtype=np.int64))
+    if field.ndim > 3 or count != 1:
+        single = f"one with a single number a {over.removesuffix('s')} is needed"
+        raise FileError(f"field '{name}' of '{path}' has {count} components: {single}")
+    if not len(field):
+        raise FileError(f"field '{name}' of '{path}' has no instant")
+    return FileField(times, np.asarray(field, np.float64).reshape(field.shape[:2]), places)
+
+
+def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:
+    """Read a field of an unstructured grid in VTKHDF: at the points of all steps, or at the cells of one."""
+    needed = {"Points", "NumberOfPoints"} if at_points else {"Points", "Connectivity", "Offsets", "NumberOfCells"}
+    with opened(path) as file:
+        grid = file.get("VTKHDF", {})
+        if not needed <= set(grid):
+            raise FileError(f"'{path}' holds no unstructured grid of VTK")
+        fields = grid.get("PointData" if at_points else "CellData", {})
+        if name not in fields:
+            raise FileError(f"'{path}': {unknown('field' if at_points else 'field of cells', name, list(fields))}")
+        field, points = values(fields, name), np.asarray(values(grid, "Points"), np.float64)
+        if not at_points:
+            return None, field[None], _middles(path, name, grid, len(field), points)
+        if "Steps" not in grid:
+            return None, field[None], points
+        n_points, n_steps = len(points), int(grid["Steps"].attrs["NSteps"])
+        times = np.asarray(values(grid["Steps"], "Values"), np.float64)[:n_steps]
+        first = np.asarray(values(grid["Steps/PointDataOffsets"], name), np.int64)[:n_steps]
+        if len(np.unique(values(grid, "NumberOfPoints"))) != 1 or int(values(grid, "NumberOfPoints")[0]) != n_points:
+            raise FileError(f"'{path}' has a mesh that changes, or of several parts: write one mesh for all instants")
+        check_size(f"field '{name}' of '{path}'", (n_steps, n_points), file)
+        if len(first) and (first.min() < 0 or first.max() + n_points > len(field)):
+            raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write it anew")
+        steps = np.array([field[start : start + n_points] for start in first])
+        return times, steps.reshape(len(first), n_points, *field.shape[1:]), points
+
+
+def _middles(path: Path, name: str, grid: Any, n_values: int, points: Array) -> Array:
+    """Return the middles (n_cells, 3) of the cells of a grid of one part, for a field with a value per cell [length]."""
+    nodes, starts = (np.asarray(values(grid, key), np.int64) for key in ("Connectivity", "Offsets"))
+    counts = np.diff(starts)
+    if len(values(grid, "NumberOfCells")) != 1 or n_values != len(counts):
+        raise FileError(f"field '{name}' of '{path}' has several instants or parts: write the cells once")
+    bad = not len(counts) or counts.min() < 1 or starts[0] != 0 or starts[-1] != len(nodes)
+    if bad or nodes.min() < 0 or nodes.max() >= len(points):
+        raise FileError(f"a cell of '{path}' names a point that is not there: write it anew")
+    return np.asarray(np.add.reduceat(points[nodes], starts[:-1], axis=0) / counts[:, None])

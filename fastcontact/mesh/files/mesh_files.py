@@ -16,8 +16,6 @@ from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# Suffixes of MED files, including code_aster's for meshes and results.
-MED_SUFFIXES = (".med", ".mmed", ".rmed")
 # code_aster's older text format, which can only be read.
 MAIL_SUFFIX = ".mail"
 
@@ -82,7 +80,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
 def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> tuple[Mesh, MeshReport]:
     """Read a mesh and return it with a report; parameters and errors as in `read_mesh`."""
     file = existing_file(path)
-    if file.suffix.lower() in MED_SUFFIXES:
+    if file.suffix.lower() in med.MED_SUFFIXES:
         content = med.read_med(file, mesh_name)
         mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
         dropped = {"vertex": content.n_vertices}
@@ -139,7 +137,7 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
     True
     """
     target = checked_target(path)
-    if target.suffix.lower() in MED_SUFFIXES:
+    if target.suffix.lower() in med.MED_SUFFIXES:
         med.write_med_mesh(target, mesh)
         return
     with replacing(target) as temporary:

@@ -22,8 +22,7 @@ from fastcontact.arrays import AnyArray, Numbers
 from fastcontact.errors import FileError, MeshError, unknown, warn
 from fastcontact.mesh import elements
 from fastcontact.mesh.files import abaqus, gmsh_versions
-from fastcontact.mesh.files.blocks import VERTEX
-from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, Orders, mesh_of
+from fastcontact.mesh.files.meshio_content import NODE_ORDER, UNFIT, VERTEX, Orders, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, library, read_in_process
 from fastcontact.mesh.mesh import Mesh
 
@@ -93,17 +92,6 @@ def _format(path: Path, writing: bool) -> str:
     return "gmsh"
 
 
-def _read_with_field(path: Path, field: str, where: str, kind: str) -> dict[str, Any]:
-    """Return the result of `meshio_process.read_in_process` for a mesh and a field, checked against the names in `where`."""
-    file_format = _format(path, writing=False)
-    if file_format == "gmsh":
-        raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
-    content = _content(path, path, file_format, field)
-    if field not in content[where]:
-        raise FileError(f"'{path}': {unknown(kind, field, content[where])}")
-    return content
-
-
 def _content(path: Path, readable: Path, file_format: str, field: str = "") -> dict[str, Any]:
     """Return the content of a file, or of a `readable` copy of it; FileError if meshio cannot read it."""
     _check_before(path, file_format)
@@ -113,31 +101,31 @@ def _content(path: Path, readable: Path, file_format: str, field: str = "") -> d
     return content
 
 
-def read_point_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
-    """Return the numbers (n_points, ...) [unit of the field] of a field, and its points (n_points, 2 or 3) [length].
+def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArray]:
+    """Return the numbers (n, ...) [unit of the field] of a field at points or cells, and their places (n, dim) [length].
 
-    FileError if meshio cannot read the file, or it has no such field.
+    The place of a cell is its middle. FileError if meshio cannot read the file, or it has no such field.
     """
-    content = _read_with_field(path, field, "fields", "field")
-    if content["field"] is None or content["points"] is None or len(content["field"]) != len(content["points"]):
-        raise FileError(f"field '{field}' of '{path}' has no number for each point: write it anew")
-    return content["field"], content["points"]
-
-
-def read_cell_data(path: Path, field: str) -> tuple[AnyArray, AnyArray]:
-    """Return the numbers (n_cells, ...) [unit of the field] of a field at cells, and their middles (n_cells, dim) [length].
-
-    FileError if meshio cannot read the file, or it has no such field.
-    """
-    content = _read_with_field(path, field, "cell_fields", "field of cells")
-    values, points, blocks = content["cell_field"], content["points"], content["cells"]
-    fits = [part is not None and nodes is not None and len(part) == len(nodes)
-            for part, (_, _, nodes) in zip(values, blocks, strict=True)]  # fmt: skip
-    if points is None or not values or not all(fits):
-        raise FileError(f"field '{field}' of '{path}' has no number for each cell: write it anew")
-    if any(len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)) for _, _, nodes in blocks):
+    file_format = _format(path, writing=False)
+    if file_format == "gmsh":
+        raise FileError(f"'{path}': fields of Gmsh files are not read: write the field to a .vtu or .med file")
+    content = _content(path, path, file_format, field)
+    names, points = content["fields" if at_points else "cell_fields"], content["points"]
+    if field not in names:
+        raise FileError(f"'{path}': {unknown('field' if at_points else 'field of cells', field, names)}")
+    values = [content["field"]] if at_points else content["cell_field"]
+    nodes = [points] if at_points else [block for _, _, block in content["cells"]]
+    fits = [
+        part is not None and of is not None and len(part) == len(of) for part, of in zip(values, nodes, strict=True)
+    ]
+    if points is None or not all(fits) or not fits:
+        each = "point" if at_points else "cell"
+        raise FileError(f"field '{field}' of '{path}' has no number for each {each}: write it anew")
+    if at_points:
+        return values[0], points
+    if any(len(block) and (block.min() < 0 or block.max() >= len(points)) for block in nodes):
         raise FileError(f"a cell of '{path}' names a point that is not there: write it anew")
-    return np.concatenate(values), np.concatenate([points[nodes].mean(axis=1) for _, _, nodes in blocks])
+    return np.concatenate(values), np.concatenate([points[block].mean(axis=1) for block in nodes])
 
 
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:

@@ -17,26 +17,25 @@ from fastcontact.mesh.generate.forest import Forest
 from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
 from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
 from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
-from fastcontact.mesh.generate.reference_points import with_reference_points
 from fastcontact.mesh.generate.refine import circles, linearised, refined
 from fastcontact.mesh.generate.rings import rings
 from fastcontact.mesh.generate.sphere import sphere_octant, sphere_on_block
-from fastcontact.mesh.generate.transform import merge_points, mirrored, renamed, transformed, union
+from fastcontact.mesh.generate.transform import (
+    merge_points,
+    mirrored,
+    renamed,
+    transformed,
+    union,
+    with_reference_points,
+)
 from fastcontact.mesh.mesh import Mesh
 
+_GENERATORS = (
+    half_spheres, quarter_disc, block, block_on_block, cylinder_on_block, box, graded_block, sphere_on_block, sphere_octant,
+    punched_block, crowned_blocks, rings,
+)  # fmt: skip
 GENERATORS: dict[str, Callable[..., Mesh]] = {
-    "half-spheres": half_spheres,
-    "quarter-disc": quarter_disc,
-    "block": block,
-    "block-on-block": block_on_block,
-    "cylinder-on-block": cylinder_on_block,
-    "box": box,
-    "graded-block": graded_block,
-    "sphere-on-block": sphere_on_block,
-    "sphere-octant": sphere_octant,
-    "punched-block": punched_block,
-    "crowned-blocks": crowned_blocks,
-    "rings": rings,
+    generator.__name__.replace("_", "-"): generator for generator in _GENERATORS
 }
 
 __all__ = [

@@ -48,13 +48,9 @@ def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: boo
     quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], axis=2)
     name, block = ("tri3", _cut(quads)) if triangles else ("quad4", quads.reshape(-1, 4))
     nodes = {"BOTTOM": numbers[:, 0], "RIGHT": numbers[-1], "TOP": numbers[::-1, -1], "LEFT": numbers[0, ::-1]}
-    groups, lines, first = {solid: np.arange(len(block))}, [np.empty((0, 2), int)], len(block)
-    for side, group in sides.items():
-        line = np.column_stack([nodes[side][:-1], nodes[side][1:]])
-        groups[group] = np.concatenate([groups.get(group, np.empty(0, int)), first + np.arange(len(line))])
-        lines.append(line)
-        first += len(line)
-    return Mesh(grid.reshape(-1, 2), {name: block, "line2": np.concatenate(lines)}, groups)
+    lines = {side: np.column_stack([nodes[side][:-1], nodes[side][1:]]) for side in sides}
+    mesh = Mesh(grid.reshape(-1, 2), {name: block}, {solid: np.arange(len(block))})
+    return mesh.with_facets({group: {"line2": lines[side]} for side, group in sides.items()})
 
 
 def _cut(quads: Indices) -> Indices:

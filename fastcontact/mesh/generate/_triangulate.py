@@ -36,11 +36,10 @@ def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> 
     points, triangles = triangulated(outline, spacing)
     starts = np.arange(len(outline))
     lines = np.column_stack([starts, np.roll(starts, -1)])
-    groups, first = {solid: np.arange(len(triangles))}, len(triangles)
-    for name, nodes in sides:
-        groups[name] = first + np.arange(len(nodes) - 1)
-        first += len(nodes) - 1
-    return Mesh(points, {"tri3": triangles, "line2": lines}, groups)
+    ends = np.cumsum([len(nodes) - 1 for _, nodes in sides])
+    mesh = Mesh(points, {"tri3": triangles}, {solid: np.arange(len(triangles))})
+    of_sides = zip(sides, np.split(lines, ends[:-1]), strict=True)
+    return mesh.with_facets({name: {"line2": block} for (name, _), block in of_sides})
 
 
 def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:

@@ -14,8 +14,8 @@ from fastcontact.mesh.elements import Element
 from fastcontact.mesh.generate._check import affordable, count, each, number, one_of, positive
 from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.topology import outer_facets
 
-AXES = "xyz"
 # All nodes of all elements are on a lattice of four steps per hexahedron, including mid nodes of the inner edges of pyramids.
 STEPS = 4
 _HEX = elements.get("hex8")
@@ -71,14 +71,14 @@ def box(
     lengths, corner = np.array(each(positive, "size", size)), np.array(each(number, "origin", origin))
     shape = np.array(each(count, "divisions", divisions))
     block, lattice = _solids(solid, shape)
-    facets, sides = _sides(solid, block, lattice, STEPS * shape)
-    cells, groups, first = {element: block}, {name: np.arange(len(block))}, len(block)
-    for kind, outer in facets.items():
-        cells[kind] = outer
-        for side, rows in sides[kind].items():
-            groups[side] = np.concatenate([groups.get(side, rows[:0]), first + rows])
-        first += len(outer)
-    return Mesh(corner + lattice / (STEPS * shape) * lengths, cells, groups)
+    mesh = Mesh(corner + lattice / (STEPS * shape) * lengths, {element: block}, {name: np.arange(len(block))})
+    sides = {}
+    for axis, letter in enumerate("XYZ"):
+        x = mesh.points[:, axis]
+        for end, on in (("MIN", x == x.min()), ("MAX", x == x.max())):
+            facets = {kind: block[on[block].all(axis=1)] for kind, block in outer_facets(mesh).items()}
+            sides[letter + end] = {kind: block for kind, block in facets.items() if len(block)}
+    return mesh.with_facets(sides)
 
 
 def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
@@ -94,25 +94,6 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     used, block = np.unique(places, return_inverse=True)
     lattice = np.column_stack([used // (n_y * n_z), used // n_z % n_y, used % n_z])
     return block.reshape(-1, solid.n_nodes), lattice
-
-
-def _sides(
-    solid: Element, block: Indices, lattice: Indices, last: Indices
-) -> tuple[dict[str, Indices], dict[str, dict[str, Indices]]]:
-    """Return the outer facets by facet element, and their rows in each group such as XMIN."""
-    facets: dict[str, list[Indices]] = {}
-    sides: dict[str, dict[str, Indices]] = {}
-    for axis, end in ((axis, end) for axis in range(3) for end in ("MIN", "MAX")):
-        on = lattice[:, axis] == (last[axis] if end == "MAX" else 0)
-        for local, kind in zip(solid.facets, solid.facet_elements, strict=True):
-            nodes = block[:, local]
-            on_side = nodes[on[nodes].all(axis=1)]
-            if len(on_side):
-                start = sum(map(len, facets.setdefault(kind, [])))
-                facets[kind].append(on_side)
-                rows, side = sides.setdefault(kind, {}), f"{AXES[axis].upper()}{end}"
-                rows[side] = np.concatenate([rows.get(side, on_side[:0, 0]), start + np.arange(len(on_side))])
-    return {kind: np.concatenate(parts) for kind, parts in facets.items()}, sides
 
 
 def on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:

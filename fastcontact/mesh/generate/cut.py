@@ -13,7 +13,7 @@ from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh, starts_of
+from fastcontact.mesh.mesh import Mesh
 
 Facet = frozenset[int]
 
@@ -53,13 +53,13 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     facets = {name: block for name, block in mesh.cells_of(group).items() if elements.get(name).dim == mesh.dim - 1}
     if not facets:
         raise MeshError(f"group '{group}' holds no facets, so nothing can be cut along it")
-    section = {frozenset(map(int, facet)) for block in facets.values() for facet in block}
+    section = _as_sets(facets)
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     direction = _direction(mesh, group, points, normal)
     beyond = _cells_beyond(mesh, group, section, points, direction)
     new_node = np.full(mesh.n_points, -1, np.int32)
     new_node[points] = mesh.n_points + np.arange(len(points), dtype=np.int32)
-    return _opened(mesh, group, section, facets, beyond, new_node)
+    return _opened(mesh, group, facets, beyond, new_node)
 
 
 def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] | None) -> Array:
@@ -73,6 +73,11 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
     if vector.shape != (mesh.dim,) or not (np.isfinite(length) and length > 0):
         raise MeshError(f"the normal {normal} of section '{group}' must be {mesh.dim} numbers, not all zero")
     return np.asarray(vector / length)
+
+
+def _as_sets(facets: dict[str, Numbers]) -> set[Facet]:
+    """Return the nodes of facets (n, k), by element, as sets."""
+    return {frozenset(facet) for block in facets.values() for facet in block.tolist()}
 
 
 def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
@@ -133,37 +138,24 @@ def _sides_of_parts(
 
 
 def _opened(
-    mesh: Mesh,
-    group: str,
-    section: set[Facet],
-    facets: dict[str, Numbers],
-    beyond: dict[str, list[int]],
-    new_node: Numbers,
+    mesh: Mesh, group: str, facets: dict[str, Numbers], beyond: dict[str, list[int]], new_node: Numbers
 ) -> Mesh:
     """Return the mesh with each `new_node` (n_points,), -1 where there is none, in the cells beyond the section."""
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
     moved = [_with_nodes(cells, name, np.array(rows), new_node) for name, rows in beyond.items()]
-    outer = {facet for sides in moved for facet in sides} - section
+    outer = {facet for sides in moved for facet in sides} - _as_sets(facets)
     for name, block in mesh.facets.items():
         rows = np.flatnonzero((new_node[block] >= 0).any(axis=1))
         follow = [row for row in rows.tolist() if frozenset(block[row].tolist()) in outer]
         _with_nodes(cells, name, np.array(follow, int), new_node)
-    groups = {}
-    starts = starts_of({name: range(len(block) + len(facets.get(name, ()))) for name, block in cells.items()})
-    for named, members in mesh.cell_groups.items():
-        parts = [starts[name] + rows for name, rows in mesh.split(members).items()]
-        groups[named] = np.concatenate(parts) if parts else members
-    groups[group + OPPOSITE] = np.concatenate(
-        [starts[name] + len(cells[name]) + np.arange(len(block)) for name, block in facets.items()]
-    )
-    for name, block in facets.items():
-        cells[name] = np.concatenate([cells[name], new_node[block]])
     old = np.flatnonzero(new_node >= 0)
     point_groups = {
         name: np.concatenate([members, new_node[members[new_node[members] >= 0]]])
         for name, members in mesh.point_groups.items()
     }
-    return Mesh(np.concatenate([mesh.points, mesh.points[old]]), cells, groups, point_groups)
+    points = np.concatenate([mesh.points, mesh.points[old]])
+    opened = mesh.replace(points=points, cells=cells, point_groups=point_groups)
+    return opened.with_facets({group + OPPOSITE: {name: new_node[block] for name, block in facets.items()}})
 
 
 def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new_node: Numbers) -> list[Facet]:

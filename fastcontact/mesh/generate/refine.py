@@ -59,9 +59,9 @@ def _pattern(name: str) -> _Pattern:
     for number, (a, b) in enumerate(element.edges):
         start, edge = element.nodes[a], element.nodes[b] - element.nodes[a]
         fraction = (lattice - start) @ edge / (edge @ edge)
-        there = np.abs(lattice - start - fraction[:, None] * edge).max(axis=1) < 1e-12
-        there[: element.n_nodes] = False
-        on_edge[there], along[there] = number, np.round(4 * fraction[there]).astype(int)
+        on = np.abs(lattice - start - fraction[:, None] * edge).max(axis=1) < 1e-12
+        on[: element.n_nodes] = False
+        on_edge[on], along[on] = number, np.round(4 * fraction[on]).astype(int)
     return _Pattern(element.shape(lattice), np.array(children), on_edge, along)
 
 

@@ -184,16 +184,7 @@ def _shallow(spacing: Spacing) -> Spacing:
 def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
     """Return a mapped box with the given grid lines; its groups and outer facets are those in `names`."""
     lattice = on_lines(element, grid, solid)
-    lattice = lattice.replace(points=place(*lattice.points.T))
-    return renamed(_without_unnamed_facets(lattice, names), dict(names))
-
-
-def _without_unnamed_facets(mesh: Mesh, names: Mapping[str, str]) -> Mesh:
-    """Return the mesh with the groups in `names` only, and without facets that belong to none of them."""
-    groups = {name: mesh.cell_groups[name] for name in names}
-    named = np.unique(np.concatenate(list(groups.values())))
-    rows = mesh.split(named)
-    cells = {name: mesh.cells[name][rows[name]] for name in mesh.cells if name in rows}
-    number = np.full(mesh.n_cells, -1)
-    number[named] = np.arange(len(named))
-    return mesh.replace(cells=cells, cell_groups={name: number[members] for name, members in groups.items()})
+    sides = {side: lattice.cells_of(side) for side in lattice.cell_groups if side in names and side != solid}
+    body = Mesh(place(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})
+    mesh = body.with_facets(sides)
+    return renamed(mesh.replace(cell_groups={name: mesh.cell_groups[name] for name in names}), dict(names))

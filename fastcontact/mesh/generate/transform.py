@@ -1,4 +1,4 @@
-"""Operations on meshes: mirror, move, unite, merge points, rename groups, and define groups by position."""
+"""Operations on meshes: mirror, move, unite, merge points, rename groups, add reference points and groups by position."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
+from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.generate._check import number, one_of
 from fastcontact.mesh.mesh import Mesh, starts_of
 
@@ -261,3 +262,45 @@ def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array
     rows = mesh.split(mesh.cell_groups[group])
     members = [mesh.offsets[kind] + chosen[near[mesh.cells[kind][chosen]].all(axis=1)] for kind, chosen in rows.items()]
     return mesh.with_groups(cells={name: np.concatenate(members)})
+
+
+@typed(MeshError)
+def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
+    """Return the mesh with reference points, which `Model.add_coupling` relates to groups.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    places : mapping of str to array_like (dim,)
+        Position of each reference point by name [length].
+
+    Returns
+    -------
+    Mesh
+        With groups of one point each: ``"<name>"``, and ``"<name> rotation"``, whose displacement is the rotation [radian],
+        in the plane its first component.
+
+    Raises
+    ------
+    MeshError
+        If a name exists already, or a position has the wrong dimension or is not finite.
+
+    Examples
+    --------
+    >>> from fastcontact.mesh.generate import block
+    >>> mesh = with_reference_points(block(), {"HANDLE": (0.5, 3.0)})
+    >>> mesh.points[mesh.point("HANDLE")].tolist()
+    [0.5, 3.0]
+    """
+    points = [mesh.points]
+    groups: dict[str, list[int]] = {}
+    for name, coordinates in places.items():
+        position = np.asarray(coordinates, float)
+        if position.shape != (mesh.dim,) or not np.isfinite(position).all():
+            raise MeshError(f"the place {coordinates!r} of reference point '{name}' must be {mesh.dim} numbers")
+        for group in (name, name + ROTATION):
+            if group in mesh.group_names:
+                raise MeshError(f"there is already a group '{group}': give the reference point another name")
+            groups[group] = [mesh.n_points + len(groups)]
+            points.append(position[None])
+    return mesh.replace(points=np.concatenate(points), point_groups={**mesh.point_groups, **groups})

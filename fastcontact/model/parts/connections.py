@@ -13,7 +13,7 @@ from fastcontact.elasticity.loads import axes_of, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.springs import grounded, joined
 from fastcontact.errors import ModelError
-from fastcontact.model.couplings import coupling
+from fastcontact.model.couplings import Term, coupling, relation
 from fastcontact.model.parts.initial_states import ModelInitialStates
 from fastcontact.model.periodicity import cyclic, periodic
 from fastcontact.model.pretension import PretensionForce, pretension
@@ -161,17 +161,14 @@ class ModelConnections(ModelInitialStates):
             check_number(f"a number of {name}", number)
         if component != NORMAL:
             axes_of(name, dict.fromkeys(component, 1.0), self.mesh.dim)
+        table = table_of(ramp, f"the ramp of {name}")
         sides = [directions_of(self.mesh, group, component) for group in (first, second)]
         for (nodes, directions), (opposite, directions_opposite) in zip(*sides, strict=True):
             match = matched(self.mesh, (first, nodes), (second, opposite), translation)
             rows = coefficients[0] * along(nodes, directions, self.n_dofs)
             rows = csr_array(rows + coefficients[1] * along(opposite[match], directions_opposite[match], self.n_dofs))
             rows.eliminate_zeros()
-            self.relations.append(
-                MultiPointConstraint(
-                    name, rows[np.diff(rows.indptr) > 0], float(value), table_of(ramp, f"the ramp of {name}")
-                )
-            )
+            self.relations.append(MultiPointConstraint(name, rows[np.diff(rows.indptr) > 0], float(value), table))
 
     def add_periodicity(
         self,
@@ -277,13 +274,8 @@ class ModelConnections(ModelInitialStates):
             raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
         origin_given = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
         along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
-        if (
-            sectors < 2
-            or sectors != int(sectors)
-            or len(origin_given) != self.mesh.dim
-            or len(along) != 3
-            or not any(along)
-        ):
+        on_axis = len(origin_given) == self.mesh.dim and len(along) == 3 and any(along)
+        if sectors < 2 or sectors != int(sectors) or not on_axis:
             raise ModelError(
                 f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
                 f"three, not {sectors}, {origin_given} and {along}"
@@ -316,23 +308,19 @@ class ModelConnections(ModelInitialStates):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -2.0)])
         """
-        row: dict[int, float] = {}
+        terms_of_nodes: list[Term] = []
         listed = [(point, component, coefficient) for point, component, coefficient in terms]
         name = "the relation of " + ", ".join(f"{component} of '{point}'" for point, component, _ in listed)
         check_number(f"the value of {name}", value)
         for point, component, coefficient in listed:
             check_number(f"a coefficient of {name}", coefficient)
             (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
-            for node in self._nodes(point):
-                dof = int(node) * self.mesh.dim + axis
-                row[dof] = row.get(dof, 0.0) + float(coefficient)
-        row = {dof: coefficient for dof, coefficient in row.items() if coefficient}
-        if not row:
+            terms_of_nodes += [(int(node), axis, float(coefficient)) for node in self._nodes(point)]
+        table = table_of(ramp, f"the ramp of {name}")
+        constraint = relation(name, [terms_of_nodes], self.mesh.points.shape, float(value), table)
+        if not constraint.rows.nnz:
             raise ModelError("a relation needs at least one displacement with a coefficient other than zero")
-        dofs = np.array(sorted(row), np.intp)
-        values = np.array([row[dof] for dof in dofs])
-        rows = csr_array((values, dofs, np.array([0, len(dofs)])), shape=(1, self.n_dofs))
-        self.relations.append(MultiPointConstraint(name, rows, float(value), table_of(ramp, f"the ramp of {name}")))
+        self.relations.append(constraint)
 
     def add_coupling(
         self,

@@ -26,11 +26,10 @@ from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, check_known
-from fastcontact.model.contact_options import SHARED_OPTIONS, ContactOptions
 from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.obstacle_rotation import rotation_of
-from fastcontact.model.pair_options import pair_options
+from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_options
 from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, table_of
@@ -299,11 +298,7 @@ class ModelContact(ModelConnections):
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
         driving = self._driving(name, moves, force)
-        turned = (
-            (None, None)
-            if rotation is None
-            else rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
-        )
+        turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         self._add_pair(
             ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
         )

@@ -18,8 +18,7 @@ from fastcontact.heat.conduction import Conduction
 from fastcontact.heat.loads import Film, FixedTemperature, HeatFlux, Heating, HeatSource, NodalHeat
 from fastcontact.heat.reached import not_reached
 from fastcontact.mesh.topology import bodies
-from fastcontact.model.parts.base import group_names
-from fastcontact.model.parts.materials import ModelMaterials
+from fastcontact.model.parts.base import ModelBase, group_names
 from fastcontact.model.periodicity import same_place
 from fastcontact.model.ramp import History, Table, table_of
 from fastcontact.model.rigid_motions import body_name
@@ -28,7 +27,7 @@ HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 
 @typed(ModelError)
-class ModelHeat(ModelMaterials):
+class ModelHeat(ModelBase):
     """A model with optional heat conduction; steps then contain temperatures and fluxes, and materials expand."""
 
     def fix_temperature(

@@ -301,13 +301,6 @@ class ModelInitialStates(ModelLoads):
 
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
         """Return the nodal forces (n_points, dim) [force] of a stress offset."""
-        held = stress_at_points(
-            self.mesh,
-            self.kinematics,
-            field.moduli,
-            field.loops,
-            np.zeros(self.mesh.points.shape),
-            field.treatment,
-            offset,
-        )
+        u, treatment = np.zeros(self.mesh.points.shape), field.treatment
+        held = stress_at_points(self.mesh, self.kinematics, field.moduli, field.loops, u, treatment, offset)
         return -internal_force(self.mesh, self.kinematics, held)

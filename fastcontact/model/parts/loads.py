@@ -25,11 +25,10 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.errors import ModelError
 from fastcontact.model.checks import check_forces
-from fastcontact.model.couplings import Moment
+from fastcontact.model.couplings import Moment, SpreadForce, spread_of
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.heat import ModelHeat
 from fastcontact.model.ramp import History, Table, table_of
-from fastcontact.model.spread_forces import SpreadForce, spread_of
 
 
 @typed(ModelError)
@@ -333,7 +332,7 @@ class ModelLoads(ModelHeat):
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return the nodal forces (n_points, dim) of all loads at multiplier 1, by history [force]."""
-        related = self._related()
+        related = self.related_points()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
             forces = self.load_vector(load)

@@ -193,10 +193,10 @@ class ModelSupports(ModelContact):
         for before in self.supports[:number]:
             if before.component == support.component and node in self.mesh.points_of(before.group):
                 break
-        own, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
+        value, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
         raise ModelError(
-            f"'{support.group}' prescribes {'xyz'[support.component]} = {own:g} at point {node}, but '{before.group}' "
-            f"prescribes {other:g} there{' with another ramp' if own == other else ''}: remove one of the two"
+            f"'{support.group}' prescribes {'xyz'[support.component]} = {value:g} at point {node}, but '{before.group}' "
+            f"prescribes {other:g} there{' with another ramp' if value == other else ''}: remove one of the two"
         )
 
     def _hold_axis(self, fixed: Mask, by_ramp: Mapping[PartHistory, Array]) -> None:

@@ -6,8 +6,7 @@ from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
-from fastcontact.mesh.rigid_parts import rigid_parts
-from fastcontact.mesh.topology import bodies, cells_joined_by_facets
+from fastcontact.mesh.topology import bodies, cells_joined_by_facets, rigid_parts
 from fastcontact.model.rigid_motions import free_motions
 
 PLANE = {"tri3": fc.generate.block, "quad4": fc.generate.block, "tri6": fc.generate.block, "quad8": fc.generate.block}

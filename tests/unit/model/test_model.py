@@ -8,7 +8,7 @@ from models import elastic_model
 
 import fastcontact as fc
 from fastcontact.contact.formulations import FORMULATIONS
-from fastcontact.model.contact_options import SHARED_OPTIONS, ContactOptions
+from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions
 
 
 @pytest.fixture

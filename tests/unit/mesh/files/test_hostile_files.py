@@ -23,8 +23,8 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli._results import case_data
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
-from fastcontact.mesh.files.blocks import Block, build_mesh
 from fastcontact.mesh.files.med import add_field, write_med_mesh
+from fastcontact.mesh.files.meshio_content import Block, build_mesh
 from fastcontact.results.med import write_med_results
 
 HEAP = b"GCOL\x01\0\0\0"
@@ -431,7 +431,7 @@ def test_pages_tell_the_limits_of_meshio():
     """Both pages that tell them: memory, and seconds for each megabyte."""
     docs = Path(__file__).parents[4] / "docs" / "reference"
     gib, times = meshio_process.MEMORY >> 30, meshio_process.MEMORY_PER_BYTE
-    assert f"at most {gib} GiB plus {times} times its size" in (docs / "promises.md").read_text("utf-8")
+    assert f"to {gib} GiB plus {times} times the size of the file" in (docs / "promises.md").read_text("utf-8")
     told = " ".join((docs / "io.md").read_text("utf-8").split())
     assert f"memory is limited to {gib} GiB plus {times} times the size of the file" in told
     each = meshio_process.SECONDS_PER_BYTE * 1e6

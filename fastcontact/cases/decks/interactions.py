@@ -1,0 +1,274 @@
+"""Interactions of a deck: the keywords of contact properties, and the options of pairs that follow from them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, defined, refusing, registered
+from fastcontact.cases.decks.content import Content, Interaction
+from fastcontact.cases.decks.histories import JUMP
+from fastcontact.contact.cohesion import ELASTIC
+from fastcontact.contact.conductance import Conductance
+from fastcontact.contact.overclosure import TabularLaw
+from fastcontact.errors import ContactError
+from fastcontact.model.model import Model
+
+INITIATIONS = {"QUADS": "quadratic", "MAXS": "maximum"}
+MODES = {"BK": "bk", "POWER LAW": "power"}
+# Conductance of ties relative to conductivity over model size: the sides differ in temperature by about its inverse.
+PERFECT = 1e8
+# Clearance, relative to the last one of a table, beyond which no heat is conducted.
+BEYOND = 1.0 + 1e-9
+
+
+def interaction(content: Content, block: Block) -> Interaction:
+    """*SURFACE INTERACTION: the beginning of the properties of contact pairs."""
+    name = block.required("NAME")
+    properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
+    if block.rows:
+        block.rows[0].number(0, 1.0)
+        content.note(block.rows[0], "the thickness of the interaction has no effect: that of the sections counts")
+    return properties
+
+
+def changed_interaction(content: Content, block: Block) -> Interaction:
+    """*CHANGE FRICTION: the beginning of a change from the current step on, given by the *FRICTION below it."""
+    name = block.required("INTERACTION")
+    before = defined("surface interaction", name, content.interactions, block)
+    changed = Interaction(name, block.location, friction=-1.0)  # to be set by *FRICTION
+    before.changes.append((len(content.steps) - 1, changed))
+    return changed
+
+
+def behaviour(content: Content, current: Interaction, block: Block) -> None:
+    """*SURFACE BEHAVIOR: hard, or soft with a slope, a table or an exponential law."""
+    law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
+    if law == "LINEAR":
+        current.penalty = block.only().positive(0, "slope")
+    elif law == "EXPONENTIAL":
+        row = block.only()
+        current.penalty = {"clearance": row.positive(0, "clearance"), "pressure": row.positive(1, "pressure")}
+    elif law == "TABULAR":
+        current.penalty = _table(block)
+    elif law == "TIED":
+        current.kind = "tied"
+    if "NO SEPARATION" in block.parameters:
+        current.kind = "bilateral_once_closed"
+
+
+def _table(block: Block) -> float | list[tuple[float, float]]:
+    """Return a table of overclosures and pressures, or the slope if it is one straight line through the origin."""
+    points = [(row.number(1), row.number(0)) for row in block.rows]
+    try:
+        TabularLaw("", points)
+    except ContactError:
+        raise block.refuse(
+            "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
+        ) from None
+    return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
+
+
+def friction(content: Content, current: Interaction, block: Block) -> None:
+    """*FRICTION: the coefficient, and in CalculiX the stick slope."""
+    row = block.only()
+    current.friction = row.number(0)
+    if current.friction < 0:
+        raise row.refuse(f"the coefficient of friction {current.friction:g} is negative")
+    if row.text(1) and row.number(1):
+        current.stick = row.positive(1, "stick slope")
+        content.note(row, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
+    if len(row.entries) > 2 and any(row.entries[2:]):
+        raise row.refuse("friction that depends on pressure or temperature is not supported: give one coefficient")
+
+
+def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
+    """*GAP CONDUCTANCE: stored until it is known whether heat is computed."""
+    current.conductance.append(block)
+
+
+def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
+    """*GAP HEAT GENERATION: the fraction of the friction work that becomes heat, half of it on each side."""
+    row = block.rows[0] if block.rows else Row(block.location, ())
+    share, secondary = row.number(0, 1.0), row.number(1, 0.5)
+    if not 0.0 <= share <= 1.0:
+        raise row.refuse(f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1")
+    if secondary != 0.5:
+        raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
+    if row.number(2, 0.0) > 0.0:
+        raise row.refuse("a given velocity is not supported: sides slide by their displacements")
+    current.friction_heat = block.location, share
+
+
+def keep(content: Content, current: Interaction, block: Block) -> None:
+    """*COHESIVE BEHAVIOR, *DAMAGE INITIATION, *DAMAGE EVOLUTION: stored until all are read."""
+    if block.keyword in current.cohesion:
+        raise block.refuse(f"surface interaction '{current.name}' has this keyword twice")
+    current.cohesion[block.keyword] = block
+
+
+def stabilization(content: Content, current: Interaction, block: Block) -> None:
+    """*DAMAGE STABILIZATION: without effect."""
+    content.note(block, "no effect: layers break without viscosity")
+
+
+def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
+    """Return the friction options of a pair; *CHANGE FRICTION changes them at the beginning of steps."""
+    table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
+    for before, changed in law.changes:
+        if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
+            raise changed.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+        table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
+        sticks |= {changed.stick} if changed.friction else set()
+    largest = max(value for _, value in table)
+    if not largest:
+        return {}
+    if len(sticks) > 1:
+        raise law.changes[0][1].refuse("a stick slope that changes is not supported: give the same one")
+    options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
+    if law.changes:
+        points = {**dict(table), float(n_steps): table[-1][1]}
+        options["friction_ramp"] = [(time, value / largest) for time, value in sorted(points.items())]
+    return options
+
+
+def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
+    """Return the options of a pair for its cohesive layer: a tie without stiffness and damage, none without a layer.
+
+    Raises CaseError if no law of the package matches the one of the deck.
+    """
+    blocks = law.cohesion
+    if not blocks:
+        return {}
+    behaviour, initiation, evolution = (
+        blocks.get(name) for name in ("COHESIVE BEHAVIOR", "DAMAGE INITIATION", "DAMAGE EVOLUTION")
+    )
+    if behaviour is None:
+        first = next(iter(blocks.values()))
+        raise first.refuse(f"surface interaction '{law.name}' has no *COHESIVE BEHAVIOR")
+    if law.friction or law.changes or law.penalty is not None or law.kind != "unilateral":
+        raise behaviour.refuse("*FRICTION, NO SEPARATION and soft contact beside a cohesive layer are not supported")
+    stiffness = _stiffness(behaviour)
+    if initiation is None and evolution is None and stiffness is None:
+        content.note(behaviour, "neither stiffness nor damage: the sides are tied")
+        return {"kind": "tied"}
+    if initiation is None or evolution is None:
+        raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed: layers here break")
+    strength, shear = _in_modes(initiation, "strengths")
+    criterion = INITIATIONS[initiation.choice("CRITERION", tuple(INITIATIONS))]
+    given = {"strength": strength, "shear_strength": shear, "initiation": criterion}
+    given.update(_evolution(evolution, given, stiffness))
+    if stiffness is None:
+        content.note(
+            behaviour,
+            f"no stiffness: damage begins at {ELASTIC:g} of the opening at which the layer is broken",
+        )
+    else:
+        given["stiffness"] = stiffness
+    content.note(
+        behaviour,
+        "sides that are pressed together have the stiffness of the layer, also where it is broken",
+    )
+    return {"cohesion": given}
+
+
+def _stiffness(block: Block) -> float | None:
+    """Return the stiffness of a layer, None if not given; raises CaseError if it differs between the directions."""
+    block.choice("TYPE", ("UNCOUPLED",))
+    block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
+    if not block.rows:
+        return None
+    row = block.only("modes or fields")
+    values = {row.number(index, row.number(0)) for index in range(3)}
+    if len(values) > 1:
+        raise row.refuse("a layer has one stiffness here, the same for opening and for sliding")
+    return row.positive(0, "stiffness")
+
+
+def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> dict[str, Any]:
+    """Return the fracture energies of a layer and its mixed-mode law."""
+    block.choice("SOFTENING", ("LINEAR",))
+    block.choice("MODE MIX RATIO", ("ENERGY",))
+    kind = block.choice("TYPE", ("DISPLACEMENT", "ENERGY"))
+    mode = block.choice("MIXED MODE BEHAVIOR", ("TABULAR", *MODES))
+    if kind == "ENERGY" and mode in MODES:
+        energy, shear = _in_modes(block, "energies")
+        power = as_number(block.location, block.required("POWER"))
+        return {"energy": energy, "shear_energy": shear, "mixed_mode": MODES[mode], "exponent": power}
+    if mode in MODES:
+        raise block.refuse(f"MIXED MODE BEHAVIOR={mode} is that of TYPE=ENERGY")
+    value = block.only("modes or fields").positive(0, "number")
+    if kind == "ENERGY":
+        return {"energy": value, "shear_energy": value}
+    strength = given["strength"]
+    if given["initiation"] != "quadratic" or given["shear_strength"] != strength:
+        raise block.refuse("TYPE=DISPLACEMENT is supported with CRITERION=QUADS of one strength only: give energies")
+    end = value / (1.0 - ELASTIC) if stiffness is None else strength / stiffness + value
+    return {"energy": 0.5 * strength * end}
+
+
+def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
+    """Return the numbers for opening and for sliding, the latter the same along both directions."""
+    row = block.only("modes or fields")
+    values = [row.positive(index, "number") for index in range(3)]
+    if values[1] != values[2]:
+        raise row.refuse(
+            f"the {quantity} along both shear directions must be the same, not {values[1]:g} and {values[2]:g}"
+        )
+    return values[0], values[1]
+
+
+def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
+    """Return the conductance options of a contact pair, by pressure or clearance; none without a table."""
+    tables: dict[str, Any] = {}
+    for block in law.conductance:
+        rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
+        if len({row.number(2, 0.0) for row in block.rows}) > 1:
+            raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
+        if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
+            raise block.refuse("needs conductances with pressures or clearances that ascend")
+        if len(rows) == 1:
+            tables["number"] = rows[0][1]
+            continue
+        pressure = "PRESSURE" in block.parameters
+        by = "pressure" if pressure or rows[-1][1] >= rows[0][1] else "gap"
+        if not pressure:
+            meant = (
+                "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
+            )
+            content.note(block, f"the conductance is by what it {meant}")
+        end = (rows[-1][0] * BEYOND, 0.0)
+        tables[by] = rows if by == "pressure" else [*rows, end]
+        if by == "pressure" and content.heat == "alone":
+            content.note(block, "steps of heat alone have no pressures: sides that touch conduct as without any")
+    given = tables.pop("number", None)
+    if given is not None and tables:
+        raise law.conductance[0].refuse("one conductance, and a table besides: give one of them")
+    if given is None and not tables:
+        return {}
+    with refusing(law.conductance[0]):
+        Conductance(law.name, tables or given)
+    return {"conductance": tables or given}
+
+
+def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
+    """Return the option for frictional heating of both sides, with the step length as time."""
+    if law.friction_heat is None:
+        if law.conductance:
+            content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
+        return {}
+    location, share = law.friction_heat
+    periods = {step.period for step in content.steps}
+    if len(periods) > 1:
+        raise location.refuse("heat of friction is supported in steps of the same length only, which is their time")
+    return {"friction_heat": share / periods.pop()}
+
+
+def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
+    """Return the conductance of a tie, independent of pressure and gap."""
+    largest = max(np.max(material.conductivity) for material, _ in model.materials)
+    h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
+    content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
+    return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h

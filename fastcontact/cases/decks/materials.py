@@ -1,0 +1,270 @@
+"""Materials of a deck: their keywords, and the materials of the model along axes, with expansion and conductivity."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fastcontact.arrays import Array
+from fastcontact.cases.decks.blocks import Block, refusing, registered
+from fastcontact.cases.decks.content import Content, Material
+from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
+from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.nonlinear_materials import (
+    ElasticPlastic,
+    MooneyRivlin,
+    NeoHookean,
+    NonlinearElastic,
+    Ogden,
+    Yeoh,
+)
+
+# Numbers of constants of elastic materials.
+CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
+# Poisson's ratio of hyperelastic materials with zero compressibility constant, as in CalculiX.
+UNGIVEN = 0.475
+# Numbers of deviatoric constants, and of compressibility constants.
+HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
+# Numbers of coefficients of expansion and conductivity by type.
+COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
+# The bodies in steps of pure heat conduction, which are fixed.
+HELD = LinearElastic(E=1.0, nu=0.0)
+
+
+def material(content: Content, block: Block) -> Material:
+    """*MATERIAL: the beginning of a material."""
+    name = block.required("NAME")
+    return registered("material", name, content.materials, Material(name, block.location), block)
+
+
+def elastic(content: Content, current: Material, block: Block) -> None:
+    """*ELASTIC: constants at one temperature."""
+    kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
+    kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
+    if not kinds:
+        known = ", ".join(CONSTANTS)
+        raise block.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
+    if kinds[0] != "ISOTROPIC":
+        _anisotropic(current, block, kinds[0])
+        return
+    row = block.only("temperatures" if len(block.rows) > 1 else "")
+    E, nu = row.number(0), row.number(1, 0.0)
+    if row.text(2):
+        content.note(row, "the temperature of the constants has no effect: there is one set of them")
+    with refusing(row, f"material '{current.name}': "):
+        law = LinearElastic(E=E, nu=nu)
+    current.law = lambda axes: law
+
+
+def _anisotropic(current: Material, block: Block, kind: str) -> None:
+    """Read the constants of a material with axes; they may span several lines, and a temperature may follow."""
+    numbers, count = block.numbers(), CONSTANTS[kind]
+    if not count <= len(numbers) <= count + 1:
+        raise block.refuse(
+            f"material '{current.name}': {len(numbers)} constants where {kind} has {count}, at one temperature"
+        )
+    values = numbers[:count]
+
+    def law(axes: Any) -> Orthotropic | Anisotropic:
+        if kind == "ENGINEERING CONSTANTS":
+            return Orthotropic(E=values[:3], nu=values[3:6], G=values[6:], axes=axes)
+        return Anisotropic(_moduli(values), axes=axes)
+
+    with refusing(block, f"material '{current.name}': "):
+        law(None)
+    current.law = law
+
+
+def _moduli(values: list[float]) -> Array:
+    """Return moduli (6, 6) [pressure] from the upper triangle in a deck, by columns 11, 22, 33, 12, 13, 23."""
+    D = np.zeros((6, 6))
+    places = [(i, j) for j in range(6) for i in range(j + 1)]
+    if len(values) == CONSTANTS["ORTHOTROPIC"]:
+        places = [(i, j) for i, j in places if i == j or j < 3]
+    for (i, j), value in zip(places, values, strict=True):
+        D[i, j] = D[j, i] = value
+    order = [0, 1, 2, 3, 5, 4]
+    return D[np.ix_(order, order)]
+
+
+def density(content: Content, current: Material, block: Block) -> None:
+    """*DENSITY."""
+    current.density = block.only().number(0)
+    if not current.density > 0:
+        raise block.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
+
+
+def plastic(content: Content, current: Material, block: Block) -> None:
+    """*PLASTIC: yield stresses by equivalent plastic strain, after the *ELASTIC of the material."""
+    hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
+    elastic = None if current.law is None else current.law(None)
+    if type(elastic) is not LinearElastic:
+        raise block.refuse(f"material '{current.name}': isotropic *ELASTIC constants come before it")
+    table = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
+    if not table:
+        raise block.refuse("a data line with a yield stress is needed")
+    if table[0][0] != 0.0:
+        raise block.rows[0].refuse(f"material '{current.name}': the first plastic strain {table[0][0]:g} must be zero")
+    if any(row.text(2) for row in block.rows) and len({row.text(2) for row in block.rows}) > 1:
+        raise block.refuse(f"material '{current.name}': one temperature is supported")
+    kinematic = 0.0
+    if hardening == "KINEMATIC":
+        if len(table) > 2:
+            raise block.refuse(
+                f"material '{current.name}': kinematic hardening is linear: two points, not {len(table)}"
+            )
+        kinematic = (table[1][1] - table[0][1]) / table[1][0] if len(table) == 2 else 0.0
+        table = table[:1]
+    with refusing(block, f"material '{current.name}': "):
+        law = ElasticPlastic(E=elastic.E, nu=elastic.nu, yield_stress=table[0][1], hardening=table, kinematic=kinematic)
+    current.law = lambda axes: law
+
+
+def hyperelastic(content: Content, current: Material, block: Block) -> None:
+    """*HYPERELASTIC: constants of the deviatoric part, then of the compressibility."""
+    kinds = [kind for kind in HYPERELASTIC if kind in block.parameters]
+    if len(kinds) != 1:
+        raise block.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
+    kind, terms = kinds[0], int(block.get("N", "1")) if kinds[0] == "OGDEN" else 1
+    numbers, (first, rest) = block.numbers(), (count * terms for count in HYPERELASTIC[kind])
+    if len(numbers) < first:
+        raise block.refuse(f"material '{current.name}': {kind} has {first} constants, {len(numbers)} are given")
+    constants, compressible = numbers[:first], [*numbers[first : first + rest], *[0.0] * rest][:rest]
+    if any(compressible[1:]):
+        raise block.refuse(f"material '{current.name}': of the compressibility only D1 is supported")
+    mu = _shear_modulus(kind, constants)
+    bulk = 2.0 / compressible[0] if compressible[0] else 2.0 * mu * (1.0 + UNGIVEN) / (3.0 * (1.0 - 2.0 * UNGIVEN))
+    if not compressible[0]:
+        content.note(block, f"D1 = 0: the bulk modulus is that of nu = {UNGIVEN}")
+    with refusing(block, f"material '{current.name}': "):
+        law = _hyperelastic(kind, constants, mu, bulk)
+    current.law = lambda axes: law
+
+
+def _shear_modulus(kind: str, constants: list[float]) -> float:
+    if kind == "OGDEN":
+        return sum(constants[::2])
+    return 2.0 * (constants[0] + (constants[1] if kind == "MOONEY-RIVLIN" else 0.0))
+
+
+def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
+    if kind == "NEO HOOKE":
+        return NeoHookean(E=9.0 * bulk * mu / (3.0 * bulk + mu), nu=(3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
+    if kind == "OGDEN":
+        return Ogden(constants[::2], constants[1::2], bulk=bulk)
+    if kind == "MOONEY-RIVLIN":
+        return MooneyRivlin(constants[0], constants[1], bulk)
+    return Yeoh(constants[0], constants[1], constants[2], bulk)
+
+
+def conductivity(content: Content, current: Material, block: Block) -> None:
+    """*CONDUCTIVITY: stored until it is known whether heat is computed."""
+    current.conductivity = block
+
+
+def specific_heat(content: Content, current: Material, block: Block) -> None:
+    """*SPECIFIC HEAT: without effect in static and steady-state steps."""
+    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
+
+
+def expansion(content: Content, current: Material, block: Block) -> None:
+    """*EXPANSION: coefficients at one temperature."""
+    current.expansion = along_axes(current, block)
+    if "ZERO" in block.parameters:
+        content.note(
+            block, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
+        )
+
+
+def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
+    """Return coefficients at one temperature, one for all directions or one along each axis."""
+    kind = block.choice("TYPE", tuple(COEFFICIENTS))
+    if len(block.rows) != 1:
+        raise block.refuse(
+            f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
+            "temperatures are not supported"
+        )
+    row, count = block.rows[0], COEFFICIENTS[kind]
+    values = tuple(row.number(index) for index in range(count))
+    if any(row.entries[count + 1 :]):
+        raise row.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
+    return values[0] if kind == "ISO" else values
+
+
+def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
+    """Return the material of the model along axes, with its expansion, and with incompatible modes if elements have them."""
+    if content.heat == "alone":
+        return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
+    assert material.law is not None
+    law, expansion = material.law(axes), material.expansion
+    law = replace(law, density=material.density)
+    if isinstance(law, NonlinearElastic) and modes:
+        content.note(material, f"material '{material.name}': incompatible modes are left out, since it is nonlinear")
+    elif modes:
+        law = replace(law, incompatible_modes=True)
+    if content.heat or material.conductivity is not None:
+        law = _with_axes(material, law, axes, conductivity=_conductivity(content, material))
+    heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
+    if expansion is None:
+        if heated:
+            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+        return replace(law, expansion=0.0) if heated else law
+    if not heated:
+        content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")
+    return _with_axes(material, law, axes, expansion=expansion)
+
+
+def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
+    """Return the conductivity of a material; raises CaseError if heat is computed and there is none."""
+    block = material.conductivity
+    if content.heat:
+        if block is None:
+            raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
+        return conductivity_of(material, block)
+    if block is not None:
+        content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
+    return None
+
+
+def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
+    """Return a material with further constants; it becomes orthotropic where they differ along the axes."""
+    if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
+        if isinstance(law, NonlinearElastic):
+            raise material.refuse(
+                f"material '{material.name}': expansion and conductivity along axes are supported in elastic materials only"
+            )
+        G = law.E / (2.0 * (1.0 + law.nu))
+        others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
+        law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
+    return replace(law, **constants)
+
+
+def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
+    """Return the conductivity of a material, one or three along its axes; raises CaseError unless all are positive."""
+    values = along_axes(material, block)
+    if not np.min(values) > 0.0:
+        raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
+    return values
+
+
+def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
+    """Return the strain measure of the model, and the reason why NLGEOM is not followed; empty if it is."""
+    finite = [law for law in laws if getattr(law, "strain", "small") == "finite"]
+    if finite:
+        return "finite", ""
+    if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
+        return "small", ""
+    reasons = {
+        "plasticity": any(isinstance(law, ElasticPlastic) for law in laws),
+        "a nearly incompressible elastic material": any(law.averaged for law in laws),
+        "initial stresses": bool(content.stresses),
+        "couplings, rigid bodies and multi-point constraints": bool(
+            content.links or content.pins or content.multi_points
+        ),
+        "pretension sections": bool(content.pretensions),
+        "incompatible modes": any(law.incompatible_modes for law in laws),
+    }
+    present = [name for name, given in reasons.items() if given]
+    return ("small", present[0]) if present else ("finite", "")

@@ -1,0 +1,85 @@
+"""Pyramids: the base [-1, 1]^2 at z = 0, then the apex (0, 0, 1); then mid nodes of the base's edges and of the rising ones.
+
+The shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992): polynomials in z, a = x / (1 - z)
+and b = y / (1 - z). At the apex their gradient depends on the direction; there the limit along the axis is used. The conical
+product rule of 27 points integrates the gradients of the quadratic element exactly, on curved cells too, so that patch
+tests are passed; code_aster uses 10 points.
+"""
+
+import numpy as np
+
+from fastcontact.mesh.elements._element import Array, Element, quadratic, with_middles
+from fastcontact.mesh.elements.quadrangles import EDGES, QUAD4
+from fastcontact.mesh.quadrature import conical_pyramid, pyramid_5
+
+X, Y = QUAD4.nodes.T
+
+
+def collapsed(xi: Array) -> tuple[Array, Array, Array]:
+    """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1) [-], at `xi` (m, 3) [-]; a = b = 0 at the apex."""
+    x, y, t = xi[:, 0:1], xi[:, 1:2], 1 - xi[:, 2:3]
+    apex = np.abs(t) < 1e-14
+    below = np.where(apex, 1.0, t)
+    return np.where(apex, 0.0, x / below), np.where(apex, 0.0, y / below), t
+
+
+def shape(xi: Array) -> Array:
+    """Shape functions (m, 5) [-] at `xi` (m, 3) [-]."""
+    a, b, t = collapsed(xi)
+    return np.column_stack([t * (1 + X * a) * (1 + Y * b) / 4, xi[:, 2]])
+
+
+def gradient(xi: Array) -> Array:
+    """Derivatives (m, 5, 3) [-] at `xi` (m, 3) [-]."""
+    a, b, _ = collapsed(xi)
+    base = np.stack([X * (1 + Y * b), Y * (1 + X * a), X * Y * a * b - 1], axis=2) / 4
+    apex = np.tile([0.0, 0.0, 1.0], (len(xi), 1, 1))
+    return np.concatenate([base, apex], axis=1)
+
+
+PYRAMID5 = Element(
+    "pyramid5", np.vstack([np.column_stack([QUAD4.nodes, np.zeros(4)]), [[0.0, 0.0, 1.0]]]),
+    edges=(*EDGES, (0, 4), (1, 4), (2, 4), (3, 4)), facets=((0, 3, 2, 1), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)),
+    shape=shape, gradient=gradient, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, quadratic="pyramid13",
+    dilatation=0,
+)  # fmt: skip
+# The sides of the base run along x at y = -1, along y at x = 1, along x at y = 1, along y at x = -1.
+SIDES = np.array([-1.0, 1.0, 1.0, -1.0])
+ALONG_X = np.array([True, False, True, False])
+
+
+def shape_13(xi: Array) -> Array:
+    """Shape functions (m, 13) [-] at `xi` (m, 3) [-]."""
+    (a, b, t), z = collapsed(xi), xi[:, 2:3]
+    corner = shape(xi)[:, :4] * (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)
+    base = t * t / 2 * np.where(ALONG_X, (1 - a * a) * (1 + SIDES * b), (1 - b * b) * (1 + SIDES * a))
+    return np.column_stack([corner, z * (2 * z - 1), base, 4 * z * shape(xi)[:, :4]])
+
+
+def gradient_13(xi: Array) -> Array:
+    """Derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
+    (a, b, t), z = collapsed(xi), xi[:, 2:3]
+    N, dN = shape(xi)[:, :4, None], gradient(xi)[:, :4]
+    outward = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]
+    corner = dN * outward + N * np.column_stack([X, Y, np.zeros(4)])
+    apex = np.zeros((len(xi), 1, 3))
+    apex[:, 0, 2] = 4 * z[:, 0] - 1
+    base = np.where(ALONG_X[:, None], _side(a, b, t, (0, 1)), _side(b, a, t, (1, 0)))
+    rising = 4 * (dN * z[:, :, None] + N * np.array([0.0, 0.0, 1.0]))
+    return np.concatenate([corner, apex, base, rising], axis=1)
+
+
+def _side(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
+    """Derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for the four S of `SIDES`; `axes` of a and b."""
+    functions = np.empty((len(a), 4, 3))
+    functions[:, :, axes[0]] = -a * t * (1 + SIDES * b)
+    functions[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2
+    functions[:, :, 2] = (1 - a * a) * t * SIDES * b / 2 - t * (1 + SIDES * b)
+    return functions
+
+
+PYRAMID13 = quadratic(
+    "pyramid13", PYRAMID5, (with_middles(PYRAMID5), shape_13, gradient_13), quadrature=conical_pyramid(3),
+    meshio="pyramid13", med="P13", vtk=27, dilatation=0,
+)  # fmt: skip
+ELEMENTS = PYRAMID13, PYRAMID5

@@ -1,0 +1,59 @@
+"""Wedges: the triangle (0,0) (1,0) (0,1) at z = -1, then at z = 1; six integration points.
+
+Then mid nodes of the edges below, above, upright; centres of the faces 0143, 1254, 2035. Quadratic elements have 21
+integration points. The order is that of Gmsh, Abaqus and VTK 9.7; older documentation of VTK numbers the triangles in the
+opposite direction.
+"""
+
+import numpy as np
+
+from fastcontact.mesh.elements._element import Array, Element, product, quadratic, with_middles
+from fastcontact.mesh.elements.lines import LINE2, LINE3
+from fastcontact.mesh.elements.triangles import TRI3, TRI6
+from fastcontact.mesh.quadrature import gauss_line, prism, triangle_3_sides, triangle_7
+
+NODES, shape, gradient = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
+Z = NODES[:, 2]
+TWICE = np.tile(np.arange(3), 2)  # the functions of the triangle for both of them
+
+WEDGE6 = Element(
+    "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
+    facets=((0, 2, 1), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)), shape=shape, gradient=gradient,
+    quadrature=prism(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, quadratic="wedge15",
+    dilatation=0,
+)  # fmt: skip
+# Ends of the edges of the two triangles, and the side z = -1 or 1 of each.
+A, B = np.array(WEDGE6.edges[:6]).T
+SIDE = Z[A]
+
+
+def shape_15(xi: Array) -> Array:
+    """Shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
+    L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
+    corner = shape(xi) * (2 * L - 2 + z * Z)
+    flat = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
+    return np.column_stack([corner, flat, L[:, :3] * (1 - z * z)])
+
+
+def gradient_15(xi: Array) -> Array:
+    """Derivatives (m, 15, 3) [-] at `xi` (m, 3) [-]."""
+    L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
+    dL = TRI3.gradient(xi[:, :2])[:, TWICE]
+    slope = np.concatenate([2 * dL, np.broadcast_to(Z[:, None], (*L.shape, 1))], axis=2)
+    corner = gradient(xi) * (2 * L - 2 + z * Z)[:, :, None] + shape(xi)[:, :, None] * slope
+    across = 2 * (dL[:, A] * L[:, B, None] + L[:, A, None] * dL[:, B]) * (1 + z * SIDE)[:, :, None]
+    flat = np.concatenate([across, (2 * L[:, A] * L[:, B] * SIDE)[:, :, None]], axis=2)
+    upright = np.concatenate([dL[:, :3] * (1 - z * z)[:, :, None], (-2 * z * L[:, :3])[:, :, None]], axis=2)
+    return np.concatenate([corner, flat, upright], axis=1)
+
+
+WEDGE15 = quadratic(
+    "wedge15", WEDGE6, (with_middles(WEDGE6), shape_15, gradient_15), quadrature=prism(triangle_7(), gauss_line(3)),
+    meshio="wedge15", med="P15", vtk=26, dilatation=0,
+)  # fmt: skip
+CENTRES = np.column_stack([TRI6.nodes[3:], np.zeros(3)])
+WEDGE18 = quadratic(
+    "wedge18", WEDGE6, product(np.vstack([WEDGE15.nodes, CENTRES]), TRI6, LINE3), quadrature=WEDGE15.quadrature,
+    meshio="wedge18", med="P18", vtk=32, dilatation=0,
+)  # fmt: skip
+ELEMENTS = WEDGE15, WEDGE18, WEDGE6
