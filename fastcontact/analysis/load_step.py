@@ -15,12 +15,11 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.displacements import with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.step_history import keep_path, save_contact_history
 from fastcontact.analysis.step_result import contact_results, counted, recover
 from fastcontact.analysis.thermal_coupling import (

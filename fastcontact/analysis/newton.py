@@ -17,17 +17,16 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.criteria import LOOSEST
-from fastcontact.analysis.displacements import solve_displacements, with_loads
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.scatter import DISPLACEMENT
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.step_equilibrium import StepEquilibrium, solve_displacements, with_loads
 from fastcontact.analysis.terms import Fluid, Terms
+from fastcontact.analysis.tolerances import DISPLACEMENT
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError

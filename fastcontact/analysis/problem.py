@@ -14,8 +14,8 @@ from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import FIRM, SOFT, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
+from fastcontact.analysis.slip import at_points
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration

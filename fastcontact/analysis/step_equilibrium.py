@@ -1,15 +1,20 @@
-"""The equilibrium at the end of a load step."""
+"""The equilibrium at the end of a load step, and its displacements for known contact forces."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from scipy.sparse import csr_array
+
 from fastcontact.analysis.balance import Balance
 from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.terms import Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
+from fastcontact.linear.protocol import Loaded
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,3 +57,27 @@ class StepEquilibrium:
         names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
         counts = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}
         return {**counts, "history": self.newton}
+
+
+def with_loads(problem: Problem, load: StepLoad) -> Loaded:
+    """Return the equations of the step: the prepared matrix with the right-hand side of its loads."""
+    return problem.solver.load(problem.system.right(load.force, load.lift))
+
+
+def solve_displacements(
+    problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array
+) -> tuple[Array, Array]:
+    """Return all displacements [length] and the contact forces [force], both (n_dofs,).
+
+    Without contact, iterative solvers begin at the displacements `guess` (n_dofs,) [length].
+    """
+    system, lift = problem.system, load.lift
+    if settled is None:
+        none = csr_array((0, len(lift))), np.empty(0)
+        v = loaded.solve(*none, guess=system.unknowns(guess, lift))[0]
+        return system.displacement(v, lift), np.zeros(len(lift))
+    contact_force, rigid = settled.force, settled.iterate.rigid
+    if problem.floating_bodies is not None and rigid is not None:
+        lift = lift + problem.floating_bodies.rigid(rigid.position)
+    v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
+    return system.displacement(v, lift), contact_force

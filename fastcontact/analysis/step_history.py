@@ -9,10 +9,9 @@ import numpy as np
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.iterate import gaps_and_forces
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.slip import slip_in_step
+from fastcontact.analysis.slip import Worn, slip_in_step
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond

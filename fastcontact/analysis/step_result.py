@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analysis.contact_result import contact_result
+from fastcontact.analysis.contact_result import contact_result, joined, on_deformed_surface
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.periodic_interfaces import joined
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.analysis.true_pressure import on_deformed_surface
 from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies

@@ -16,13 +16,13 @@ from scipy.sparse import csr_array
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.balance import Balance
+from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
-from fastcontact.analysis.true_pressure import areas
 from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing

@@ -12,15 +12,16 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
-from fastcontact.contact.line_projection import along_line_normals, smooth_ends
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Places,
+    along_line_normals,
     along_normals,
     at_nodes_of_facets,
     facet_normals,
     interpolated,
     places,
+    smooth_ends,
     smooth_normals,
 )
 from fastcontact.contact.search.closest import Closest, closest_of_kinds

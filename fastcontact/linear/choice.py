@@ -9,7 +9,7 @@ import pkgutil
 
 from fastcontact.errors import ModelError, unknown
 from fastcontact.linear import solvers
-from fastcontact.linear.factors.factor_solver import AFFORDABLE
+from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")

@@ -21,8 +21,8 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.factors.factor_solver import AFFORDABLE
-from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
+from fastcontact.linear.elimination.loaded import put_back_tolerance, tighten
+from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
 from fastcontact.linear.multigrid.solver import (

@@ -5,9 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 import fastcontact as fc
-from fastcontact.contact.line_projection import along_line_normals
 from fastcontact.contact.pairing import pair
-from fastcontact.contact.projection import at_nodes_of_facets, interpolated, places, smooth_normals
+from fastcontact.contact.projection import along_line_normals, at_nodes_of_facets, interpolated, places, smooth_normals
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
