@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analysis.problem import Problem
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.configuration import Configuration
@@ -21,6 +23,36 @@ from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.results.step import ContactResult, half_width
+
+
+def contact_results(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+) -> dict[str, ContactResult]:
+    """Return the results of all contact pairs.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+    settled : SettledContact
+    end : State
+        State at the end of the step, of which displacements and points of first contact are used.
+    """
+    displacement = problem.displacement(end.u)
+    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
+    results = {
+        name: contact_result(
+            name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
+            problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
+        )
+        for name, rows in settled.constraints.rows().items()
+    }  # fmt: skip
+    results = _joined(problem, results)
+    if problem.model.strain == "small":
+        return results
+    return {name: _on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
 
 
 def contact_result(
@@ -258,7 +290,7 @@ def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:
     return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)
 
 
-def on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
+def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
     """Return a contact result with Cauchy instead of nominal tractions, and widths in the deformed configuration.
 
     The force of each node is preserved (lumped form of Nanson's formula: Bonet and Wood, 2008, equation 4.68).
@@ -302,7 +334,7 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
     return ratios[0], ratios[1]
 
 
-def joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
+def _joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
     """Return the results of contact pairs with one traction for both nodes of a point, closed if one of them is."""
     results_of_pairs = dict(results)
     for name, contact in results.items() if problem.model.periodic_interfaces else ():

@@ -15,13 +15,14 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
+from fastcontact.analysis.contact_result import contact_results
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.step_history import keep_path, save_contact_history
-from fastcontact.analysis.step_result import contact_results, counted, recover
+from fastcontact.analysis.step_result import counted, recover
 from fastcontact.analysis.thermal_coupling import (
     Heated,
     expanded,
@@ -29,7 +30,6 @@ from fastcontact.analysis.thermal_coupling import (
     first_rise,
     settle_heat,
 )
-from fastcontact.arrays import Array
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -113,17 +113,14 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
+    # Nonlinear bodies are extrapolated along the motions of obstacles, too.
+    motions = [] if problem.bodies is None else load.obstacles.values()
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
         largest_force=max(state.largest_force, largest(pushing.force)),
-        extrapolation=state.extrapolation.to(load.lift, pushing.force, *_motions(problem, load)),
+        extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions),
     )  # fmt: skip
     return Beginning(start, index, load, loaded, expected)
-
-
-def _motions(problem: Problem, load: StepLoad) -> list[Array]:
-    """Return the motions of obstacles along which nonlinear bodies are extrapolated."""
-    return [] if problem.bodies is None else [*load.obstacles.values()]
 
 
 def after_contact(

@@ -16,7 +16,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
-from fastcontact.analysis.criteria import LOOSEST
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
@@ -270,7 +270,7 @@ class _Newton:
                 self._kept = problem
         load = load_about(problem, terms, u, self._load, iterate.rigid)
         iterate.u, iterate.history = u.copy(), []
-        enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), LOOSEST)
+        enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
         inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
         return self._contact(inner, load, with_loads(problem, load), u, Extrapolation())
 

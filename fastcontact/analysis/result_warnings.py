@@ -20,7 +20,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.elasticity import element_kernels, recovery
-from fastcontact.elasticity.materials import LinearElastic, Material
+from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
@@ -169,7 +169,10 @@ def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
 def _large_strain(problem: Problem, last: StepResult) -> Iterator[str]:
     laws, field = [material for material, _ in problem.model.materials], problem.field
     isotropic = np.array([isinstance(law, LinearElastic) and not law.graded for law in laws])
-    shear = np.array([_shear_modulus(law) for law in laws])
+    # Strains of other materials are computed below.
+    shear = np.array(
+        [getattr(law, "shear_modulus", math.inf) if own else math.inf for law, own in zip(laws, isotropic)]
+    )
     strain, border = 0.0, last.material_stress
     inside = np.ones(len(last.stress), bool)
     if border is not None:
@@ -211,11 +214,6 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
             f"temperatures and initial states cause strains of {strain:.3g}, beyond the {STRAIN} up to which linear "
             "kinematics are accurate: are they in the units of the model?"
         )
-
-
-def _shear_modulus(law: Material) -> float:
-    """Return the shear modulus of an isotropic material [pressure]; infinity for others, whose strains are computed."""
-    return law.shear_modulus if isinstance(law, LinearElastic) and not law.graded else math.inf
 
 
 def _large_rotation(problem: Problem, state: State) -> Iterator[str]:

@@ -22,8 +22,6 @@ from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 
-# Cost of the projection of a point relative to a node of a cell, see `portions`.
-EFFORT = 16
 # Facets that meet at a smaller angle than this approximate a smooth surface; others form a corner [degrees].
 CORNER = 45.0
 
@@ -212,7 +210,7 @@ def along_normals(
         lambda portion: projection_kernels.along_normals(
             *portion, seen, heights, terms, directions, side.triangular, side.neighbours, facet
         ),
-        portions(len(points), EFFORT),
+        portions(len(points)),
     )
     return facet
 
@@ -228,7 +226,7 @@ def _polynomials(kinds: Sequence[Array]) -> Array:
 
 def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
-) -> tuple[Indices, Array, Array]:
+) -> tuple[Indices, Array, Array, Array]:
     """Project points (n, 2) on a line along its interpolated normals; see `along_normals`."""
     n_facets = side.n_facets
     corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
@@ -245,7 +243,8 @@ def along_line_normals(
     line_projection_kernels.along_normals(
         np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
     )
-    return facet, xi[:, None], overhang
+    xi = xi[:, None]
+    return facet, xi, overhang, interpolated(normals[facet], places(side, facet, xi))
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:

@@ -14,7 +14,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.delassus import InverseColumns, check_rows, multipliers, solve_multipliers, symmetric
+from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
@@ -25,7 +25,6 @@ LAST_UP_TO = 4000
 # Number of unknowns up to which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 ATTAINABLE = 1e-14
-NONE = np.empty(0, np.intp)
 # Number of stored right-hand sides: loads and supports seldom have more independent ramps.
 KEPT = 4
 
@@ -120,7 +119,7 @@ class FactorSolver(LinearSolver):
             If K is singular.
         """
         self.n, self._K, self.refines = K.shape[0], K, False
-        last = NONE if involved is None or len(involved) > LAST_UP_TO else involved
+        last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
         self._factors = self._factorised(K, last)
         self.counters.setups += 1
         self.columns, self.known_loads = InverseColumns(self.n, self._factors.solve), KnownLoads()
@@ -187,7 +186,7 @@ class LoadedFactor:
         """See `Loaded`."""
         if B.shape[0] == 0:
             return self._free, np.empty(0)
-        multiplier = multipliers(self._solver.columns, B, c - B @ self._free, C)
+        multiplier = solve_multipliers(self._solver.columns.of_rows(B), c - B @ self._free, C)
         return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:

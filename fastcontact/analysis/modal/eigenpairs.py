@@ -20,7 +20,7 @@ from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.multigrid.hierarchy import COARSEST
-from fastcontact.linear.multigrid.solver import Multigrid
+from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -31,8 +31,8 @@ UNSTABLE = (
     "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
     "(stress_stiffening=False)"
 )
-# Iterations between checks of the error, and the number of checks.
-ROUND, ROUNDS = 20, 15
+# Iterations between checks of the error.
+ROUND = 20
 
 
 def lowest(
@@ -118,7 +118,7 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
 
     unit = LinearOperator(shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float)
     vectors = start
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS // ROUND):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a warning that a round has few iterations
             values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
@@ -127,7 +127,7 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
         if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= ACCURACY**2 * values[:n]).all():
             return np.asarray(vectors)
     raise ConvergenceError(
-        f"{n} modes did not settle in {ROUNDS * ROUND} iterations of multigrid: ask for fewer, or use "
+        f"{n} modes did not settle in {MAX_ITERATIONS} iterations of multigrid: ask for fewer, or use "
         'linear_solver="direct" if memory allows'
     )
 

@@ -11,15 +11,16 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.linear.delassus import multipliers
+from fastcontact.linear.delassus import solve_multipliers
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import LinearSolver, Monitor
+from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Target of the residual relative to its admissible value, and the smallest relative residual that round-off allows.
-LEFT, LEAST = 0.1, 1e-15
+# Target of the residual relative to its admissible value.
+LEFT = 0.1
 
 
 class LoadedIteration:
@@ -57,7 +58,7 @@ class LoadedIteration:
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
-        multiplier = multipliers(solver.columns, B, c - B @ self._free, C)
+        multiplier = solve_multipliers(solver.columns.of_rows(B), c - B @ self._free, C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
@@ -79,7 +80,7 @@ class LoadedIteration:
 
 def tighten(solver: LinearSolver, excess: float) -> bool:
     """Lower the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; False at the lower limit."""
-    tolerance = max(solver.tolerance * LEFT / excess, LEAST)
+    tolerance = max(solver.tolerance * LEFT / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:
         return False
     log.info(
