@@ -36,7 +36,7 @@ class Criteria:
         Keep the pairing of the undeformed configuration, with its normals and projections, in all steps (REAC_GEOM =
         'SANS'); for small motions only. Without friction the solution is then independent of the load path.
     max_geometry_updates, max_active_set_iterations : int
-        Limits per step, and per pairing.
+        Limits per step, and per pairing; the former also limits the exchanges between contact and heat conduction.
     max_halvings : int
         How many times a load step that does not converge is halved before the analysis stops (DECOUPE); twice as many
         with nonlinear bodies, whose substeps double in size after each one that took few iterations. Substeps are

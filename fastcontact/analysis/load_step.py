@@ -16,7 +16,6 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.contact_result import contact_results
-from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
@@ -80,7 +79,10 @@ def _ended(
     end = solution.terms.commit(u, end)
     contact: dict[str, ContactResult] = {}
     if settled is not None:
-        end, contact = after_contact(problem, start, load, settled, end, balanced.energy)
+        end = save_contact_history(problem, start, load, settled, end)
+        contact = contact_results(problem, start, load, settled, end)
+        end, contact = keep_path(problem, start, load, settled, end, contact, balanced.energy)
+        end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
     else:
         end = replace(end, extrapolation=start.extrapolation.converged(u, {}))
     if settled is None and start.work is not None:
@@ -121,13 +123,3 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions),
     )  # fmt: skip
     return Beginning(start, index, load, loaded, expected)
-
-
-def after_contact(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
-) -> tuple[State, dict[str, ContactResult]]:
-    """Return the state at the end of the step with its contact history, and the results of all contact pairs."""
-    end = save_contact_history(problem, start, load, settled, end)
-    results = contact_results(problem, start, load, settled, end)
-    end, results = keep_path(problem, start, load, settled, end, results, energy)
-    return end.after_touching(name for name, pair in results.items() if pair.active.any()), results

@@ -16,9 +16,6 @@ from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
 
-# In facet lengths: nodes up to this distance beyond the other side may still carry pressure, by parts of their facets.
-STANDS_OUT = 3.0
-
 
 def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
     """Return the slip (m, dim) of the closed nodes in a step that ends at the configuration `at` [length]."""
@@ -29,9 +26,12 @@ def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -
 
 
 def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
-    """Return the slip increment (m, dim) of the secondary nodes, zero where they face nothing [length]."""
+    """Return the slip increment (m, dim) of the secondary nodes [length].
+
+    Nodes beyond the other side may still carry pressure, by parts of their facets.
+    """
     nodes = Candidates.nodes_of(pair.secondary)
-    pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
+    pairing = pair.facing(nodes, at, np.inf)
     directions = tangents(pairing.normal)
     rows, slip0 = pair.slips(nodes, pairing, directions, at)
     along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])

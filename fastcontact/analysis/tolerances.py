@@ -18,6 +18,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
+from fastcontact.round_off import SINGLE_PRECISION
 
 # Relative residual of the first solution of a step by an iterative solver, and of later ones relative to the last change of
 # the displacement and to the last residual: more accuracy than that of the pairing is useless.
@@ -30,8 +31,8 @@ LEAST_FALL = 0.2
 INEXACT_NEWTON_STEPS = 3
 # Number of updates in the window, and largest distance of their displacements over the typical change (WINDOW if collinear).
 WINDOW, APART = 8, 4.0
-# What may scatter at most: displacements relative to the largest one, nodal contact forces relative to the largest one.
-DISPLACEMENT, FORCE = 1e-6, 1e-5
+# What nodal contact forces may scatter at most, relative to the largest one.
+FORCE = 1e-5
 # Changes below this fraction of those at the beginning of the window still converge.
 DECLINE = 0.5
 
@@ -140,7 +141,7 @@ class Watch:
         Scatter or None
             None while the updates may still converge, or scatter by more than is acceptable.
         """
-        if not change <= DISPLACEMENT * size:
+        if not change <= SINGLE_PRECISION * size:
             self.forget()
             return None
         self._parts.append(unknowns.copy())
@@ -154,7 +155,7 @@ class Watch:
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
         if declining or scatter.displacement * size > APART * float(np.median(changes)):
             return None
-        return scatter if scatter.displacement <= DISPLACEMENT and scatter.force <= FORCE else None
+        return scatter if scatter.displacement <= SINGLE_PRECISION and scatter.force <= FORCE else None
 
     def forget(self) -> None:
         """Discard the window."""

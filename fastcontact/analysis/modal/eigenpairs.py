@@ -21,11 +21,9 @@ from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.multigrid.hierarchy import COARSEST
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
-from fastcontact.linear.protocol import LinearSolver
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Error of vectors; the error of eigenvalues is its square.
-ACCURACY = 1e-5
 UNSTABLE = (
     "the settled step is not stable, small motions grow by themselves: where nodes slide, as round a tightened bolt, "
     "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
@@ -124,7 +122,7 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
             values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
         residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
         # Measured by the energy of the error, independent of units: the error of eigenvalues is its square.
-        if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= ACCURACY**2 * values[:n]).all():
+        if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= TOLERANCE * values[:n]).all():
             return np.asarray(vectors)
     raise ConvergenceError(
         f"{n} modes did not settle in {MAX_ITERATIONS} iterations of multigrid: ask for fewer, or use "
