@@ -21,7 +21,7 @@ from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.step_history import keep_path, save_contact_history
-from fastcontact.analysis.step_result import counted, recover
+from fastcontact.analysis.step_result import recover
 from fastcontact.analysis.thermal_coupling import (
     Heated,
     expanded,
@@ -62,8 +62,8 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     if rise is not None:
         solve = partial(newton, problem, begin)
         heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, solve)
-    iterations = counted(solution.settled, problem.solver.counters.iterations - solved_before)
-    return _ended(problem, begin.state, load, solution, {**iterations, **solution.counts}, (index, instant), heated)
+    iterations = solution.counts(problem.solver.counters.iterations - solved_before)
+    return _ended(problem, begin.state, load, solution, iterations, (index, instant), heated)
 
 
 def _ended(

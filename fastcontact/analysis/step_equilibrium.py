@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -49,14 +49,24 @@ class StepEquilibrium:
         """An entry for each geometry update of the contact."""
         return self.settled.iterate.history if self.settled is not None else []
 
-    @property
-    def counts(self) -> dict[str, Any]:
-        """Iteration history of nonlinear bodies, with the pairings and active-set iterations of all iterations."""
+    def counts(self, linear_iterations: int) -> dict[str, Any]:
+        """Return the work of the step, see `StepResult.iterations`.
+
+        For nonlinear bodies the history is that of Newton's iterations, with the pairings and active-set iterations of all.
+        """
+        history, scatter = self.history, None if self.settled is None else self.settled.scatter
+        counts: dict[str, Any] = {
+            "geometry_updates": max(len(history) - 1, 0),
+            "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
+            "linear_iterations": linear_iterations,
+            "history": history,
+            **({} if scatter is None else {"scatter": asdict(scatter)}),
+        }
         if self.terms.prepared:
-            return {}
+            return counts
         names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
-        counts = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}
-        return {**counts, "history": self.newton}
+        of_newton = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}
+        return {**counts, **of_newton, "history": self.newton}
 
 
 def with_loads(problem: Problem, load: StepLoad) -> Loaded:

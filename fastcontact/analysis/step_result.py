@@ -1,11 +1,9 @@
-"""Recover the result of a load step: stresses and iteration counts."""
+"""Recover the result of a load step."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
-from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
@@ -67,16 +65,3 @@ def recover(
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
     )  # fmt: skip
-
-
-def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
-    """Return the work of a load step, see `StepResult.iterations`."""
-    history = settled.iterate.history if settled is not None else []
-    counts = {
-        "geometry_updates": max(len(history) - 1, 0),
-        "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
-        "linear_iterations": linear_iterations,
-        "history": history,
-    }
-    scatter = None if settled is None else settled.scatter
-    return counts if scatter is None else {**counts, "scatter": dataclasses.asdict(scatter)}
