@@ -112,17 +112,12 @@ class SurfaceDofs(ActiveDofs):
 
     # Of one load step, see `for_step`.
     _lift: Array
-    _prescribed: float
-    _beyond: float
     _unknown_beyond: float
 
     def for_step(self, u: Array, lift: Array) -> SurfaceDofs:
         """See `ActiveDofs`."""
         step = copy.copy(self)
-        step._lift, step._prescribed = lift[self._dofs], largest(lift)
-        beyond = u.copy()
-        beyond[self._dofs] = 0.0
-        step._beyond = largest(beyond)
+        step._lift = lift[self._dofs]
         beyond = self._system.unknowns(u, lift)
         beyond[self._unknowns] = 0.0
         step._unknown_beyond = largest(beyond)
@@ -167,10 +162,6 @@ class SurfaceDofs(ActiveDofs):
     def size(self, v: Array) -> float:
         """See `ActiveDofs`."""
         return max(self._unknown_beyond, largest(v))
-
-    def scale(self, u: Array, lift: Array) -> float:
-        """See `ActiveDofs`."""
-        return self._prescribed + max(self._beyond, largest(self.of(u)))
 
 
 def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:
