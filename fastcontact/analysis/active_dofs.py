@@ -10,7 +10,7 @@ import copy
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, eye_array
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.arrays import Array, Indices
@@ -107,29 +107,17 @@ class SurfaceDofs(ActiveDofs):
     def __init__(self, system: System, contact_dofs: Indices, unknowns: Indices) -> None:
         super().__init__(system, np.arange(len(contact_dofs)))
         self._dofs, self._unknowns = contact_dofs, unknowns
-        # Columns of constraints as positions among the unknowns or, with multi-point constraints, among the components.
-        columns = unknowns if system.T is None else contact_dofs
-        self._place = np.full(len(system.free), -1, np.intp)
-        self._place[columns] = np.arange(len(columns))
-        self._columns = len(columns)
-        if system.T is None:
-            self._own = np.searchsorted(contact_dofs, unknowns)
-        else:
-            self._T = csr_array(system.T[contact_dofs][:, unknowns])
+        T = eye_array(len(system.free), format="csr") if system.T is None else system.T
+        self._T = csr_array(T[contact_dofs][:, unknowns])
 
     # Of one load step, see `for_step`.
     _lift: Array
-    _prescribed: float
-    _beyond: float
     _unknown_beyond: float
 
     def for_step(self, u: Array, lift: Array) -> SurfaceDofs:
         """See `ActiveDofs`."""
         step = copy.copy(self)
-        step._lift, step._prescribed = lift[self._dofs], largest(lift)
-        beyond = u.copy()
-        beyond[self._dofs] = 0.0
-        step._beyond = largest(beyond)
+        step._lift = lift[self._dofs]
         beyond = self._system.unknowns(u, lift)
         beyond[self._unknowns] = 0.0
         step._unknown_beyond = largest(beyond)
@@ -152,15 +140,8 @@ class SurfaceDofs(ActiveDofs):
 
     def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
         """See `ActiveDofs`."""
-        offset = offset + rows @ lift
-        place = self._place[rows.indices]
-        kept = (place >= 0) & (rows.data != 0.0)
-        start = np.concatenate([[0], np.cumsum(kept)])[rows.indptr]
-        reduced = csr_array((rows.data[kept], place[kept], start), shape=(rows.shape[0], self._columns))
-        if self._system.T is not None:
-            reduced = csr_array(reduced @ self._T)
-            reduced.eliminate_zeros()
-        return reduced, offset
+        reduced, offset = super().rows(rows, offset, lift)
+        return csr_array(reduced[:, self._unknowns]), offset
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """See `ActiveDofs`."""
@@ -172,23 +153,15 @@ class SurfaceDofs(ActiveDofs):
 
     def varied(self, v: Array) -> Array:
         """See `ActiveDofs`."""
-        if self._system.T is not None:
-            return np.asarray(self._T @ v)
-        moved = np.zeros(len(self._dofs))
-        moved[self._own] = v
-        return moved
+        return np.asarray(self._T @ v)
 
     def reduced(self, force: Array) -> Array:
         """See `ActiveDofs`."""
-        return force[self._unknowns] if self._system.T is None else np.asarray(self._T.T @ force[self._dofs])
+        return np.asarray(self._T.T @ force[self._dofs])
 
     def size(self, v: Array) -> float:
         """See `ActiveDofs`."""
         return max(self._unknown_beyond, largest(v))
-
-    def scale(self, u: Array, lift: Array) -> float:
-        """See `ActiveDofs`."""
-        return self._prescribed + max(self._beyond, largest(self.of(u)))
 
 
 def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Number of earlier iterates that are mixed into the next one.
 DEPTH = 5
-# Changes of the residual are dependent if their directions agree to more than this.
-DEPENDENT = 1e-8
 
 
 class Anderson:
@@ -48,7 +47,7 @@ class Anderson:
             return image
         last = self._residuals[-1]
         differences = np.column_stack([last - earlier for earlier in self._residuals[:-1]])
-        weights = np.linalg.lstsq(differences, last, rcond=DEPENDENT)[0]
+        weights = np.linalg.lstsq(differences, last, rcond=LENGTH_ROUND_OFF)[0]
         mixture, newest = image.copy(), self._images[-1]
         for weight, earlier in zip(weights, self._images[:-1], strict=True):
             mixture[self.mixes] -= weight * (newest - earlier)

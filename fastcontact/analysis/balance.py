@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.criteria import LOOSEST
-from fastcontact.analysis.floating_bodies import SLACK
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Array
 from fastcontact.elasticity.springs import ground_force
@@ -79,7 +78,7 @@ class Balance:
     def _remedy(self, iterative: bool) -> str:
         if iterative:
             return "use the direct solver"
-        more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= LOOSEST else ""
+        more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
         return (
             "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
             f"in the place of a stiff body{more}"
@@ -140,7 +139,7 @@ def _round_off(
     criterion, or the force itself may be round-off of other rows. Otherwise the forces define the bound: stiff parts with
     large displacements must not hide the residual of soft ones.
     """
-    slack = SLACK * largest_force
+    slack = ROUND_OFF * largest_force
     noise = max(slack, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
     for part in map(np.abs, forces):
         if ((part > noise) & (part * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():

@@ -1,4 +1,4 @@
-"""Result of one contact pair at the end of a load step: pressures, contact status, forces, friction, centre and width."""
+"""Results of contact pairs at the end of a load step: pressures, contact status, forces, friction, centre and width."""
 
 from __future__ import annotations
 
@@ -7,17 +7,52 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
-from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.analysis.state import State
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.contact_middle import contact_middle
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
+from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.results.step import ContactResult, half_width
+
+
+def contact_results(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
+) -> dict[str, ContactResult]:
+    """Return the results of all contact pairs.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        At the beginning of the step.
+    load : StepLoad
+    settled : SettledContact
+    end : State
+        State at the end of the step, of which displacements and points of first contact are used.
+    """
+    displacement = problem.displacement(end.u)
+    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
+    results = {
+        name: contact_result(
+            name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
+            problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
+        )
+        for name, rows in settled.constraints.rows().items()
+    }  # fmt: skip
+    results = _joined(problem, results)
+    if problem.model.strain == "small":
+        return results
+    return {name: _on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
 
 
 def contact_result(
@@ -253,3 +288,74 @@ def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:
     foot, direction = axis
     arm = positions - foot
     return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)
+
+
+def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
+    """Return a contact result with Cauchy instead of nominal tractions, and widths in the deformed configuration.
+
+    The force of each node is preserved (lumped form of Nanson's formula: Bonet and Wood, 2008, equation 4.68).
+
+    Parameters
+    ----------
+    pair : Formulation
+    contact : ContactResult
+        Result per reference area.
+    displacement : ndarray (n_points, dim)
+        Displacement of the mesh [length].
+    """
+    before, after = areas(pair, displacement)
+    ratio, stretch = before / after, _stretch(contact, displacement[contact.points], before, after)
+    return replace(
+        contact, pressure=contact.pressure * ratio, multiplier=contact.multiplier * ratio,
+        shear=contact.shear * ratio[:, None], radius=(contact.radius[0] * stretch[0], contact.radius[1] * stretch[1]),
+    )  # fmt: skip
+
+
+def areas(pair: Formulation, displacement: Array) -> tuple[Array, Array]:
+    """Return the tributary areas (n_nodes,) of secondary nodes before and after a displacement (n_points, dim) [area]."""
+    places = pair.points, pair.points + displacement
+    before, after = (lumped_areas(pair.secondary, points, pair.axisymmetric) for points in places)
+    return before, after
+
+
+def _stretch(contact: ContactResult, displacement: Array, before: Array, after: Array) -> tuple[float, float]:
+    """Return the stretch of both bounds of the contact width [-].
+
+    In 3D it is the square root of the area ratio of the closed nodes.
+    """
+    if not contact.active.any():
+        return 1.0, 1.0
+    if contact.coordinates.shape[1] == 3:
+        grown = float(np.sqrt(after[contact.active].sum() / before[contact.active].sum()))
+        return grown, grown
+    moved = displacement[:, 0] if contact.tangent is None else displacement @ contact.tangent
+    widths = (half_width(contact.place, contact.active, contact.across + fraction * moved) for fraction in (0.0, 1.0))
+    ratios = [now / then if then > 0.0 and np.isfinite(then) else 1.0 for then, now in zip(*widths, strict=True)]
+    return ratios[0], ratios[1]
+
+
+def _joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
+    """Return the results of contact pairs with one traction for both nodes of a point, closed if one of them is."""
+    results_of_pairs = dict(results)
+    for name, contact in results.items() if problem.model.periodic_interfaces else ():
+        pair = problem.pairs[name]
+        areas = lumped_areas(pair.secondary, pair.points, pair.axisymmetric)
+        pressure, shear, active = contact.pressure.copy(), contact.shear.copy(), contact.active.copy()
+        for interface in problem.model.periodic_interfaces:
+            a, b = _rows(problem, contact, interface)
+            share = areas[a] / (areas[a] + areas[b])
+            turn = np.eye(shear.shape[1]) if interface.turn is None else interface.turn
+            pressure[a] = pressure[b] = share * pressure[a] + (1.0 - share) * pressure[b]
+            shear[a] = share[:, None] * shear[a] + (1.0 - share[:, None]) * (shear[b] @ turn)
+            shear[b] = shear[a] @ turn.T
+            active[a] = active[b] = active[a] | active[b]
+        results_of_pairs[name] = replace(contact, pressure=pressure, shear=shear, active=active)
+    return results_of_pairs
+
+
+def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
+    """Return the rows of a contact that belong to the two nodes of one point."""
+    row = np.full(problem.model.mesh.n_points, -1, np.intp)
+    row[contact.points] = np.arange(len(contact.points))
+    both = (row[interface.first] >= 0) & (row[interface.second] >= 0)
+    return row[interface.first[both]], row[interface.second[both]]

@@ -9,9 +9,9 @@ import numpy as np
 
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.scatter import WINDOW
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
 from fastcontact.analysis.state import State
+from fastcontact.analysis.tolerances import WINDOW
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from fastcontact._tools.argument_types import typed
 from fastcontact.errors import ModelError
 
-# Upper bound of the criteria: beyond it a state need not resemble the solution.
-LOOSEST = 1e-2
-# Fraction of the largest displacement above which a warning is given.
+# Fraction of the largest displacement or force above which errors are notable: a warning is given, and no criterion is
+# larger, because a state need not resemble the solution beyond it.
 NOTABLE = 1e-2
 
 
@@ -37,7 +36,7 @@ class Criteria:
         Keep the pairing of the undeformed configuration, with its normals and projections, in all steps (REAC_GEOM =
         'SANS'); for small motions only. Without friction the solution is then independent of the load path.
     max_geometry_updates, max_active_set_iterations : int
-        Limits per step, and per pairing.
+        Limits per step, and per pairing; the former also limits the exchanges between contact and heat conduction.
     max_halvings : int
         How many times a load step that does not converge is halved before the analysis stops (DECOUPE); twice as many
         with nonlinear bodies, whose substeps double in size after each one that took few iterations. Substeps are
@@ -73,9 +72,9 @@ class Criteria:
 
     def __post_init__(self) -> None:
         for name in ("relative", "geometry"):
-            if not 0 < getattr(self, name) <= LOOSEST:
+            if not 0 < getattr(self, name) <= NOTABLE:
                 raise ModelError(
-                    f"the convergence criterion {name} = {getattr(self, name)} must be positive and at most {LOOSEST}: "
+                    f"the convergence criterion {name} = {getattr(self, name)} must be positive and at most {NOTABLE}: "
                     "beyond that nothing has converged"
                 )
         updates = self.geometry_updates

@@ -70,7 +70,10 @@ class Extrapolation:
     def to_dict(self) -> dict[str, Any]:
         """Return the data as plain values, without the last displacements."""
         return {
-            "loads": [[_sparse(part) for part in load] for load in self.loads[-2:]],
+            "loads": [
+                [{"size": len(part), "places": np.flatnonzero(part), "values": part[part != 0.0]} for part in load]
+                for load in self.loads[-2:]
+            ],
             "before": self.states[0][0] if len(self.states) == 2 else None,
             "contact": [{name: list(both) for name, both in contact.items()} for _, contact in self.states],
         }
@@ -91,11 +94,6 @@ def _ratio(first: Array, second: Array, third: Array) -> float | None:
     now, last = third - second, second - first
     size = float(np.sum(last * last))
     return float(np.sum(now * last)) / size if size else None
-
-
-def _sparse(values: Array) -> dict[str, Any]:
-    places = np.flatnonzero(values)
-    return {"size": len(values), "places": places, "values": values[places]}
 
 
 def _dense(kept: Mapping[str, Any]) -> Array:

@@ -23,28 +23,18 @@ from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 # Stiffness of the springs over that of the body. Softer springs cost digits of factorisations (1e-6: an error of 3e-9 in a
 # wedge), stiffer ones more solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and
-# 1, a bolt 2.8, 5.3 and 27. With factorisations, whose solutions are cheap, the second is used: the pressure of SSNP170
-# is uniform to 1.5e-10 with the first and to 1e-10 with the second. Where rotated bodies under load have a negative
-# stiffness, springs as stiff as the body compensate it. The reference is the softest body: a contact with a stiff body
-# is no stiffer than it (a layer 2e5 times softer crept for 100 positions).
-SOFT, FIRM, STIFF = 1e-3, 1e-2, 1.0
-# At convergence the springs carry less than this fraction of the loads and of the contact forces (the only forces where
-# prescribed displacements drive the bodies), or as little as round-off or the linear solver allow.
-SLACK = ROUND_OFF
-# Springs whose forces do not decrease any more count as slack below this fraction.
-STAGNANT = 1e-8
+# 1, a bolt 2.8, 5.3 and 27. Where rotated bodies under load have a negative stiffness, springs as stiff as the body
+# compensate it. The reference is the softest body: a contact with a stiff body is no stiffer than it (a layer 2e5 times
+# softer crept for 100 positions).
+SOFT, STIFF = 1e-3, 1.0
 MAX_POSITIONS = 100
-# Number of positions before their changes are extrapolated: parts far softer than the springs, such as a peeling layer,
-# creep.
-PLAIN = 1
 # Weight of displacements in the choice of springs where springs were before: a rubber block pressed on another by multigrid
 # takes 142 iterations in two steps, 157 without.
 KEPT = 4.0
-NONE = np.empty(0, np.intp)
 
 
 @dataclass(frozen=True)
@@ -99,14 +89,17 @@ class FloatingBodies:
         Stiffness of each spring [force / length].
     """
 
-    def __init__(self, motions: FreeMotions, system: System, relative_stiffness: float, before: Indices = NONE) -> None:
+    def __init__(
+        self, motions: FreeMotions, system: System, relative_stiffness: float, before: Indices | None = None
+    ) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
         typical = _softest(diagonal, system.free & ~weightless, motions.displacement != 0.0)
         diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
-        weights[before] *= KEPT
+        if before is not None:
+            weights[before] *= KEPT
         self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), weights)
         self._places = [
             f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
@@ -187,15 +180,18 @@ class FloatingBodies:
             elongation, iterations = state.u[self.dofs], iterations + state.iterations
             left = float(np.abs(elongation).max())
             force = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
-            slack = left <= max(SLACK * force, noise * float(np.abs(state.u).max()))
-            if not slack and left >= 0.5 * before and positions > PLAIN + 2:
-                slack = left <= max(STAGNANT * force, round_off)
+            # Less than round-off of the loads and of the contact forces (the only forces where prescribed displacements
+            # drive the bodies), or as little as the linear solver allows.
+            slack = left <= max(ROUND_OFF * force, noise * float(np.abs(state.u).max()))
+            # Springs whose forces do not decrease any more count as slack sooner.
+            if not slack and left >= 0.5 * before and positions > 3:
+                slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
             if slack or not state.settled or positions == MAX_POSITIONS:
                 break
             if left > before:
                 mixing.restart()
-            anchor = position + elongation
-            position, before = anchor if positions <= PLAIN else mixing.mixed(position, anchor), left
+            # Extrapolated: parts far softer than the springs, such as a peeling layer, creep.
+            position, before = mixing.mixed(position, position + elongation), left
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
 

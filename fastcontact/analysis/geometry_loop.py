@@ -16,10 +16,9 @@ from fastcontact.analysis.geometry_newton import newton_step
 from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.scatter import Scatter, Watch
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
-from fastcontact.analysis.tolerances import Tolerances
+from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError

@@ -127,11 +127,6 @@ class Heat:
         """Whether heat is conducted in the deformed bodies."""
         return self.model.strain == "finite"
 
-    @property
-    def depends_on_equilibrium(self) -> bool:
-        """Whether temperatures depend on contact or deformation."""
-        return self.depends_on_contact or self.finite
-
     def conductors(self, displacement: Array) -> Conduction:
         """Return the conduction of the cells at displacements (n_points, dim), deformed with finite strains [length]."""
         return replace(self.conduction, displacement=displacement) if self.finite else self.conduction

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -99,8 +98,3 @@ def _start_of(name: str, constraints: Constraints, iterate: Iterate, extrapolati
         return active
     last = iterate.active[name]
     return last if extrapolation is None else extrapolation.active(name, last)
-
-
-def gaps_and_forces(constraints: StackedConstraints, solution: Solution) -> Mapping[str, tuple[Array, Array]]:
-    """Return gaps [length] and multipliers [force] (m,) by pair."""
-    return {name: (solution.gap[rows], solution.multiplier[rows]) for name, rows in constraints.rows().items()}

@@ -7,13 +7,12 @@ from dataclasses import replace
 
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact.analysis.floating_bodies import STIFF, FloatingBodies, RigidPosition
+from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import (
     Problem,
     StepLoad,
     active_dofs,
     floating_motions,
-    floating_stiffness,
     near_nullspace,
     prepare_solver,
 )  # fmt: skip
@@ -72,5 +71,4 @@ def _floating(
         turned = floating_motions(problem.model, problem.model.prescribed_by_ramp()[0], problem.displacement(u))
         motions = turned if len(turned) == len(motions) else motions
     before = problem.floating_bodies.dofs if rigid is None else rigid.dofs
-    relative_stiffness = STIFF if stiff else floating_stiffness(problem.solver)
-    return FloatingBodies(motions, system, relative_stiffness, before)
+    return FloatingBodies(motions, system, STIFF if stiff else SOFT, before)

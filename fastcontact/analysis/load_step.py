@@ -15,14 +15,13 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.displacements import with_loads
-from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.contact_result import contact_results
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.step_history import keep_path, save_contact_history
-from fastcontact.analysis.step_result import contact_results, counted, recover
+from fastcontact.analysis.step_result import recover
 from fastcontact.analysis.thermal_coupling import (
     Heated,
     expanded,
@@ -30,7 +29,6 @@ from fastcontact.analysis.thermal_coupling import (
     first_rise,
     settle_heat,
 )
-from fastcontact.arrays import Array
 from fastcontact.model.rigid_motions import generalised
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -64,8 +62,8 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     if rise is not None:
         solve = partial(newton, problem, begin)
         heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, solve)
-    iterations = counted(solution.settled, problem.solver.counters.iterations - solved_before)
-    return _ended(problem, begin.state, load, solution, {**iterations, **solution.counts}, (index, instant), heated)
+    iterations = solution.counts(problem.solver.counters.iterations - solved_before)
+    return _ended(problem, begin.state, load, solution, iterations, (index, instant), heated)
 
 
 def _ended(
@@ -81,7 +79,10 @@ def _ended(
     end = solution.terms.commit(u, end)
     contact: dict[str, ContactResult] = {}
     if settled is not None:
-        end, contact = after_contact(problem, start, load, settled, end, balanced.energy)
+        end = save_contact_history(problem, start, load, settled, end)
+        contact = contact_results(problem, start, load, settled, end)
+        end, contact = keep_path(problem, start, load, settled, end, contact, balanced.energy)
+        end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
     else:
         end = replace(end, extrapolation=start.extrapolation.converged(u, {}))
     if settled is None and start.work is not None:
@@ -114,24 +115,11 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
+    # Nonlinear bodies are extrapolated along the motions of obstacles, too.
+    motions = [] if problem.bodies is None else load.obstacles.values()
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
         largest_force=max(state.largest_force, largest(pushing.force)),
-        extrapolation=state.extrapolation.to(load.lift, pushing.force, *_motions(problem, load)),
+        extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions),
     )  # fmt: skip
     return Beginning(start, index, load, loaded, expected)
-
-
-def _motions(problem: Problem, load: StepLoad) -> list[Array]:
-    """Return the motions of obstacles along which nonlinear bodies are extrapolated."""
-    return [] if problem.bodies is None else [*load.obstacles.values()]
-
-
-def after_contact(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, energy: tuple[float, float]
-) -> tuple[State, dict[str, ContactResult]]:
-    """Return the state at the end of the step with its contact history, and the results of all contact pairs."""
-    end = save_contact_history(problem, start, load, settled, end)
-    results = contact_results(problem, start, load, settled, end)
-    end, results = keep_path(problem, start, load, settled, end, results, energy)
-    return end.after_touching(name for name, pair in results.items() if pair.active.any()), results

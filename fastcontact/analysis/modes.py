@@ -11,9 +11,8 @@ from scipy.sparse import bsr_array
 from fastcontact._jit import parallel
 from fastcontact._tools.argument_types import typed
 from fastcontact.analysis.modal.cyclic import Sectors, Wave, pairs_of, without_ends
-from fastcontact.analysis.modal.eigenpairs import lowest
+from fastcontact.analysis.modal.eigenpairs import Reduced, lowest
 from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
-from fastcontact.analysis.modal.reduced import Reduced
 from fastcontact.analysis.modal.shapes import Modes
 from fastcontact.analysis.problem import near_nullspace
 from fastcontact.analysis.stages import at_present_length, stage_of

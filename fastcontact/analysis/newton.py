@@ -16,22 +16,21 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.balance import Balance, balance
-from fastcontact.analysis.criteria import LOOSEST
-from fastcontact.analysis.displacements import solve_displacements, with_loads
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.scatter import DISPLACEMENT
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.step_equilibrium import StepEquilibrium, solve_displacements, with_loads
 from fastcontact.analysis.terms import Fluid, Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.protocol import Loaded
+from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Largest number of Newton iterations of a load step, and of halvings of one that inverts cells.
@@ -47,7 +46,7 @@ HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement at which iterations end. A change that is small enough to be round-off
-# (`scatter.DISPLACEMENT`, reached in slender bodies) counts as such if it exceeds the fraction STAYS of the previous
+# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction STAYS of the previous
 # one.
 UNCHANGED, STAYS = 1e-10, 0.3
 
@@ -197,7 +196,7 @@ class _Newton:
         """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
         error = last * min(last / before, 1.0) if before else last
-        return error <= self._enough or (last <= DISPLACEMENT and last > STAYS * before)
+        return error <= self._enough or (last <= SINGLE_PRECISION and last > STAYS * before)
 
     def _serves_again(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.
@@ -271,7 +270,7 @@ class _Newton:
                 self._kept = problem
         load = load_about(problem, terms, u, self._load, iterate.rigid)
         iterate.u, iterate.history = u.copy(), []
-        enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), LOOSEST)
+        enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
         inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
         return self._contact(inner, load, with_loads(problem, load), u, Extrapolation())
 

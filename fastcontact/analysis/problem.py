@@ -12,10 +12,10 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import FIRM, SOFT, FloatingBodies
+from fastcontact.analysis.floating_bodies import SOFT, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
+from fastcontact.analysis.slip import at_points
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
@@ -307,7 +307,7 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, floating_stiffness(solver)) if len(motions) else None
+    bodies = FloatingBodies(motions, system, SOFT) if len(motions) else None
     involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
@@ -316,11 +316,6 @@ def prepare(
         solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
-
-
-def floating_stiffness(solver: LinearSolver) -> float:
-    """Return the stiffness of springs on floating bodies relative to that of the bodies [-]."""
-    return SOFT if solver.iterative else FIRM
 
 
 def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:

@@ -28,10 +28,7 @@ from fastcontact.errors import ModelError
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import RampLike, ramp_of
 from fastcontact.results.step import StepResult
-from fastcontact.round_off import TINY
-
-# Largest admissible relative difference of one-sided derivatives, due to points that project onto edges between facets.
-BETWEEN = 1e-6
+from fastcontact.round_off import SINGLE_PRECISION, TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +166,8 @@ def _derivatives(contact: MovingContact, gradient: Gradient, changes: Sequence[C
     if kinks.nnz:
         other = Adjoint(contact, gradient, csr_array(0.5 * (forward + backward) + kinks))
         off = np.abs([other.derivative(change) for change in changes] - values)
-        if (off > BETWEEN * np.abs(values)).any():
+        # One-sided derivatives differ where points project onto edges between facets.
+        if (off > SINGLE_PRECISION * np.abs(values)).any():
             raise ModelError(_between(contact, kinks, float((off / np.maximum(np.abs(values), TINY)).max())))
     return values, adjoint.solutions
 

@@ -1,17 +1,20 @@
-"""Slip increment of the secondary nodes of a contact pair."""
+"""Slip of the secondary nodes of a contact pair in a load step, and the wear that it causes.
+
+Wear follows Archard (J. Appl. Phys. 24, 1953): its depth is proportional to pressure times sliding distance.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, tangents
+from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
-
-# In facet lengths: nodes up to this distance beyond the other side may still carry pressure, by parts of their facets.
-STANDS_OUT = 3.0
 
 
 def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
@@ -23,12 +26,90 @@ def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -
 
 
 def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
-    """Return the slip increment (m, dim) of the secondary nodes, zero where they face nothing [length]."""
+    """Return the slip increment (m, dim) of the secondary nodes [length].
+
+    Nodes beyond the other side may still carry pressure, by parts of their facets.
+    """
     nodes = Candidates.nodes_of(pair.secondary)
-    pairing = pair.facing(nodes, at, max(pair.projection_tolerance or 0.0, STANDS_OUT))
+    pairing = pair.facing(nodes, at, np.inf)
     directions = tangents(pairing.normal)
     rows, slip0 = pair.slips(nodes, pairing, directions, at)
     along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
     along += 0.0 if slip0 is None else slip0
     slip = np.einsum("kn,knd->nd", along, np.stack(directions))
     return np.where(pairing.paired[:, None], slip, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Worn:
+    """Wear of a contact pair at the end of a load step.
+
+    Attributes
+    ----------
+    depth, pressure : ndarray (m,)
+        Wear depth at the secondary nodes [length], and the pressure there [pressure].
+    pace : float
+        The largest wear of any step over the pressure [length / pressure].
+    """
+
+    depth: Array
+    pressure: Array
+    pace: float = 0.0
+
+    @classmethod
+    def nothing(cls, count: int) -> Worn:
+        """Return the initial state, for `count` nodes."""
+        return cls(np.zeros(count), np.zeros(count))
+
+    def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
+        """Return the wear after one more load step, see `worn_in_step`."""
+        more = worn_in_step(pair, at, contact, self.pressure, coefficient)
+        mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
+        pace = np.divide(more, mean, out=np.zeros_like(more), where=mean > 0.0)
+        return Worn(self.depth + more, contact.pressure, max(self.pace, float(pace.max(initial=0.0))))
+
+
+def worn_in_step(
+    pair: Formulation, at: Configuration, contact: ContactResult, before: Array | float, coefficient: float
+) -> Array:
+    """Return the wear depth (m,) of a load step at the secondary nodes [length].
+
+    Parameters
+    ----------
+    pair : Formulation
+    at : Configuration
+        Configuration at the end of the step.
+    contact : ContactResult
+        Contact result at the end of the step.
+    before : ndarray (m,) or float
+        Pressures at the beginning of the step; wear follows from the mean of both [pressure].
+    coefficient : float
+        Archard's coefficient over the hardness [1 / pressure].
+    """
+    distance = np.linalg.norm(slip_of_nodes(pair, at), axis=1)
+    if pair.friction:
+        distance = np.where(contact.sticking, 0.0, distance)
+    pressure = np.maximum(contact.pressure + before, 0.0)
+    return np.asarray(coefficient * 0.5 * pressure * distance)
+
+
+def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
+    """Return wear depths (m,) at `points` (m,) as depths of all points (n_points,), zero elsewhere [length]."""
+    whole = np.zeros(n_points)
+    whole[points] = depth
+    return whole
+
+
+def too_fast(pair: Formulation, worn: Worn) -> float:
+    """Return the wear rate over its stability limit: above 1 pressures may oscillate from node to node.
+
+    A wave of gaps with the period of two edges h causes pressures of ``pi E* / (2 h)`` times its height (Johnson, Contact
+    Mechanics, 13.2). The wear of a step follows from the mean of the pressures before and after, and affects the next
+    step: such a wave decays if the pace times this stiffness is less than two. The stiffness of pressures at integration
+    points is up to twice as large.
+    """
+    edge = np.inf
+    for block in pair.secondary.blocks:
+        size = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        edge = min(edge, float(size.min()) / elements.get(block.element).order)
+    return worn.pace * np.pi * pair.modulus / (2.0 * edge)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -68,21 +69,14 @@ class Equilibrium:
     wanted: Mask
     iterations: int
     response: Callable[[], Response] | None = field(default=None, repr=False)
+    # The active set is solved exactly, and there are no tangential forces without friction.
+    residual: ClassVar[float] = 0.0
+    tangential: ClassVar[None] = None
 
     @property
     def settled(self) -> bool:
         """Whether all inequalities hold."""
         return bool(np.array_equal(self.active, self.wanted))
-
-    @property
-    def residual(self) -> float:
-        """Violation of the inequalities over the largest force: zero, since the active set is solved exactly."""
-        return 0.0
-
-    @property
-    def tangential(self) -> None:
-        """Tangential forces: none without friction."""
-        return None
 
 
 @dataclass(frozen=True, eq=False)

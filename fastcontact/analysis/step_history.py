@@ -7,12 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.iterate import gaps_and_forces
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.slip import slip_in_step
+from fastcontact.analysis.slip import Worn, slip_in_step
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
@@ -33,10 +31,11 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
     end : State
         State at the end of the step, with its displacements.
     """
+    gap, force, rows = settled.solution.gap, settled.solution.multiplier, settled.constraints.rows()
     return replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
-        extrapolation=start.extrapolation.converged(end.u, gaps_and_forces(settled.constraints, settled.solution)),
+        extrapolation=start.extrapolation.converged(end.u, {name: (gap[at], force[at]) for name, at in rows.items()}),
         never_opening=never_opening(problem, start, settled), elastic_slip=elastic_slips(settled),
         bonds=bonds(settled, end.u),
     )  # fmt: skip

@@ -1,18 +1,11 @@
-"""Recover the result of a load step: stresses, contact results, iteration counts."""
+"""Recover the result of a load step."""
 
 from __future__ import annotations
 
-import dataclasses
 from typing import Any
 
-import numpy as np
-
-from fastcontact.analysis.contact_result import contact_result
-from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.periodic_interfaces import joined
-from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
-from fastcontact.analysis.true_pressure import on_deformed_surface
 from fastcontact.arrays import Array
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
@@ -72,46 +65,3 @@ def recover(
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
     )  # fmt: skip
-
-
-def contact_results(
-    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State
-) -> dict[str, ContactResult]:
-    """Return the results of all contact pairs.
-
-    Parameters
-    ----------
-    problem : Problem
-    start : State
-        At the beginning of the step.
-    load : StepLoad
-    settled : SettledContact
-    end : State
-        State at the end of the step, of which displacements and points of first contact are used.
-    """
-    displacement = problem.displacement(end.u)
-    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
-    results = {
-        name: contact_result(
-            name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
-            problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
-        )
-        for name, rows in settled.constraints.rows().items()
-    }  # fmt: skip
-    results = joined(problem, results)
-    if problem.model.strain == "small":
-        return results
-    return {name: on_deformed_surface(problem.pairs[name], result, displacement) for name, result in results.items()}
-
-
-def counted(settled: SettledContact | None, linear_iterations: int) -> dict[str, Any]:
-    """Return the work of a load step, see `StepResult.iterations`."""
-    history = settled.iterate.history if settled is not None else []
-    counts = {
-        "geometry_updates": max(len(history) - 1, 0),
-        "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
-        "linear_iterations": linear_iterations,
-        "history": history,
-    }
-    scatter = None if settled is None else settled.scatter
-    return counts if scatter is None else {**counts, "scatter": dataclasses.asdict(scatter)}

@@ -46,19 +46,11 @@ class Term(Protocol):
         ...
 
     def commit(self, u: Array, state: State) -> State:
-        """Return the state with the history of the term at the end of the load step."""
-        ...
-
-
-class _WithoutHistory:
-    """Terms without history."""
-
-    def commit(self, u: Array, state: State) -> State:
-        """See `Term`."""
+        """Return the state with the history of the term at the end of the load step; most terms have none."""
         return state
 
 
-class LinearBodies(_WithoutHistory):
+class LinearBodies(Term):
     """Linear bodies and springs, whose stiffness is that of the prepared problem."""
 
     def __init__(self, K: Stiffness) -> None:
@@ -73,7 +65,7 @@ class LinearBodies(_WithoutHistory):
         """See `Term`."""
 
 
-class Bodies:
+class Bodies(Term):
     """Nonlinear bodies in a load step that begins at `start`.
 
     Forces and tangent are computed in one loop over the cells, and cached for the last two displacements.
@@ -117,7 +109,7 @@ class Bodies:
         return replace(state, history=self.at(u).history)
 
 
-class SpringForces(_WithoutHistory):
+class SpringForces(Term):
     """Springs beside nonlinear bodies, of `n` components."""
 
     def __init__(self, springs: Sequence[Springs], n: int) -> None:
@@ -135,7 +127,7 @@ class SpringForces(_WithoutHistory):
         return self._K
 
 
-class FollowerLoad(_WithoutHistory):
+class FollowerLoad(Term):
     """Force of a pressure on the undeformed surface, which is in the external forces, minus that on the deformed one."""
 
     def __init__(self, problem: Problem, pressure: FollowingPressure, factor: float) -> None:
@@ -153,7 +145,7 @@ class FollowerLoad(_WithoutHistory):
         return self._factor * self._pressure.at(self._problem.displacement(u))[1]
 
 
-class Fluid(_WithoutHistory):
+class Fluid(Term):
     """Fluid force at the displacements `at` (n_dofs,), where contact was linearised, minus the current one."""
 
     def __init__(self, problem: Problem, wetted: Wetted, at: Array) -> None:

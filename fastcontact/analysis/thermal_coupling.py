@@ -16,13 +16,13 @@ from scipy.sparse import csr_array
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.balance import Balance
+from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium
-from fastcontact.analysis.true_pressure import areas
 from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing
@@ -34,10 +34,6 @@ from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
-# Largest number of exchanges.
-MOST_EXCHANGES = 60
-# Accuracy of temperatures over the tolerance of linear solutions.
-SETTLED = 10.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +60,7 @@ def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
     """Return the initial temperature rise (n_points,) of a load step [temperature]; None without heat."""
     if problem.heat is None:
         return None
-    if not problem.heat.depends_on_equilibrium:
+    if not (problem.heat.depends_on_contact or problem.heat.finite):
         return problem.heat.temperatures(instant).rise
     return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
 
@@ -98,9 +94,9 @@ def settle_heat(
     """
     heat, mixing = problem.heat, Anderson(DEPTH, np.arange(len(rise)))
     assert heat is not None
-    enough = max(problem.criteria.geometry, SETTLED * heat.linear_tolerance)
-    change = np.inf
-    for exchange in range(1, MOST_EXCHANGES + 1):
+    enough = max(problem.criteria.geometry, 10 * heat.linear_tolerance)
+    change, most = np.inf, max(problem.criteria.max_geometry_updates, 1)
+    for exchange in range(1, most + 1):
         heated = _conducted(problem, start, load, instant, equilibrium)
         change = largest_difference(heated.rise, rise)
         settled = change <= enough * largest(heated.rise) or not problem.model.expands
@@ -109,7 +105,7 @@ def settle_heat(
         rise = mixing.mixed(rise, heated.rise)
         equilibrium = solve(expanded(problem, load, rise), equilibrium)
     raise ConvergenceError(
-        f"heat and contact do not settle: after {MOST_EXCHANGES} times temperatures still change by {change:.3g}, for "
+        f"heat and contact do not settle: after {most} times temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
         equilibrium.history,

@@ -108,9 +108,8 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
     for name, rows in constraints.rows().items():
         part, before = constraints.parts[name], step.state.forces.get(name)
         if before is not None and part.areas is not None and part.wetted is None:
-            areas = np.where(np.isfinite(part.areas), part.areas, 0.0)
             pressure, shear = before.at(part.positions)
-            normal[rows], traction[rows] = areas * pressure, areas[:, None] * shear
+            normal[rows], traction[rows] = part.finite_areas * pressure, part.finite_areas[:, None] * shear
         elif name in step.state.touched and not (part.equality is not None and part.equality.all()):
             return None
     return normal, traction

@@ -165,7 +165,7 @@ def contact_work(
     force, moved = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
     now = _forces(pair, constraints, normal, tangents, force, contact, _added(pair, at, contact))
     before = before or _nothing(now)
-    areas = _areas(constraints)
+    areas = constraints.finite_areas
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
@@ -180,15 +180,6 @@ def contact_work(
     gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
     gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
     return now, (friction, touching, gained - (now.stored - before.stored) - sliding)
-
-
-def _areas(constraints: Constraints) -> Array:
-    """Return the areas (m,) of constraints, zero without one [area]."""
-    return (
-        np.zeros(len(constraints))
-        if constraints.areas is None
-        else np.where(np.isfinite(constraints.areas), constraints.areas, 0.0)
-    )
 
 
 def _forces(
@@ -207,14 +198,14 @@ def _forces(
         along += (tangent.T @ own)[:size]
     rates = rows.sum(axis=0).reshape(-1, dim)[pair.secondary.points]
     facing = np.where(np.isfinite(contact.normal), contact.normal, 0.0)
-    share = 1.0 / np.where(_areas(constraints) > 0.0, _areas(constraints), np.inf)
+    share = 1.0 / np.where(constraints.finite_areas > 0.0, constraints.finite_areas, np.inf)
     give = (
         np.zeros(len(constraints))
         if constraints.normal_compliance is None
         else constraints.normal_compliance.apply(normal)
     )
     if constraints.law is not None:  # replaces the energy of a linear spring
-        energy = 2.0 * _areas(constraints) * constraints.law.energy(normal * share)
+        energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * share)
         give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
         constraints.positions, normal * share, force * share[:, None], give * normal, (rows.data, rows.indices, rows.indptr),

@@ -234,6 +234,11 @@ class Constraints:
         """Coefficients of friction (m,), zero where there are none [-]."""
         return np.zeros(len(self)) if self.friction is None else self.friction
 
+    @property
+    def finite_areas(self) -> Array:
+        """Areas (m,), zero where a constraint takes no part or has none [area]."""
+        return np.zeros(len(self)) if self.areas is None else np.where(np.isfinite(self.areas), self.areas, 0.0)
+
     def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
         """Return for which tangents (k, q) of constraints (q,), rotated by Q, supports and obstacles impose a slip."""
         if self.driven is None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.held_motions import HeldMotions
+from fastcontact.contact.held_motions import TOGETHER, HeldMotions
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
@@ -28,8 +28,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
 ACROSS = 0.5
-# A direction is held where at least this fraction of it, squared, is prescribed.
-HELD = 0.99
 # A surface whose mean of unit normals is shorter than this closes on itself: it has no mean direction.
 DIRECTED = 0.3
 
@@ -136,7 +134,7 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
     if motions is None:
         return []
     points = coordinates[surface.points]
-    held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= HELD
+    held = np.diagonal(motions.at(surface.points), axis1=1, axis2=2) >= TOGETHER**2
     tolerance, planes = SINGLE_PRECISION * float(np.ptp(points, axis=0).max()), []
     across = np.abs(nodal_normals(surface, coordinates)) < ACROSS
     for axis in range(points.shape[1]):

@@ -23,11 +23,8 @@ from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import Entries, rows_of
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# A force that does not depend on the gap is represented by a line of small slope, which vanishes at a gap of this
-# multiple of the length of the side.
-FAR = 1e6
 # Mean gaps next to the edge of the contact, where some places between nodes are closed, may be negative by up to this
 # fraction of the facet length.
 EDGE = 0.01
@@ -127,7 +124,8 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
         passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
-    far = FAR * size
+    # A force that does not depend on the gap is represented by a line of small slope, which vanishes far beyond the side.
+    far = size / SINGLE_PRECISION
     none = np.zeros(len(constraints))
     B, weights = _along(constraints.B, rows, side, vectors[node])
     strength = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)

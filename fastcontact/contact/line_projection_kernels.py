@@ -4,10 +4,7 @@
 from fastcontact._jit.decorators import interpretable_kernel, kernel
 from fastcontact.contact.projection_kernels import BEYOND
 from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP
-
-MOST_FACETS = 8
-# Reference coordinate of a projection that ends too far beyond its facet.
-FAR = 1.0 + 2.0 * BEYOND
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @kernel
@@ -38,12 +35,12 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
             my += slopes[k] * normals[f, k, 1]
         slope = (px * my - py * mx) - (tx * ny - ty * nx)
         # Beyond a centre of curvature, or where facets fold too sharply, Newton's method has no descent direction.
-        if not abs(slope) > 1e-8 * abs(tx * ny - ty * nx):
+        if not abs(slope) > LENGTH_ROUND_OFF * abs(tx * ny - ty * nx):
             return s, False
         step = -(px * ny - py * nx) / slope
         step = min(1.0, max(-1.0, step))
         s += step
-        if abs(s) > 2.0 * FAR:
+        if 0.5 * (abs(s) - 1.0) > 2.0 * BEYOND:
             return s, False
         if abs(step) <= STEP * (1.0 + abs(s)):
             return s, True
@@ -70,9 +67,9 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
     """
     for i in range(points.shape[0]):
         f, s, before = facet[i], xi[i], -1
-        for _ in range(MOST_FACETS):
+        for _ in range(MAX_ITERATIONS):
             s, converged = _newton(points[i, 0], points[i, 1], corners, normals, f, counts[f], s, values, slopes)
-            if not converged or abs(s) > FAR:
+            if not converged or 0.5 * (abs(s) - 1.0) > BEYOND:
                 break
             if abs(s) <= 1.0:
                 facet[i], xi[i], overhang[i] = f, s, 0.0

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, diags_array, eye_array
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.cohesion import CohesiveLaw
 from fastcontact.contact.conductance import Conductance
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pairing import Candidates, Pairing, normals
 from fastcontact.contact.projection import places

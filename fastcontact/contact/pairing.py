@@ -12,15 +12,16 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import AnyArray, Array, Indices, Mask, Numbers
-from fastcontact.contact.line_projection import along_line_normals, smooth_ends
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.projection import (
     Places,
+    along_line_normals,
     along_normals,
     at_nodes_of_facets,
     facet_normals,
     interpolated,
     places,
+    smooth_ends,
     smooth_normals,
 )
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
@@ -165,11 +166,8 @@ def pair(
     at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))
     if not isinstance(normals, str):
         at_nodes = np.broadcast_to(np.array(normals), at_nodes.shape).copy()
-    if coordinates.shape[1] == 3:
-        facet, xi, overhang, normal = along_normals(candidates, primary, coordinates, at_nodes, closest)
-    else:
-        facet, xi, overhang = along_line_normals(candidates, primary, coordinates, at_nodes, closest)
-        normal = interpolated(at_nodes[facet], places(primary, facet, xi))
+    project = along_normals if coordinates.shape[1] == 3 else along_line_normals
+    facet, xi, overhang, normal = project(candidates, primary, coordinates, at_nodes, closest)
     if normals == "facet":
         normal = _round_edges(primary, coordinates, facet, xi, normal)
     paired = overhang <= projection_tolerance

@@ -2,7 +2,8 @@
 
 On a faceted surface the closest point jumps at concave edges, by a distance proportional to the gap; iterated pairings may
 then not converge. Along normals interpolated between nodal means the projection varies continuously (Puso and Laursen, 2004,
-section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2).
+section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2), on facets in 3D (`along_normals`) and on lines in the plane
+(`along_line_normals`).
 """
 
 from __future__ import annotations
@@ -13,16 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact._jit.parallel import portions, shared
-from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.contact import projection_kernels
+from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.contact import line_projection_kernels, projection_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
-from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 
-# Cost of the projection of a point relative to a node of a cell, see `portions`.
-EFFORT = 16
 # Facets that meet at a smaller angle than this approximate a smooth surface; others form a corner [degrees].
 CORNER = 45.0
 
@@ -211,7 +210,7 @@ def along_normals(
         lambda portion: projection_kernels.along_normals(
             *portion, seen, heights, terms, directions, side.triangular, side.neighbours, facet
         ),
-        portions(len(points), EFFORT),
+        portions(len(points)),
     )
     return facet
 
@@ -223,3 +222,38 @@ def _polynomials(kinds: Sequence[Array]) -> Array:
         projection_kernels.coefficients(kind, tables(kind.shape[1]).to_terms, first, 0, len(kind), out)
         first += len(kind)
     return out
+
+
+def along_line_normals(
+    points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
+) -> tuple[Indices, Array, Array, Array]:
+    """Project points (n, 2) on a line along its interpolated normals; see `along_normals`."""
+    n_facets = side.n_facets
+    corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
+    at_nodes[:, : normals.shape[1]] = normals
+    counts, ends = np.empty(n_facets, np.intp), np.empty((n_facets, 2), np.intp)
+    first = 0
+    for block in side.blocks:
+        rows, k = slice(first, first + len(block.facets)), block.facets.shape[1]
+        corners[rows, :k], counts[rows], ends[rows] = coordinates[block.facets], k, block.local[:, :2]
+        first = rows.stop
+    facet, xi, overhang = start.facet.astype(np.intp), start.xi[:, 0].copy(), start.overhang.copy()
+    work = np.empty(3), np.empty(3)
+    neighbour = np.where(smooth_ends(side, normals), line_neighbours(ends), -1)
+    line_projection_kernels.along_normals(
+        np.ascontiguousarray(points), corners, at_nodes, counts, neighbour, facet, xi, overhang, *work
+    )
+    xi = xi[:, None]
+    return facet, xi, overhang, interpolated(normals[facet], places(side, facet, xi))
+
+
+def smooth_ends(side: Surface, normals: Array) -> Mask:
+    """Return the ends (n_facets, 2) of lines at which another line continues without a corner.
+
+    `normals` (n_facets, k, 2) are those of the facets at their nodes, see `smooth_normals`: the same for both
+    facets at such an end.
+    """
+    ends = np.concatenate([block.local[:, :2] for block in side.blocks])
+    total = np.zeros((len(side.points), 2))
+    np.add.at(total, ends, normals[:, :2])
+    return np.asarray(side.inner_ends & (np.linalg.norm(total, axis=1)[ends] > 2.0 - 1e-6))

@@ -8,15 +8,12 @@ in `search.facet_tables`; facets with fewer nodes than the widest kind have zero
 import numpy as np
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.projection_3d_kernels import STEP, component, vector
+from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP, component, vector
 from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
-MAX_ITERATIONS = 15
 # A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
 BEYOND = 1.0
-# Columns of a Jacobian are dependent if they span less than this fraction of the volume of a box.
-FLAT = 1e-8
 
 
 @interpretable_kernel
@@ -88,7 +85,8 @@ def _newton(point, terms, directions, f, s, t, height):
         p, q = along(along_s, turn_s, height), along(along_t, turn_t, height)
         across = cross(q, normal)
         volume = dot(p, across)
-        if not abs(volume) > FLAT * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
+        # Columns of a Jacobian are dependent if they span next to none of the volume of a box.
+        if not abs(volume) > LENGTH_ROUND_OFF * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
             return s, t, False
         ds, dt = dot(residual, across) / volume, dot(residual, cross(normal, p)) / volume
         dh, size = dot(residual, cross(p, q)) / volume, max(abs(ds), abs(dt))

@@ -4,19 +4,32 @@ The sides are paired once, in the undeformed configuration; the relative displac
 zero in every direction. The test functions are the formulation's multipliers: one set of equations per node where forces
 are nodal; moments with the functions of the multiplier field where forces act at integration points, which is the mortar
 method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
+
+At nodes that supports hold on both sides, the secondary side has one displacement less than the multipliers, which then are
+not determined: multipliers that alternate from node to node and die out along the surface do no work. They are reduced as at
+the ends of mortar lines (section 3 there): in a direction that is held on both sides, the multiplier of a node is the mean of
+its neighbours', so that uniform tractions remain among them (`reduction`).
+
+Equal displacements across a gap would resist rigid rotations: the forces of both sides would have different lines of action,
+and the moment of the shear would be lost. A rigid arm across the gap therefore rotates with the primary facet (`with_arms`):
+the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
+derivative along t on the primary facet; it vanishes in any small rotation of both sides.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, eye_array, vstack
+from scipy.sparse import coo_array, csr_array, diags_array, eye_array, vstack
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
-from fastcontact.round_off import ROUND_OFF, TINY
+from fastcontact.contact.pairing import Pairing, normals
+from fastcontact.contact.surface import Surface
+from fastcontact.linear.sparse_rows import nodal_rows
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +53,7 @@ class TiedPair:
     areas : ndarray (q,), optional
         Integrals of the functions that the equations are tested with [area].
     reduction : csr_array (q dim, q dim), optional
-        All multipliers by those that are left where supports hold both sides, see `tied_at_supports`.
+        All multipliers by those that are left where supports hold both sides, see `reduction`.
     """
 
     moments: csr_array
@@ -104,3 +117,86 @@ def _cleaned(rows: csr_array) -> csr_array:
     rows.data[np.abs(rows.data) < ROUND_OFF * np.abs(rows.data).max(initial=0.0)] = 0.0
     rows.eliminate_zeros()
     return rows
+
+
+def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: csr_array) -> csr_array:
+    """Return the matrix (q dim, q dim) of the multipliers of all equations by those that are left, others being empty.
+
+    Multipliers are forces, component by component along the frames.
+
+    Parameters
+    ----------
+    frames : ndarray (q, dim, dim)
+        Unit vectors along which the equations of the nodes hold, the normal and then tangents [-].
+    held : ndarray (q, dim, dim)
+        Projectors on the directions in which both sides are held [-].
+    nodes : ndarray of int (q,)
+        Secondary nodes of the equations.
+    areas : ndarray (q,)
+        Integrals of their test functions, zero where they hold nothing [area].
+    beside : csr_array (n_nodes, n_nodes)
+        Which nodes lie in one facet.
+    """
+    q, dim = held.shape[:2]
+    taken = np.trace(held, axis1=1, axis2=2).round().astype(np.intp)
+    takers, free = np.flatnonzero(taken), np.eye(dim) - held
+    along = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
+    left = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1) >= taken[:, None]
+    own = np.where(left[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
+    around = coo_array(csr_array(beside[nodes])[:, nodes][takers])
+    gives = (areas[around.col] > 0.0) & (areas[takers[around.row]] > 0.0) & (takers[around.row] != around.col)
+    taker, giver = around.row[gives], around.col[gives]
+    whole = np.zeros((len(takers), dim, dim))
+    np.add.at(whole, taker, free[giver])
+    share = held[takers] @ np.linalg.pinv(whole, hermitian=True)
+    rows, columns = np.append(np.arange(q), takers[taker]), np.append(np.arange(q), giver)
+    size = np.where(areas > 0.0, areas, 1.0)
+    tractions = np.concatenate([own, share[taker] @ own[giver]]) * (size[rows] / size[columns])[:, None, None]
+    blocks = frames[rows] @ tractions
+    blocks[np.abs(blocks) < ROUND_OFF] = 0.0
+    row, column = (np.arange(dim) * q + nodes_of[:, None] for nodes_of in (rows, columns))
+    row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
+    reduced = csr_array((blocks.ravel(), (row.ravel(), column.ravel())), shape=(q * dim, q * dim))
+    reduced.eliminate_zeros()
+    return reduced
+
+
+def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
+    """Return constraints whose tangential rows are zero in small rotations of both sides, also across a gap.
+
+    Parameters
+    ----------
+    constraints : Constraints
+        Constraints (m) with tangents.
+    pairing : Pairing
+        Pairing of the constraint points.
+    primary : Surface
+    points : ndarray (n_points, dim)
+        Reference coordinates [length].
+    """
+    size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
+    normal, facing = normals(constraints.directions), pairing.places(primary, np.arange(len(constraints)))
+    axes = np.einsum("mkj,mkd->mdj", facing.gradient, points[facing.nodes])
+    along = np.einsum("mkj,mjd->mkd", facing.gradient, np.linalg.pinv(axes))
+    slopes = [np.einsum("mkd,md->mk", along, direction) for direction in constraints.directions]
+    levers = [nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
+    rotations, translations = _rotations(points), np.tile(np.eye(points.shape[1]), (len(points), 1))
+    arms = np.stack([lever @ rotations for lever in levers], axis=1)
+    left = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
+    moved = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
+    # A tensor, because one length per tangent would depend on the choice of tangents where the gap is not along the normal.
+    lengths = left @ np.linalg.pinv(arms)
+    lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
+    tangents = [
+        csr_array(tangent - sum(diags_array(lengths[:, k, j]) @ lever for j, lever in enumerate(levers)))
+        for k, tangent in enumerate(constraints.tangents)
+    ]
+    return replace(constraints, tangents=tuple(tangents) if lengths.any() else constraints.tangents)
+
+
+def _rotations(points: Array) -> Array:
+    """Return the displacements (n_dofs, 1), in 3D (n_dofs, 3) of unit rotations about the middle [length]."""
+    x = points - points.mean(axis=0)
+    if points.shape[1] == 2:
+        return np.column_stack([-x[:, 1], x[:, 0]]).reshape(-1, 1)
+    return np.stack([np.cross(axis, x).ravel() for axis in np.eye(3)], axis=1)

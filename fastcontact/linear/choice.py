@@ -9,7 +9,7 @@ import pkgutil
 
 from fastcontact.errors import ModelError, unknown
 from fastcontact.linear import solvers
-from fastcontact.linear.factors.factor_solver import AFFORDABLE
+from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
@@ -19,10 +19,9 @@ KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
 # Largest admissible relative residual.
 LOOSEST = 1e-3
-# Sizes above which a multigrid solution is cheaper than a factorisation (measured, see bench/README.md). The second applies
-# where constraints need columns of K^-1, which a factorisation provides at once and multigrid by one solution each.
+# Sizes above which a multigrid solution is cheaper than a factorisation (measured, see bench/README.md); where
+# constraints need columns of K^-1, which a factorisation provides at once and multigrid by one solution each: AFFORDABLE.
 DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
-DIRECT_WITH_COLUMNS_UP_TO = AFFORDABLE
 
 
 def make(
@@ -84,7 +83,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
 
 def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
     """Return the solver chosen by ``"auto"``, and the reason."""
-    limit = (DIRECT_WITH_COLUMNS_UP_TO if columns else DIRECT_UP_TO)[dim]
+    limit = (AFFORDABLE if columns else DIRECT_UP_TO)[dim]
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"
     return "amg", f"for {n_dofs} unknowns in {dim}D a factorisation is dearer than multigrid (beyond {limit})"

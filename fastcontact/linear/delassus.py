@@ -101,16 +101,12 @@ class InverseColumns:
         """Restore exactly the columns of `requests`, in that order; solve only for missing ones."""
         pairs = zip(self.asked, requests, strict=False)
         same = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
-        self._forget(sum(len(dofs) for dofs in self.asked[same:]))
+        if later := sum(len(dofs) for dofs in self.asked[same:]):
+            self._place[self._dofs[-later:]] = -1
+            self._dofs, self._values = self._dofs[:-later], self._values[:-later, :-later].copy()
         del self.asked[same:]
         for dofs in requests[len(self.asked) :]:
             self._places(dofs)
-
-    def _forget(self, count: int) -> None:
-        """Discard the last `count` columns."""
-        if count:
-            self._place[self._dofs[-count:]] = -1
-            self._dofs, self._values = self._dofs[:-count], self._values[:-count, :-count].copy()
 
     def _places(self, dofs: NDArray[np.integer]) -> Indices:
         """Return the positions of `dofs` (k,), which may repeat, among stored columns; solve for new ones."""
@@ -159,18 +155,11 @@ def symmetric(delassus: Array) -> Array:
     return 0.5 * (delassus + delassus.T)
 
 
-def multipliers(
-    columns: InverseColumns, B: csr_array, wanted: Array, C: Array | FieldCompliance | None
-) -> Array:  # fmt: skip
-    """Return the multipliers (m,) [force] with ``(B K^-1 B.T + C) multiplier = wanted`` (m,) [length].
-
-    C is a matrix (m, m), the diagonal (m,) of a diagonal one, or None.
-    """
-    return solve_multipliers(columns.of_rows(B), wanted, C)
-
-
 def solve_multipliers(delassus: Array, wanted: Array, C: Array | FieldCompliance | None) -> Array:
-    """Return the multipliers (m,) with ``(delassus + C) multiplier = wanted``; `delassus` (m, m) is overwritten."""
+    """Return the multipliers (m,) [force] with ``(delassus + C) multiplier = wanted`` (m,) [length].
+
+    C is a matrix (m, m), the diagonal (m,) of a diagonal one, or None; `delassus` (m, m) is overwritten.
+    """
     C = C.dense() if isinstance(C, FieldCompliance) else C
     if C is not None and C.ndim == 1:
         delassus[np.diag_indices(len(C))] += C

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from fastcontact.contact.obstacles import Obstacle
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.model.pair_options import clearance_ramp, friction_ramp
 from fastcontact.model.ramp import Table
 

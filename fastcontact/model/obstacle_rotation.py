@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from fastcontact._tools.argument_types import finite_vector
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.loads import check_number
 from fastcontact.errors import ModelError, check_known
 from fastcontact.model.contact_pair import ContactPair

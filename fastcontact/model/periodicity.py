@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.contact.projection import places
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface

@@ -121,7 +121,7 @@ def distorted_facets(patch):
 
 def stuck(patch):
     patch.setattr(solver, "MAX_ITERATIONS", 0)
-    patch.setattr(amg, "FACTORS_UP_TO", {2: 0})
+    patch.setattr(amg, "AFFORDABLE", {2: 0})
     solved(blocks(), linear_solver="amg")
 
 

@@ -20,6 +20,7 @@ from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
 from fastcontact.cli._executor import _failing_threads_interrupt
 from fastcontact.results import file_lock
+from fastcontact.round_off import SUM_ROUND_OFF
 from fastcontact.studies import affordable, execute
 from fastcontact.studies.levels import _default_element
 
@@ -331,11 +332,11 @@ def test_no_equations_have_no_pivots():
 
 
 def test_the_least_tolerance_is_not_lowered():
-    from fastcontact.linear import lower_tolerance
+    from fastcontact.linear.elimination.loaded import tighten
 
-    solver = types.SimpleNamespace(tolerance=lower_tolerance.LEAST)
-    assert not lower_tolerance.tighten(solver, 100.0)
-    assert solver.tolerance == lower_tolerance.LEAST
+    solver = types.SimpleNamespace(tolerance=SUM_ROUND_OFF)
+    assert not tighten(solver, 100.0)
+    assert solver.tolerance == SUM_ROUND_OFF
 
 
 def test_a_sweep_shows_itself(tmp_path):

@@ -9,8 +9,7 @@ from models import elastic_model
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
-from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide, Rotation
 from fastcontact.mesh.generate import block, box
 
 pytestmark = pytest.mark.each_value

@@ -5,7 +5,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 
 CENTRE, AXIS = (0.3, -1.0, 2.0), (1.0, 2.0, -0.5)
 NEO_HOOKEAN, KIRCHHOFF = fc.NeoHookean(E=1.0, nu=0.3), fc.LinearElastic(E=1.0, nu=0.3)

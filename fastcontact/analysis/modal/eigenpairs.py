@@ -1,4 +1,4 @@
-"""The lowest eigenpairs of ``K v = eigenvalue M v``, by factors of a shifted matrix or by multigrid.
+"""The lowest eigenpairs of ``K v = eigenvalue M v`` among the motions that supports and closed contact allow.
 
 With a factorisation of ``K + s M``, the Lanczos method is applied to its inverse (Ericsson and Ruhe, Math. Comp. 35, 1980);
 where a factorisation is too expensive, the locally optimal block preconditioned conjugate gradient method (LOBPCG; Knyazev,
@@ -10,25 +10,27 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.sparse import bsr_array
+from scipy.linalg import eigh, qr, solve_triangular
+from scipy.sparse import bsr_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobpcg
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.elasticity.constrained_system import System, diagonal_of, supports_apart
 from fastcontact.errors import ConvergenceError, ModelError
+from fastcontact.linear.elimination.coupled_pivots import RepeatedError
+from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.multigrid.hierarchy import COARSEST
-from fastcontact.linear.multigrid.solver import Multigrid
-from fastcontact.linear.protocol import LinearSolver
+from fastcontact.linear.multigrid.solver import MAX_ITERATIONS, Multigrid
+from fastcontact.linear.protocol import TOLERANCE, LinearSolver
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Error of vectors; the error of eigenvalues is its square.
-ACCURACY = 1e-5
 UNSTABLE = (
     "the settled step is not stable, small motions grow by themselves: where nodes slide, as round a tightened bolt, "
     "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
     "(stress_stiffening=False)"
 )
-# Iterations between checks of the error, and the number of checks.
-ROUND, ROUNDS = 20, 15
+# Iterations between checks of the error.
+ROUND = 20
 
 
 def lowest(
@@ -114,15 +116,81 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
 
     unit = LinearOperator(shifted.shape, matvec=lambda r: cycle(r.reshape(-1, 1)).ravel(), matmat=cycle, dtype=float)
     vectors = start
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ITERATIONS // ROUND):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # a warning that a round has few iterations
             values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
         residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
         # Measured by the energy of the error, independent of units: the error of eigenvalues is its square.
-        if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= ACCURACY**2 * values[:n]).all():
+        if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= TOLERANCE * values[:n]).all():
             return np.asarray(vectors)
     raise ConvergenceError(
-        f"{n} modes did not settle in {ROUNDS * ROUND} iterations of multigrid: ask for fewer, or use "
+        f"{n} modes did not settle in {MAX_ITERATIONS} iterations of multigrid: ask for fewer, or use "
         'linear_solver="direct" if memory allows'
     )
+
+
+class Reduced:
+    """Motions ``u = T v`` of a system under further equations ``rows @ u = 0``.
+
+    Parameters
+    ----------
+    system : System
+        System with supports and multi-point constraints.
+    mass : bsr_array (n, n)
+        [mass].
+    rows : csr_array (m, n)
+        Equations, possibly linearly dependent [-].
+    nodes : ndarray of int (m,)
+        A node of each row, whose unknowns are preferred for elimination.
+
+    Attributes
+    ----------
+    K, M : bsr_array (n, n)
+        Stiffness [force / length] and mass [mass] of v; rows that are not free have only the diagonal in K, and are
+        empty in M.
+    free : ndarray of bool (n,)
+        Components of v that are unknowns.
+    """
+
+    def __init__(self, system: System, mass: bsr_array, rows: csr_array, nodes: Indices) -> None:
+        n, size = mass.shape[0], mass.blocksize[0]
+        unit = diags_array(system.free.astype(float))
+        self._T = csr_array(unit if system.T is None else system.T @ unit)
+        self.K, self.free = system.matrix, system.free.copy()
+        rows_of_unknowns = system.rows(rows, np.zeros(rows.shape[0]), np.zeros(n))[0]
+        kept = np.flatnonzero(np.diff(rows_of_unknowns.indptr) > 0)
+        if len(kept):
+            pivots, weights = _eliminated(csr_array(rows_of_unknowns[kept]), nodes[kept], size)
+            self.free[pivots] = False
+            at_pivots = csr_array((np.ones(len(pivots)), (pivots, np.arange(len(pivots)))), shape=(n, len(pivots)))
+            among = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
+            K = csr_array(among.T @ self.K.tocsr() @ among).tobsr((size, size))
+            K.sort_indices()
+            self.K, self._T = supports_apart(K, ~self.free, diagonal_of(K))[0], csr_array(self._T @ among)
+        self.M = csr_array(self._T.T @ mass.tocsr() @ self._T).tobsr((size, size))
+
+    def displacement(self, v: Array) -> Array:
+        """Return the displacements (n, k) of motions v (n, k) [unit of v]."""
+        return np.asarray(self._T @ v)
+
+
+def _eliminated(rows: csr_array, nodes: Indices, size: int) -> tuple[Indices, csr_array]:
+    """Return the unknowns (p,) that equations (m, n) eliminate, and their weights (p, n) of the others.
+
+    Linearly dependent equations, as at corners where several sides meet, are dropped.
+    """
+    try:
+        elimination = eliminate(rows, np.zeros(rows.shape[0]), None, nodes, size)
+    except RepeatedError:
+        return _independent(rows)
+    return elimination.pivots, elimination.full_weights()
+
+
+def _independent(rows: csr_array) -> tuple[Indices, csr_array]:
+    columns = np.unique(rows.indices)
+    _, R, order = qr(rows[:, columns].toarray(), mode="economic", pivoting=True)
+    rank = int((np.abs(np.diag(R)) > LENGTH_ROUND_OFF * abs(R[0, 0])).sum())
+    weights, others = csr_array(-solve_triangular(R[:rank, :rank], R[:rank, rank:])), columns[order[rank:]]
+    of_all = csr_array((weights.data, others[weights.indices], weights.indptr), shape=(rank, rows.shape[1]))
+    return columns[order[:rank]].astype(np.intp), of_all

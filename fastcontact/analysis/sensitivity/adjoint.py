@@ -16,9 +16,10 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError
+from fastcontact.linear.protocol import TOLERANCE
 
-# Relative residual of GMRES for s, and its largest number of solutions.
-LEFT, SOLUTIONS = 1e-10, 200
+# Largest number of solutions of GMRES for s.
+SOLUTIONS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,7 @@ class Adjoint:
             return s + self._transposed(*self._solve_transposed(s, none))
 
         n = len(right)
-        s, info = gmres(LinearOperator((n, n), product), first, rtol=LEFT, atol=0.0, restart=SOLUTIONS, maxiter=1)
+        s, info = gmres(LinearOperator((n, n), product), first, rtol=TOLERANCE, atol=0.0, restart=SOLUTIONS, maxiter=1)
         if info:
             raise ConvergenceError(
                 f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.sensitivity.moving_contact import CHANGED, MovingContact
 from fastcontact.analysis.sensitivity.quantities import Label
 from fastcontact.arrays import Array
@@ -35,7 +34,8 @@ def by_constant(contact: MovingContact, parameter: Label) -> tuple[Array, Array 
             (_changed(m, name, component, by) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
-        return replace(contact, problem=_with_model(contact.problem, made))
+        pairs = {pair.name: made.bind(pair, contact.problem.pairs[pair.name].held) for pair in made.contact}
+        return replace(contact, problem=replace(contact.problem, model=made, pairs=pairs))
 
     # Fourth order: the error is proportional to the fourth power of the step.
     forces = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
@@ -108,11 +108,6 @@ def _changed(material: Material, name: str, component: int | None, by: float) ->
         )
     assert isinstance(material, Orthotropic | Anisotropic)
     return replace(material, **{name: value})
-
-
-def _with_model(problem: Problem, model: Model) -> Problem:
-    pairs = {pair.name: model.bind(pair, problem.pairs[pair.name].held) for pair in model.contact}
-    return replace(problem, model=model, pairs=pairs)
 
 
 def _inside(contact: MovingContact) -> Array:

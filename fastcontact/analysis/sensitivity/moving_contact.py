@@ -33,8 +33,6 @@ CHANGED = 1e-3
 # A larger difference of one-sided derivatives is a kink: for forces relative to the largest one over the shortest edge,
 # for gaps absolute.
 SMOOTH = 1e-3
-# Up to this number of components, each is moved on its own.
-FEW = 60
 # Largest error of the derivatives from simultaneous moves, relative to the largest of them; above it points are moved
 # one by one.
 TOGETHER = 1e-5
@@ -160,11 +158,10 @@ class MovingContact:
         dofs = np.empty(0, np.intp) if keep else self._moving_dofs()
         if not len(dofs):
             return csr_array((size, n)), csr_array((size, n))
-        if len(dofs) > FEW:
-            reached = self._reached()
-            derivatives = self._differences(_independent_groups(dofs, reached, self.problem.model.mesh.dim), reached)
-            if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
-                return derivatives
+        reached = self._reached()
+        derivatives = self._differences(_independent_groups(dofs, reached, self.problem.model.mesh.dim), reached)
+        if self._agrees(0.5 * (derivatives[0] + derivatives[1]), dofs):
+            return derivatives
         return self._differences([np.array([dof]) for dof in dofs], None)
 
     def kinks(self, forward: csr_array, backward: csr_array) -> csr_array:

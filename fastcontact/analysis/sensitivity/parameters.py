@@ -13,7 +13,7 @@ from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.analysis.sensitivity.quantities import Label
-from fastcontact.analysis.wear import Worn
+from fastcontact.analysis.slip import Worn
 from fastcontact.arrays import Array
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load, evaluated
@@ -75,17 +75,16 @@ def _nothing(contact: MovingContact) -> Change:
     return Change(np.zeros(n), np.zeros(n), np.zeros(n + len(contact.active) + nodes))
 
 
-def _on(items: Sequence[Item], group: str) -> list[Item]:
-    """Return the loads or temperatures that act on a group, restricted to it."""
-    return [
+def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
+    """Return the loads or temperatures on a group, restricted to it.
+
+    ModelError if there are none, and `others` lack the name.
+    """
+    group = str(parameter[1])
+    items_of_group = [
         item if len(item.places) == 1 else replace(item, groups=(group,))  # type: ignore[type-var]
         for item in items if group in item.places
     ]  # fmt: skip
-
-
-def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
-    """Return the loads or temperatures on a group; ModelError if there are none, and `others` lack the name."""
-    items_of_group = _on(items, str(parameter[1]))
     if not items_of_group and parameter[1] not in others:
         names = [place for item in items for place in item.places]
         raise ModelError(unknown(kind, str(parameter[1]), list(dict.fromkeys([*names, *others]))))

@@ -10,8 +10,7 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
 from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS
-from fastcontact.contact.search.straight_3d_kernels import FINAL
-from fastcontact.round_off import ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
 MOST = 12
@@ -253,7 +252,7 @@ def _locate(flat, x, y, xi, terms):
         step_s, step_t = (d * off_x - b * off_y) / area, (a * off_y - c * off_x) / area
         xi[0] += step_s
         xi[1] += step_t
-        if n_terms == 3 or (abs(step_s) < FINAL and abs(step_t) < FINAL):
+        if n_terms == 3 or (abs(step_s) < LENGTH_ROUND_OFF and abs(step_t) < LENGTH_ROUND_OFF):
             _fill_terms(n_terms, xi[0], xi[1], terms)
             return abs(area)
     return 0.0

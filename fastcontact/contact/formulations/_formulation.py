@@ -27,9 +27,7 @@ from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nod
 from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
-from fastcontact.contact.tied import TiedPair, moments_of, tied
-from fastcontact.contact.tied_at_supports import reduction
-from fastcontact.contact.tied_offset import with_arms
+from fastcontact.contact.tied import TiedPair, moments_of, reduction, tied, with_arms
 from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 

@@ -22,9 +22,6 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets, same_facets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Ridges of a facet at most: four sides of a quadrangle.
-MOST_RIDGES = 4
-
 
 @dataclass(frozen=True, eq=False)
 class Block:
@@ -59,7 +56,7 @@ class SurfaceFacets(NamedTuple):
     """
 
     blocks: list[Block]
-    beyond: Indices  # (n_facets, 4): the facet beyond each ridge, -1 where the surface ends
+    beyond: Indices  # (n_facets, most ridges): the facet beyond each ridge, -1 where the surface ends
     normals: list[Array]  # (n, k, dim) for each block: unit normals at the nodes [-]
     smooth: list[Array]  # the same, of the smooth surface [-]
     at_points: Array  # (n_points, dim): normals of points [-]
@@ -137,7 +134,7 @@ def _described(blocks: list[Block], facet: int) -> str:
 
 
 def _neighbours(blocks: list[Block], group: str) -> Indices:
-    """Return the facet beyond each ridge (n_facets, 4), -1 where the surface ends.
+    """Return the facet beyond each ridge (n_facets, most ridges), -1 where the surface ends.
 
     Raises ContactError, which names a facet, if the surface branches or neighbours have opposite orientations.
     """
@@ -153,7 +150,7 @@ def _neighbours(blocks: list[Block], group: str) -> Indices:
             "surface must not branch, so split it into several groups"
         )
     one = first[count == 2]
-    beyond = np.full((sum(len(block.nodes) for block in blocks), MOST_RIDGES), -1, np.intp)
+    beyond = np.full((sum(len(block.nodes) for block in blocks), ridge.max() + 1), -1, np.intp)
     beyond[facet[one], ridge[one]] = facet[one + 1]
     beyond[facet[one + 1], ridge[one + 1]] = facet[one]
     _check_orientation(blocks, group, facet[one], facet[one + 1], sign[one] != sign[one + 1])

@@ -13,11 +13,10 @@ import numpy as np
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
 from fastcontact.arrays import Array
 
-# Capacity of the stack of boxes still to open; a squared distance that no facet exceeds.
-DEPTH, FAR = 64, 1e300
-# Factor for the round-off of squared distances to boxes and facets, which from far away exceeds the distances within
-# which places count as the same.
-ROUNDING = 1.0 + 1e-14
+# Capacity of the stack of boxes still to open.
+DEPTH = 64
+# A squared distance that no facet exceeds.
+FAR = float(np.finfo(np.float64).max)
 
 
 class Tree(NamedTuple):

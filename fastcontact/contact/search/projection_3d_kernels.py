@@ -11,7 +11,8 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, cross, dot, minus, on_flat, rest, unit
+from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_flat, rest, unit
+from fastcontact.round_off import ROUND_OFF
 
 # Steps in reference coordinates below which a projection has converged.
 STEP = 1e-13
@@ -109,7 +110,7 @@ def _expansion(terms, f, s, t, point):
 def _allowed(sides, s, t, ps, pt, size):
     """Return whether a step (ps, pt) from (s, t) leaves the domain through none of the sides that (s, t) lies on."""
     for k in range(sides.shape[0]):
-        on = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ON_SIDE
+        on = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t <= ROUND_OFF
         if on and sides[k, 0] * ps + sides[k, 1] * pt > 1e-14 * size:
             return False
     return True
@@ -140,7 +141,7 @@ def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
         return ps, pt
     ps, pt, gain = 0.0, 0.0, 0.0
     for k in range(sides.shape[0]):
-        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t > ON_SIDE:
+        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t > ROUND_OFF:
             continue
         us, ut = -sides[k, 1], sides[k, 0]
         slope = gs * us + gt * ut
@@ -180,7 +181,7 @@ def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
 def _fits(sides, s, t):
     """Return whether (s, t) lies in the domain."""
     for k in range(sides.shape[0]):
-        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t < -ON_SIDE:
+        if sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t < -ROUND_OFF:
             return False
     return True
 
@@ -277,7 +278,7 @@ def onto_sides(sides, s, t):
     """Return (s, t) moved exactly onto the sides that it lies on up to round-off."""
     for k in range(sides.shape[0]):
         room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
-        if room <= ON_SIDE:
+        if room <= ROUND_OFF:
             # Of a + b <= c the first coordinate is solved for: it is as exact as the other.
             if sides[k, 0] != 0.0:
                 s = (sides[k, 2] - sides[k, 1] * t) / sides[k, 0]
@@ -302,6 +303,6 @@ def frame(terms, f, s, t, point, sides, nodes):
     overhang, span = 0.0, nodes[1, 0] - nodes[0, 0]
     for k in range(sides.shape[0]):
         a, b = sides[k, 0], sides[k, 1]
-        if sides[k, 2] - a * s - b * t <= ON_SIDE:
+        if sides[k, 2] - a * s - b * t <= ROUND_OFF:
             overhang = max(overhang, (a * ds + b * dt) / span)
     return unit(cross(p, q)), overhang

@@ -7,7 +7,8 @@ Facets are straight lines (2 nodes) or parabolas (3 nodes, the middle one last),
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, open_box, square_to_box
+from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
+from fastcontact.round_off import ROUND_OFF
 
 
 @inlined_kernel
@@ -84,7 +85,7 @@ def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
             f = box - leaves
             s, d = _project(nodes, f, x, y)
             if d < best or (d == best and numbers[f] < numbers[closest]):
-                closest, best, best_s, reach = f, d, s, ROUNDING * d
+                closest, best, best_s, reach = f, d, s, (1.0 + ROUND_OFF) * d
         result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
             result.facet[i] = numbers[closest]

@@ -4,10 +4,10 @@
 import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel
-from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, ROUNDING, open_box, square_to_box
+from fastcontact.contact.search.box_tree_kernels import DEPTH, FAR, open_box, square_to_box
 from fastcontact.contact.search.projection_3d_kernels import component, frame, onto_sides, project, vector
-from fastcontact.contact.search.straight_3d_kernels import ON_SIDE, along, cross, dot, minus, on_bilinear, on_flat, unit
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, on_bilinear, on_flat, unit
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
 @interpretable_kernel
@@ -47,7 +47,7 @@ def closest_facets(points, order, begin, end, facets, domain, numbers, tree, clo
             if square < best:
                 best = square
                 reach = np.sqrt(best) + same
-                reach = ROUNDING * (reach * reach)
+                reach = (1.0 + ROUND_OFF) * (reach * reach)
         closest_facet.facet[i], closest_facet.distance[i] = -1, np.nan
         if closest >= 0:
             closest_facet.facet[i] = numbers[closest]
@@ -89,7 +89,7 @@ def _projected(facets, f, domain, point, reach):
         r = minus(point, o)
         if terms.shape[1] == 3:
             s, t = on_flat(r, a, b)
-            inside, d = s > ON_SIDE and t > ON_SIDE and 1.0 - s - t > ON_SIDE, 0.0
+            inside, d = s > ROUND_OFF and t > ROUND_OFF and 1.0 - s - t > ROUND_OFF, 0.0
         else:
             s, t, d = on_bilinear(r, a, b, c, np.sqrt(reach))
             inside = abs(s) < 1.0 and abs(t) < 1.0

@@ -1,20 +1,14 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Closest points of facets with straight sides: flat triangles in closed form, bilinear quadrangles by a few Newton steps.
 
-Vectors are tuples of three numbers: Numba would count references to arrays in every call.
+Vectors are tuples of three numbers: Numba would count references to arrays in every call. A point nearer to a side of the
+domain than ROUND_OFF, in reference coordinates, lies on it.
 """
 
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.round_off import ROUND_OFF
-
-# A point nearer to a side of the domain than this, in reference coordinates, lies on it.
-ON_SIDE = ROUND_OFF
-# Steps of Newton's method shrink quadratically: the next one after a step of this size is below round-off.
-FINAL = 1e-8
-# Squared sines between the sides of a triangle: below the first, the area is round-off; below the second, half its digits.
-COLLAPSED, NEEDLE = 1e-14, 1e-10
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 
 @kernel
@@ -82,14 +76,14 @@ def on_flat(r, a, b):
         t = (d4 - d3) / ((d4 - d3) + (d5 - d6))
         return 1.0 - t, t
     square = aa * bb - ab * ab
-    if not square > COLLAPSED * aa * bb:
+    if not square > ROUND_OFF * aa * bb:
         return _on_longest_side(r, a, b)
     area = va + vb + vc
     s, t = vb / area, vc / area
-    if square < NEEDLE * aa * bb:  # rounding errors are large there, and one more step makes them small
+    if square < LENGTH_ROUND_OFF * aa * bb:  # rounding errors are large there, and one more step makes them small
         v = rest(r, a, b, (0.0, 0.0, 0.0), s, t)
         s, t = s + (bb * dot(a, v) - ab * dot(b, v)) / square, t + (aa * dot(b, v) - ab * dot(a, v)) / square
-    if s >= -ON_SIDE and t >= -ON_SIDE and s + t <= 1.0 + ON_SIDE:
+    if s >= -ROUND_OFF and t >= -ROUND_OFF and s + t <= 1.0 + ROUND_OFF:
         return s, t
     return _on_longest_side(r, a, b)
 
@@ -149,7 +143,7 @@ def on_bilinear(r, a, b, c, reach):
 def _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t):
     """Return where Newton's method gets from (s, t), and whether that is a stationary point inside the facet."""
     for _ in range(8):
-        if not (abs(s) < 1.0 - ON_SIDE and abs(t) < 1.0 - ON_SIDE):
+        if not (abs(s) < 1.0 - ROUND_OFF and abs(t) < 1.0 - ROUND_OFF):
             return s, t, False
         w = cr - s * ac - t * bc - s * t * cc
         gs = ar - s * aa - t * ab - s * t * ac + t * w
@@ -159,8 +153,8 @@ def _stationary(aa, ab, bb, ac, bc, cc, ar, br, cr, s, t):
         determinant = hss * htt - hst * hst
         ps, pt = (htt * gs - hst * gt) / determinant, (hss * gt - hst * gs) / determinant
         s, t = s + ps, t + pt
-        if abs(ps) < FINAL and abs(pt) < FINAL:
-            return s, t, abs(s) < 1.0 - ON_SIDE and abs(t) < 1.0 - ON_SIDE
+        if max(abs(ps), abs(pt)) < LENGTH_ROUND_OFF:  # steps shrink quadratically: the next one is below round-off
+            return s, t, abs(s) < 1.0 - ROUND_OFF and abs(t) < 1.0 - ROUND_OFF
     return s, t, False
 
 

@@ -14,11 +14,10 @@ from fastcontact.arrays import Indices, Mask, Numbers
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_kernels
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Largest fraction of explicit zeros in merged supernodes, by their width.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
-# Pivots below this fraction of the diagonal are round-off.
-SINGULAR = 1e-10
 
 
 def singular() -> ModelError:
@@ -99,7 +98,7 @@ class SymbolicFactors:
             A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
         )
         if bad >= 0:
-            if abs(d[bad]) <= SINGULAR * A.diagonal()[tree.order[bad]]:
+            if abs(d[bad]) <= LENGTH_ROUND_OFF * A.diagonal()[tree.order[bad]]:
                 raise singular()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)

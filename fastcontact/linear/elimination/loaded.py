@@ -1,22 +1,26 @@
-"""Common part of iterative solvers: solution under linear constraints, eliminated where possible."""
+"""Common part of iterative solvers: linear constraints, eliminated where possible, and tolerances that may be lowered."""
 
 from __future__ import annotations
 
 import functools
 import logging
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.linear.delassus import multipliers
+from fastcontact.linear.delassus import solve_multipliers
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.elimination.pivot_order import RepeatedError
 from fastcontact.linear.field_compliance import FieldCompliance
-from fastcontact.linear.protocol import Monitor
+from fastcontact.linear.protocol import LinearSolver, Monitor
+from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
+# Target of the residual relative to its admissible value.
+LEFT = 0.1
 
 
 class LoadedIteration:
@@ -54,7 +58,7 @@ class LoadedIteration:
             else:
                 u = solver.solution(self._f, elimination, guess, monitor, tolerance)
                 return u, solver.multiplier(elimination, u, self._f)
-        multiplier = multipliers(solver.columns, B, c - B @ self._free, C)
+        multiplier = solve_multipliers(solver.columns.of_rows(B), c - B @ self._free, C)
         return solver.solution(self._f + B.T @ multiplier, None, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
@@ -72,3 +76,24 @@ class LoadedIteration:
     def condensed(self) -> None:
         """See `Loaded`."""
         return None
+
+
+def tighten(solver: LinearSolver, excess: float) -> bool:
+    """Lower the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; False at the lower limit."""
+    tolerance = max(solver.tolerance * LEFT / excess, SUM_ROUND_OFF)
+    if not tolerance < solver.tolerance:
+        return False
+    log.info(
+        "linear solver: forces are out of balance by %.1e times the bound, its tolerance falls from %.1e to %.1e",
+        excess, solver.tolerance, tolerance,
+    )  # fmt: skip
+    solver.asked = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = tolerance
+    return True
+
+
+def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
+    """Restore the tolerance of a snapshot, lowered or not."""
+    requested = solver.tolerance if solver.asked is None else solver.asked
+    solver.tolerance = snapshot.get("tolerance", requested)
+    solver.asked = None if solver.tolerance == requested else requested

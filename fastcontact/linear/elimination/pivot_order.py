@@ -56,18 +56,12 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
     """
     if not B.shape[0]:
         return np.empty(0, np.intp), SparseInverse(csr_array((0, 0)))
-    return (pivots := _chosen(B, nodes, size)), inverse_of(B, pivots, size)
-
-
-def _chosen(B: csr_array, nodes: Indices | None, size: int) -> Indices:
-    """Return the pivot of every equation (m,), see `chosen`."""
-    if (pivots := of_groups(B, np.arange(B.shape[0]) if nodes is None else nodes)) is not None:
-        return pivots
-    if nodes is not None and (pivots := of_nodes(B, nodes, size)) is not None:
-        return pivots
-    if nodes is not None and (pivots := of_most_groups(B, nodes)) is not None:
-        return pivots
-    return assigned(B)
+    pivots = of_groups(B, np.arange(B.shape[0]) if nodes is None else nodes)
+    if pivots is None and nodes is not None:
+        pivots = of_nodes(B, nodes, size)
+        pivots = of_most_groups(B, nodes) if pivots is None else pivots
+    pivots = assigned(B) if pivots is None else pivots
+    return pivots, inverse_of(B, pivots, size)
 
 
 def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:

@@ -21,8 +21,8 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.factors.factor_solver import AFFORDABLE
-from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
+from fastcontact.linear.elimination.loaded import put_back_tolerance, tighten
+from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.multigrid.loaded import LoadedMultigrid
 from fastcontact.linear.multigrid.reduced import Reduced
 from fastcontact.linear.multigrid.solver import (
@@ -36,8 +36,6 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Number of unknowns up to which a factorisation replaces multigrid.
-FACTORS_UP_TO = AFFORDABLE
 # Work in one load step, in iterations, above which a factorisation is certainly cheaper: a constant, and a number for
 # each unknown, by the number of components per node. In 3D a factorisation and a step by it cost 300 and 0.04 where two
 # bodies touch, three times as much in stacks with friction (measured, see bench/README.md).
@@ -164,7 +162,7 @@ class Amg(Multigrid, LinearSolver):
 
     @property
     def _may_factorise(self) -> bool:
-        return bool(self.K.shape[0] <= FACTORS_UP_TO[self.K.blocksize[0]])
+        return bool(self.K.shape[0] <= AFFORDABLE[self.K.blocksize[0]])
 
     def _factorise(self, why: str) -> Direct:
         if self._factored is None:

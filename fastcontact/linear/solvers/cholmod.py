@@ -14,7 +14,7 @@ from scipy.sparse import bsr_array, csr_array
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.factorisation import fill_reducing, singular
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
-from fastcontact.linear.factors.factor_solver import FactorSolver
+from fastcontact.linear.factor_solver import FactorSolver
 
 # The system whose solution CHOLMOD calls b in the order of elimination.
 PERMUTE = 7

@@ -7,7 +7,7 @@ from scipy.sparse import bsr_array
 from fastcontact.arrays import Indices
 from fastcontact.linear.cholesky.factorisation import SymbolicFactors
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.factors.factor_solver import FactorSolver
+from fastcontact.linear.factor_solver import FactorSolver
 
 
 class Direct(FactorSolver):

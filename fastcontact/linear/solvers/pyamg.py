@@ -18,8 +18,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import InverseColumns
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.elimination.loaded import LoadedIteration
-from fastcontact.linear.lower_tolerance import put_back_tolerance, tighten
+from fastcontact.linear.elimination.loaded import LoadedIteration, put_back_tolerance, tighten
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import finite_vector, typed
 from fastcontact.arrays import AnyArray, Array, Mask, Numbers
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.incompatible_modes import BENDING
 from fastcontact.elasticity.initial_states import InitialState
 from fastcontact.elasticity.loads import Load, Value, check_number, check_solids, evaluated, solid_rows

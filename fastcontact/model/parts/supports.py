@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.obstacles.rotation import Rotation
+from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.loads import Value, axes_of, check_points, check_value, evaluated
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint

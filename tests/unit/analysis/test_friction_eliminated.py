@@ -147,7 +147,7 @@ def test_an_iteration_that_does_not_end_is_told(monkeypatch):
 def stuck(monkeypatch, limit=None):
     monkeypatch.setattr(solver, "MAX_ITERATIONS", 0)
     if limit is not None:
-        monkeypatch.setattr(amg, "FACTORS_UP_TO", {3: limit})
+        monkeypatch.setattr(amg, "AFFORDABLE", {3: limit})
     return small_blocks(0.0)
 
 

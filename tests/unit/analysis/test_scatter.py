@@ -7,7 +7,7 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact.analysis.scatter import WINDOW, Watch
+from fastcontact.analysis.tolerances import WINDOW, Watch
 
 RNG = np.random.default_rng(5)
 

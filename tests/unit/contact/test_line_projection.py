@@ -5,9 +5,8 @@ import pytest
 from scipy.optimize import brentq
 
 import fastcontact as fc
-from fastcontact.contact.line_projection import along_line_normals
 from fastcontact.contact.pairing import pair
-from fastcontact.contact.projection import at_nodes_of_facets, interpolated, places, smooth_normals
+from fastcontact.contact.projection import along_line_normals, at_nodes_of_facets, interpolated, places, smooth_normals
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
@@ -34,7 +33,7 @@ def test_points_lie_along_the_normal_of_their_projection(element):
     candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(-0.1, 0.25, 400)])
     normals = at_nodes_of_facets(smooth_normals(side, mesh.points))
     start = closest_of_kinds(candidates, side.corners(mesh.points))
-    facet, xi, overhang = along_line_normals(candidates, side, mesh.points, normals, start)
+    facet, xi, overhang, _ = along_line_normals(candidates, side, mesh.points, normals, start)
     at = places(side, facet, xi)
     foot = np.einsum("nk,nkd->nd", at.shape, mesh.points[at.nodes])
     assert (overhang == 0.0).all()
@@ -51,7 +50,7 @@ def test_against_a_plain_root_on_every_facet(element):
     x = rng.uniform(0.1, 3.9, 60)
     candidates = np.column_stack([x, 1.0 + 0.3 * np.sin(2.5 * x) + rng.uniform(0.0, 0.1, 60)])
     start = closest_of_kinds(candidates, side.corners(mesh.points))
-    facet, xi, _ = along_line_normals(candidates, side, mesh.points, normals, start)
+    facet, xi, _, _ = along_line_normals(candidates, side, mesh.points, normals, start)
     for i, point in enumerate(candidates):
 
         def aside(s, f, point=point):

@@ -162,7 +162,7 @@ def test_threads_change_no_bit(monkeypatch):
     normals = at_nodes_of_facets(smooth_normals(side, points))
     start = closest_of_kinds(candidates, side.corners(points))
     alone = along_normals(candidates, side, points, normals, start)
-    monkeypatch.setattr(projection, "portions", lambda count, nodes: [(0, 3), (3, count // 2), (count // 2, count)])
+    monkeypatch.setattr(projection, "portions", lambda count, nodes=1: [(0, 3), (3, count // 2), (count // 2, count)])
     for one, other in zip(alone, along_normals(candidates, side, points, normals, start), strict=True):
         assert (one == other).all()
     for block in side.blocks:

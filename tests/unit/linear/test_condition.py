@@ -6,8 +6,7 @@ from scipy.sparse import csr_array
 from test_coupled_pivots import mass_equations
 
 from fastcontact.linear.elimination import pivot_order
-from fastcontact.linear.elimination.condition import condition
-from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError
+from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, RepeatedError, condition
 from fastcontact.linear.elimination.elimination import eliminate
 
 

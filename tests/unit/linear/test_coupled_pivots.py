@@ -174,7 +174,7 @@ def test_constraints_that_cannot_be_eliminated_go_to_factors_and_not_through_man
     assert "columns of the inverse stiffness" in solver.gave_up
     assert "dual" in solver.gave_up
     assert found.force == pytest.approx(solved(model, "direct")[1].force, abs=1e-9)
-    monkeypatch.setattr(amg, "FACTORS_UP_TO", {3: 100})
+    monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
     with pytest.raises(TooManyColumnsError, match="direct solver"):
         solved(model, "amg")
 

@@ -14,7 +14,7 @@ from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.linear import choice as linear
 from fastcontact.linear.cholesky import triangular_kernels
 from fastcontact.linear.cholesky.factorisation import fill_reducing, reordered
-from fastcontact.linear.factors.known_loads import KnownLoads
+from fastcontact.linear.factor_solver import KnownLoads
 
 FACTORED = ["direct", "cholmod"]
 

@@ -50,7 +50,7 @@ def test_after_factors_took_over_solutions_are_as_accurate_as_theirs(monkeypatch
 def test_without_factors_that_fit_any_work_is_allowed(monkeypatch):
     monkeypatch.setattr(amg, "COST", 0)
     monkeypatch.setattr(amg, "COST_OF_UNKNOWN", {3: 0.0})
-    monkeypatch.setattr(amg, "FACTORS_UP_TO", {3: 100})
+    monkeypatch.setattr(amg, "AFFORDABLE", {3: 100})
     solver, _ = solved(pressed(friction=0.3, n=6), "amg")
     assert not solver.gave_up
     assert solver.counters.iterations > 10

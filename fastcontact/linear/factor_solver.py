@@ -1,9 +1,12 @@
-"""Common part of direct solvers: right-hand sides by factors of K, constraints by the Schur complement."""
+"""Common part of direct solvers: right-hand sides by factors of K, constraints by the Schur complement.
+
+Solutions for right-hand sides that are linear combinations of earlier ones are combined from theirs (`KnownLoads`).
+"""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +14,10 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
-from fastcontact.linear.delassus import InverseColumns, check_rows, multipliers, solve_multipliers, symmetric
-from fastcontact.linear.factors.known_loads import KnownLoads
+from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
+from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
 # Number of last unknowns above which their dense block costs more than the solutions it saves.
@@ -22,7 +25,57 @@ LAST_UP_TO = 4000
 # Number of unknowns up to which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 ATTAINABLE = 1e-14
-NONE = np.empty(0, np.intp)
+# Number of stored right-hand sides: loads and supports seldom have more independent ramps.
+KEPT = 4
+
+
+class KnownLoads:
+    """Stores the last right-hand sides and solutions, and combines them where that is exact to round-off."""
+
+    def __init__(self) -> None:
+        self._loads: list[Array] = []
+        self._solutions: list[Array] = []
+
+    def solution(self, f: Array, solve: Callable[[Array], Array]) -> Array:
+        """Return the solution (n,) for f (n,); `solve` computes new ones."""
+        size = float(np.linalg.norm(f))
+        if size == 0.0:
+            return np.zeros_like(f)
+        weights, left = self._projected(f)
+        if len(weights) and np.linalg.norm(left) <= SUM_ROUND_OFF * size:
+            return sum((w * u for w, u in zip(weights, self._solutions, strict=True)), np.zeros_like(f))
+        f = f / size
+        u = solve(f)
+        self._keep(f, u)
+        return size * u
+
+    def _projected(self, f: Array) -> tuple[Array, Array]:
+        """Return the least-squares weights of the stored loads for f, and the remainder (n,)."""
+        weights, left = np.zeros(len(self._loads)), f
+        if self._loads:
+            gram = np.array([[one @ other for other in self._loads] for one in self._loads])
+            for _ in range(2):  # a second pass recovers digits lost in the normal equations
+                weights = weights + np.linalg.lstsq(gram, [load @ left for load in self._loads], rcond=None)[0]
+                left = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
+        return weights, left
+
+    def _keep(self, f: Array, u: Array) -> None:
+        self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
+
+    def snapshot(self) -> list[dict[str, Any]]:
+        """Return the stored right-hand sides in sparse form: ``places`` and ``values``."""
+        places = [np.flatnonzero(f) for f in self._loads]
+        return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]
+
+    def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
+        """Restore the right-hand sides of a `snapshot`, for the same matrix (n, n); solve only for missing ones."""
+        now = list(zip(self._loads, self._solutions, strict=True))
+        self._loads, self._solutions = [], []
+        for entry in snapshot:
+            f = np.zeros(n)
+            f[entry["places"]] = entry["values"]
+            known = [u for load, u in now if np.array_equal(load, f)]
+            self._keep(f, known[0] if known else solve(f))
 
 
 class FactorSolver(LinearSolver):
@@ -66,7 +119,7 @@ class FactorSolver(LinearSolver):
             If K is singular.
         """
         self.n, self._K, self.refines = K.shape[0], K, False
-        last = NONE if involved is None or len(involved) > LAST_UP_TO else involved
+        last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
         self._factors = self._factorised(K, last)
         self.counters.setups += 1
         self.columns, self.known_loads = InverseColumns(self.n, self._factors.solve), KnownLoads()
@@ -133,7 +186,7 @@ class LoadedFactor:
         """See `Loaded`."""
         if B.shape[0] == 0:
             return self._free, np.empty(0)
-        multiplier = multipliers(self._solver.columns, B, c - B @ self._free, C)
+        multiplier = solve_multipliers(self._solver.columns.of_rows(B), c - B @ self._free, C)
         return self.involved_solution(B.T @ multiplier, guess), multiplier
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
