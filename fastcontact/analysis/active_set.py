@@ -23,7 +23,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg import lu_solve
 
-from fastcontact.analysis.solution import Accuracy, Equilibrium, Response
+from fastcontact.analysis.solution import Accuracy, Equilibrium, Response, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.delassus import lu_factors
@@ -82,21 +82,14 @@ def solve(
 def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Response:
     """Return the response of a solution with active constraints `rows` to additional forces and gaps."""
     R, compliance = constraints.B[rows], constraints.normal_compliance
-    at_rest = loaded.involved_solution(np.zeros(R.shape[1]), None)
     F = loaded.delassus(R)[1]
     C = None if compliance is None else compliance.block(rows)
     if C is not None:
         F = F + (np.diag(C) if C.ndim == 1 else C)
-    factors = lu_factors(F) if len(rows) else None
-
-    def respond(force: Array, gaps: Array) -> Array:
-        u = loaded.involved_solution(force, None) - at_rest
-        if factors is None:
-            return u
-        forces = lu_solve(factors, -(R @ u + gaps[rows]))
-        return u + loaded.involved_solution(R.T @ forces, None) - at_rest
-
-    return respond
+    if not len(rows):
+        return response(loaded, R, rows, np.negative)
+    factors = lu_factors(F)
+    return response(loaded, R, rows, lambda gaps: -lu_solve(factors, gaps))
 
 
 def _first_changed(active: Mask, wanted: Mask) -> Mask:

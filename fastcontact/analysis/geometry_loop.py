@@ -28,6 +28,8 @@ log = logging.getLogger("fastcontact")
 SEMISMOOTH_UPDATES = 8
 # Pairings after which an iteration begins again from elsewhere, or with rounded edges: nodes flip between facets.
 PATIENT_UPDATES = 25
+# A solution may contract a change of the geometry less than that of the last Newton step by this factor.
+SAFETY = 3.0
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ class Plan:
         criteria, iterative = problem.criteria, problem.solver.iterative
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
         pairs = problem.pairs.values()
-        # Derivatives of slips are not available, and fluid pressure follows the surfaces themselves.
-        known = not any(pair.friction or pair.options.source is not None for pair in pairs)
+        # Fluid pressure follows the surfaces themselves.
+        known = not any(pair.options.source is not None for pair in pairs)
         newton = known and not iterative and problem.floating_bodies is None
         return cls(
             until_settled=fixed is None,
@@ -158,9 +160,10 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
-        mixed = None
-        if mixing.newton(moved.change) and solution.settled and nodes is None:
-            mixed = newton_step(step, constraints, solution, moved.before, fraction)
+        mixed, enough = None, tolerances.enough(moved.size)
+        if mixing.newton(moved.change, enough) and solution.settled and nodes is None:
+            stepped = newton_step(step, constraints, solution, moved.before, fraction, enough / moved.change)
+            mixed = None if stepped is None else mixing.stepped(*stepped)
         if mixed is None:
             mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
@@ -254,15 +257,21 @@ class _Mixing:
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
-        self._newton, self._change = newton, np.inf
+        self._newton, self._change, self._contraction = newton, np.inf, np.inf
 
-    def newton(self, change: float) -> bool:
+    def newton(self, change: float, enough: float) -> bool:
         """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
 
-        Where nodes move to and fro between facets, changes increase, and Newton's method does not converge.
+        Where nodes move to and fro between facets, changes increase, and Newton's method does not converge. Where the next
+        solution is expected to differ by no more than `enough` [length], it is cheaper.
         """
         self._newton, self._change = self._newton and change <= self._change, change
-        return self._newton
+        return self._newton and SAFETY * self._contraction * change > enough
+
+    def stepped(self, next_pairing: Array, contraction: float) -> Array:
+        """Store by how much a solution contracts changes of the geometry, and return the displacements of a Newton step."""
+        self._contraction = contraction
+        return next_pairing
 
     def restart(self) -> None:
         """Discard the geometries so far."""

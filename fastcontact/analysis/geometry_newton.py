@@ -18,19 +18,19 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.solution import Equilibrium, Solution
+from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 
-# Relative residual of the change, and the largest number of iterations.
-ACCURACY, MOST = 1e-6, 20
+# Relative residual of the change, that over what suffices at the end, and the largest number of iterations.
+ACCURACY, AT_END, MOST = 1e-6, 0.01, 20
 
 
 def newton_step(
-    step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array
-) -> Array | None:
-    """Return the active displacements (k,) of the next pairing [length]; None where the geometry is not linearised.
+    step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array, accuracy: float
+) -> tuple[Array, float] | None:
+    """Return the active displacements (k,) of the next pairing [length], and the norm of S'; None without derivatives.
 
     Parameters
     ----------
@@ -42,19 +42,17 @@ def newton_step(
     before, image : ndarray (k,)
         Active displacements of the pairing and of the solution [length]; displacements on which contact does not depend are
         taken from the latter.
+    accuracy : float
+        Relative accuracy of the change that suffices.
     """
-    if (
-        not isinstance(solution, Equilibrium)
-        or solution.response is None
-        or not (parts := _linearised(constraints, solution))
-    ):
+    if solution.response is None or not (parts := _linearised(constraints, solution)):
         return None
     try:
         respond = solution.response()
     except LinAlgError:
         return None
     dim, n_dofs, where = step.problem.model.mesh.dim, len(step.load.lift), step.dofs.compared
-    gaps = np.zeros(len(constraints))
+    gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def along(v: Array) -> Array:
         """Return ``v - S'(u) v``."""
@@ -63,20 +61,22 @@ def newton_step(
         u = step.dofs.put(np.zeros(n_dofs), active)
         force, nodal = np.zeros(n_dofs), u[: step.problem.model.n_dofs].reshape(-1, dim)
         for rows, part in parts:
-            varied, gaps[rows] = part.along(nodal)
+            varied, changed = part.along(nodal)
+            gaps[: len(changed), rows] = changed
             force[: varied.size] += varied.ravel()
         return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))[where]
 
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(system, changed / size, rtol=ACCURACY, atol=0.0, restart=MOST, maxiter=1)
+    v, _ = gmres(system, changed / size, rtol=max(ACCURACY, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
+    responding = largest_difference(size * v, changed)
     # Far from the solution a step in which the response adds more than the change itself leads anywhere.
-    if not largest_difference(size * v, changed) <= size:
+    if not responding <= size:
         return None
     mixed = image.copy()
     mixed[where] = before[where] + size * v
-    return mixed
+    return mixed, responding / (size * largest(v) or 1.0)
 
 
 def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:
@@ -84,9 +84,12 @@ def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tup
     parts = []
     for name, rows in constraints.rows().items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
+        tangential = np.zeros((len(part), 0))
+        if solution.tangential is not None:
+            tangential = solution.tangential[rows, : len(part.tangents)]
         if part.tied is not None or not multiplier.any():
             continue
         if part.geometry is None:
             return []
-        parts.append((rows, part.geometry(multiplier)))
+        parts.append((rows, part.geometry(multiplier, tangential)))
     return parts

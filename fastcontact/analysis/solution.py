@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
+from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.linear.protocol import Loaded
 
 
 @dataclass(frozen=True)
@@ -36,8 +38,29 @@ class Accuracy:
     max_newton_steps: int | None = None
 
 
-# Response of the unknowns (n,) [length] to forces (n,) [force] and gaps (m,) [length].
+# Response of the unknowns (n,) [length] to forces (n,) [force], and to gaps and slips (1 + k, m) [length].
 Response = Callable[[Array, Array], Array]
+
+
+def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[Array], Array]) -> Response:
+    """Return the `Response` of constraints `rows` (q,), in contact.
+
+    Parameters
+    ----------
+    loaded : Loaded
+    R : csr_array ((1 + k) q, n)
+        Rows of their gaps, and of their slips along k tangents.
+    rows : ndarray of int (q,)
+    forces_of : callable
+        Returns the change of their forces ((1 + k) q,) due to a change of gaps and slips.
+    """
+    at_rest = loaded.involved_solution(np.zeros(R.shape[1]), None)
+
+    def respond(force: Array, gaps: Array) -> Array:
+        u = loaded.involved_solution(force, None) - at_rest
+        return u + loaded.involved_solution(R.T @ forces_of(R @ u + gaps[:, rows].ravel()), None) - at_rest
+
+    return respond
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +192,8 @@ class FrictionalEquilibrium:
         Frictional work in the step, and the part of it done by constraints while they close, from increments [energy].
     slid : Slid, optional
         Beginning of the last increment.
+    response : callable, optional
+        As in `Equilibrium`.
     """
 
     u: Array
@@ -184,6 +209,7 @@ class FrictionalEquilibrium:
     directions: tuple[Array, ...] = ()
     work: Array | None = None
     slid: Slid | None = None
+    response: Callable[[], Response] | None = field(default=None, repr=False)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.

@@ -1,16 +1,18 @@
-r"""Linearised contact geometry: variation of contact forces and gaps with the displacements.
+r"""Linearised contact geometry: variation of contact forces, gaps and slips with the displacements.
 
 The rows of constraints depend on the displacements: points slide over the facets they face, and normals rotate. A
-secondary point :math:`x`, with shape functions :math:`N_s` and contact force :math:`p = \lambda n`, faces the primary
-point :math:`y(\xi) = \sum_k N_k(\xi) y_k`, with the normal n. For a variation of the displacements its nodal forces and
-its gap vary, in addition to the rows themselves, by
+secondary point :math:`x`, with shape functions :math:`N_s` and contact force :math:`p = \lambda n + \tau`, faces the
+primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k`, with the normal n. For a variation of the displacements its nodal
+forces and its gap vary, in addition to the rows themselves, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
-          \delta p = \lambda \, \delta n, \qquad
+          \delta p = \lambda \, \delta n - (\tau \cdot \delta n) n, \qquad
           \delta g = - n \cdot y_{,\alpha} \delta \xi^\alpha + (x - y) \cdot \delta n
 
 (Laursen, Computational Contact and Impact Mechanics, 2002, section 5.3; Wriggers, Computational Contact Mechanics, 2006,
-chapter 9; for mortar Popp, Gee and Wall, 2009), without friction.
+chapter 9; for mortar Popp, Gee and Wall, 2009, with friction Gitterle, Popp, Gee and Wall, 2010). Tangents follow the
+normal without spin, :math:`\delta t = - (t \cdot \delta n) n`: a spin would only rotate the components of tangential
+forces and slips. For slips see `Slips`.
 """
 
 from __future__ import annotations
@@ -37,23 +39,28 @@ from fastcontact.contact.projection import (
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
-from fastcontact.round_off import DIFFERENCES
+from fastcontact.round_off import DIFFERENCES, TINY
 
 
 class Linearised(Protocol):
-    """Contact forces and gaps of one pair, linearised at its pairing and multipliers."""
+    """Contact forces, gaps and slips of one pair, linearised at its pairing and multipliers."""
 
     def along(self, du: Array) -> tuple[Array, Array]:
-        """Return how nodal forces (n_points, dim) [force] and gaps (m,) [length] vary with displacements (n_points, dim)."""
+        """Return how nodal forces (n_points, dim) [force], gaps and slips (1 + k, m) [length] vary with displacements du."""
         ...
 
 
-# A function of the multipliers (m,) [force].
-Geometry = Callable[[Array], Linearised]
+# A function of the multipliers (m,) and the tangential forces (m, k) [force].
+Geometry = Callable[[Array, Array], Linearised]
 
 
 class NodalNormals:
-    """Variation of the `nodal_normals` of a side at `coordinates` (n_points, dim) [length], with fixed facet angles."""
+    """Nodal normals of a side at `coordinates` (n_points, dim) [length], as `nodal_normals`, and their variation.
+
+    Attributes
+    ----------
+    normal : ndarray (m, dim)
+    """
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
         self._side, self._parts = side, []
@@ -65,19 +72,84 @@ class NodalNormals:
             normal, angle = facet_normals(block, coordinates), facet_angles(element, corners)
             up = np.linalg.solve(np.einsum("fqad,fqbd->fqab", axes, axes), axes)
             np.add.at(total, block.local, angle[:, :, None] * normal)
-            self._parts.append((block, slope, normal, angle[:, :, None, None] * up))
+            self._parts.append((block, slope, normal, angle[:, :, None, None] * up, _angle_gradient(element, corners)))
         side.add_across_ends(total)
         self._length = np.linalg.norm(total, axis=1, keepdims=True)
-        self._mean = total / self._length
+        self.normal = total / self._length
 
     def along(self, du: Array) -> Array:
         """Return how the normals (m, dim) vary with displacements (n_points, dim) [length]."""
-        total = np.zeros_like(self._mean)
-        for block, slope, normal, up in self._parts:
-            leans = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(du[block.facets], 1, 2), slope)
+        total = np.zeros_like(self.normal)
+        for block, slope, normal, up, wider in self._parts:
+            moved = du[block.facets]
+            leans = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(moved, 1, 2), slope)
             np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", up, leans))
+            if wider is not None:
+                np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", wider, moved)[:, :, None] * normal)
         self._side.add_across_ends(total)
-        return across(self._mean, total) / self._length
+        return across(self.normal, total) / self._length
+
+
+def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
+    """Return the derivatives (n, q, k, dim) of the angles at nodes q of facets with nodes (n, k, dim); None on lines.
+
+    The angle between unit edges a and b varies with the end of a by ``-(b - cos a) / (|a| sin)``.
+    """
+    if element.dim == 1:
+        return None
+    gradient = np.zeros((len(nodes), nodes.shape[1], *nodes.shape[1:]))
+    n = element.n_corners
+    for corner in range(n):
+        ends = (corner + 1) % n, (corner - 1) % n
+        edges = [nodes[:, end] - nodes[:, corner] for end in ends]
+        length = [np.linalg.norm(edge, axis=1, keepdims=True) for edge in edges]
+        unit = [edge / size for edge, size in zip(edges, length, strict=True)]
+        for end, a, b, size in zip(ends, unit, unit[::-1], length, strict=True):
+            other = across(a, b)
+            slope = -other / (size * np.linalg.norm(other, axis=1, keepdims=True))
+            gradient[:, corner, end] += slope
+            gradient[:, corner, corner] -= slope
+    return gradient
+
+
+class InterpolatedNormals:
+    """Unit normals interpolated between those at nodes, at fixed reference coordinates, and their variation.
+
+    Parameters
+    ----------
+    nodal : NodalNormals
+    local : ndarray of int (n, k)
+        Nodes of the points, as positions on the side.
+    shape : ndarray (n, k)
+    at_nodes : ndarray (n, k, dim), optional
+        Normals at these nodes, where they are not those of `nodal`: at corners.
+
+    Attributes
+    ----------
+    normal : ndarray (n, dim)
+    """
+
+    def __init__(self, nodal: NodalNormals, local: Indices, shape: Array, at_nodes: Array | None = None) -> None:
+        self._at_nodes = nodal.normal[local] if at_nodes is None else at_nodes
+        mean = np.einsum("nk,nkd->nd", shape, self._at_nodes)
+        self._length = np.linalg.norm(mean, axis=1, keepdims=True)
+        self.normal, self._nodal = mean / self._length, nodal
+        self._local = shapes_at(shape, local, len(nodal.normal))
+
+    @classmethod
+    def smooth(cls, side: Surface, coordinates: Array, facet: Indices, at: Places) -> InterpolatedNormals:
+        """Return the normals of a side as a smooth surface at points of its facets (n,), see `smooth_normals`."""
+        at_nodes = at_nodes_of_facets(smooth_normals(side, coordinates))[facet]
+        return cls(NodalNormals(side, coordinates), at.local, at.shape, at_nodes)
+
+    def bend(self, gradient: Array) -> Array:
+        """Return the derivatives (n, dim - 1, dim) along facets, from those of shape functions (n, k, dim - 1)."""
+        bend = np.einsum("nki,nkd->nid", gradient, self._at_nodes) / self._length[:, None]
+        return np.asarray(bend - np.einsum("nid,nd->ni", bend, self.normal)[:, :, None] * self.normal[:, None])
+
+    def along(self, du: Array) -> Array:
+        """See `NodalNormals.along`."""
+        return across(self.normal, self._local @ self._nodal.along(du)) / self._length
 
 
 def across(normal: Array, vector: Array) -> Array:
@@ -117,17 +189,18 @@ class _SurfacePoints:
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
-        self._motion = shapes_at(shape, nodes, n_points)  # motion of points relative to the facing points
+        self.motion = shapes_at(shape, nodes, n_points)  # motion of points relative to the facing points
         self._slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
-        self._spreading = [csr_array(matrix.T) for matrix in (self._motion, *self._slopes)]
-        self.axes = np.stack([slope @ coordinates for slope in self._slopes], axis=1)
-        self.apart = self._motion @ coordinates
+        self._spreading = [csr_array(matrix.T) for matrix in (self.motion, *self._slopes)]
+        self.axes = self.slopes(coordinates)
+        self.apart = self.motion @ coordinates
         self.normal = pairing.normal[rows]
-        self._nodal: NodalNormals | None = None
+        self.averaged: InterpolatedNormals | None = None
         if normals == "facet":
             self._bend = self._facet_normals(primary, coordinates, facet, pairing.xi[rows], at)
         elif isinstance(normals, str):
-            self._bend = self._averaged(primary, coordinates, facet, at)
+            self.averaged = InterpolatedNormals.smooth(primary, coordinates, facet, at)
+            self.normal, self._bend = self.averaged.normal, self.averaged.bend(at.gradient)
         else:
             self._bend = np.zeros_like(self.axes)
         self._varies = isinstance(normals, str)
@@ -146,28 +219,22 @@ class _SurfacePoints:
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._up, curvature)
 
-    def _averaged(self, primary: Surface, coordinates: Array, facet: Indices, at: Places) -> Array:
-        """Prepare the variation of interpolated normals; return their derivatives (n, dim - 1, dim) along the facet."""
-        at_nodes = at_nodes_of_facets(smooth_normals(primary, coordinates))[facet]
-        self._length = np.linalg.norm(np.einsum("nk,nkd->nd", at.shape, at_nodes), axis=1, keepdims=True)
-        self._nodal = NodalNormals(primary, coordinates)
-        self._local = shapes_at(at.shape, at.local, len(primary.points))
-        self.normal = np.einsum("nk,nkd->nd", at.shape, at_nodes) / self._length
-        bend = np.einsum("nki,nkd->nid", at.gradient, at_nodes) / self._length[:, None]
-        return np.asarray(bend - np.einsum("nid,nd->ni", bend, self.normal)[:, :, None] * self.normal[:, None])
+    def slopes(self, values: Array) -> Array:
+        """Return the derivatives (n, dim - 1, dim) along facets of nodal values (n_points, dim) at the facing points."""
+        return np.stack([slope @ values for slope in self._slopes], axis=1)
 
     def _turned_in_place(self, du: Array) -> Array:
         """Return the variation of normals (n, dim) at fixed reference coordinates of the projections."""
         if not self._varies:
             return np.zeros_like(self.normal)
-        if self._nodal is not None:
-            return across(self.normal, self._local @ self._nodal.along(du)) / self._length
-        leans = np.stack([np.einsum("nd,nd->n", slope @ du, self.normal) for slope in self._slopes], axis=1)
+        if self.averaged is not None:
+            return self.averaged.along(du)
+        leans = np.einsum("nid,nd->ni", self.slopes(du), self.normal)
         return -np.einsum("nid,ni->nd", self._up, leans)
 
     def along(self, du: Array) -> Variation:
         """Return how projections and normals vary with displacements (n_points, dim) [length]."""
-        still, moved = self._turned_in_place(du), self._motion @ du
+        still, moved = self._turned_in_place(du), self.motion @ du
         xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * still)
         foot = np.einsum("nid,ni->nd", self.axes, xi)
         return Variation(xi, foot, still + np.einsum("nid,ni->nd", self._bend, xi))
@@ -207,7 +274,8 @@ class _ObstaclePoints:
     """
 
     def __init__(self, secondary: csr_array, obstacle: RigidSide, coordinates: Array, pose: Pose) -> None:
-        self.secondary, x = secondary, secondary @ coordinates
+        self.averaged = None
+        self.motion, x = secondary, secondary @ coordinates
         gap, self.normal, paired, _ = obstacle.facing(x, pose)
         self._gap = np.where(paired, gap, 0.0)[:, None]
         self.apart = self._gap * self.normal
@@ -218,34 +286,190 @@ class _ObstaclePoints:
 
     def along(self, du: Array) -> Variation:
         """See `_SurfacePoints.along`; there are no reference coordinates."""
-        moved = self.secondary @ du
+        moved = self.motion @ du
         normal = np.einsum("nde,ne->nd", self._gradient, moved)
         return Variation(np.zeros((len(normal), 0)), across(self.normal, moved) - self._gap * normal, normal)
 
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:
         """See `_SurfacePoints.spread`."""
-        return np.asarray(self.secondary.T @ varied)
+        return np.asarray(self.motion.T @ varied)
+
+    def slopes(self, values: Array) -> Array:
+        """See `_SurfacePoints.slopes`."""
+        return np.zeros((len(self.normal), 0, values.shape[1]))
 
 
 Points = _SurfacePoints | _ObstaclePoints
 
 
 @dataclass(frozen=True, eq=False)
+class Closing:
+    """The part q m of a relative motion that closes a gap, ``q = a . o / a . m``, see `Slips`.
+
+    Attributes
+    ----------
+    mean, size : ndarray (n, dim), ndarray (n, 1)
+        Mean direction m of both sides' normals, and the length of their difference [-].
+    secondary : NodalNormals or InterpolatedNormals
+        Normals of the secondary side.
+    opening : ndarray (n, dim)
+        Distance o of both sides at the beginning of the step [length].
+    length : ndarray (n,)
+        q [length]; zero where nothing closes.
+    along_mean : bool
+        Whether the direction a is m, and not the normal of the constraint.
+    """
+
+    mean: Array
+    size: Array
+    secondary: NodalNormals | InterpolatedNormals
+    opening: Array
+    length: Array
+    along_mean: bool
+
+    @classmethod
+    def of(
+        cls, primary: Array, secondary: NodalNormals | InterpolatedNormals, opening: Array, length: Array | None = None
+    ) -> Closing:
+        """Return the closing motion between sides with normals `primary` (n, dim) and `secondary`, along m by default."""
+        mean = primary - secondary.normal
+        size = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
+        mean /= size
+        along = np.einsum("nd,nd->n", mean, opening)
+        return cls(mean, size, secondary, opening, along if length is None else length, length is None)
+
+    @property
+    def vector(self) -> Array:
+        """q m (n, dim) [length]."""
+        return self.length[:, None] * self.mean
+
+    def along(self, du: Array, normal: tuple[Array, Array], primary: Array, opening: Array) -> Array:
+        """Return the variation (n, dim) [length] from those of normals of the constraints, of `primary` and of `opening`."""
+        mean = self.mean
+        turned = across(mean, primary - self.secondary.along(du)) / self.size
+        a, varied = (mean, turned) if self.along_mean else normal
+        lean = np.einsum("nd,nd->n", a, mean)
+        change = np.einsum("nd,nd->n", varied, self.opening) + np.einsum("nd,nd->n", a, opening)
+        change -= self.length * (np.einsum("nd,nd->n", varied, mean) + np.einsum("nd,nd->n", a, turned))
+        q = np.divide(change, lean, out=np.zeros_like(lean), where=(self.length != 0.0) & (lean != 0.0))
+        return q[:, None] * mean + self.length[:, None] * turned
+
+
+@dataclass(frozen=True, eq=False)
+class Slips:
+    r"""Slips in a step at n points or weighted gaps along k tangents t, and the tangential forces.
+
+    They are the components of
+
+    .. math:: s = r + q m, \qquad q = \frac{a \cdot o}{a \cdot m}, \qquad
+              \delta (t \cdot s) = t \cdot \delta s - (t \cdot \delta n) (n \cdot s)
+
+    with the relative motion r of the step and, where slip is symmetric, minus its part that closes the distance o of the
+    beginning. Both vary as points face other primary points: :math:`\delta r = - \sum_k N_{k, \alpha} \Delta u_k
+    \delta \xi^\alpha`, and o likewise with the positions at the beginning instead of the increments of displacements.
+
+    Attributes
+    ----------
+    tangents : ndarray (k, n, dim)
+    forces : ndarray (n, k)
+        [force].
+    total : ndarray (n, dim)
+        s [length].
+    motion, start : ndarray (n_points, dim)
+        Increments of displacements in the step and positions at its beginning, of all nodes [length].
+    closing : Closing, optional
+    turning : ndarray (dim, dim), optional
+        By how much the motion that points share with a turning obstacle varies with their displacements.
+    """
+
+    tangents: Array
+    forces: Array
+    total: Array
+    motion: Array
+    start: Array
+    closing: Closing | None = None
+    turning: Array | None = None
+
+    @property
+    def force(self) -> Array:
+        """Tangential forces as vectors (n, dim) [force]."""
+        return np.einsum("nk,knd->nd", self.forces, self.tangents)
+
+    def along(
+        self, du: Array, varied: Variation, points: Points, weights: csr_array | None, normal: tuple[Array, Array],
+        primary: Array | None = None,
+    ) -> Array:  # fmt: skip
+        """Return how slips (k, n) vary with displacements [length].
+
+        Parameters
+        ----------
+        du : ndarray (n_points, dim)
+            [length].
+        varied : Variation
+            That of `points`.
+        points : Points
+        weights : csr_array (n, n_points), optional
+            Of the points in the slips; each has its own by default.
+        normal : (ndarray (n, dim), ndarray (n, dim))
+            Normals of the constraints, and how they vary.
+        primary : ndarray (n, dim), optional
+            How the `primary` normals of `closing` vary; as `normal` by default.
+        """
+
+        def faced(values: Array) -> Array:
+            moved = -np.einsum("nid,ni->nd", points.slopes(values), varied.xi)
+            return np.asarray(moved if weights is None else weights @ moved)
+
+        change = faced(self.motion)
+        if self.turning is not None:
+            shared = points.motion @ du @ self.turning
+            change -= shared if weights is None else weights @ shared
+        if self.closing is not None:
+            change += self.closing.along(du, normal, normal[1] if primary is None else primary, faced(self.start))
+        leaning = np.einsum("nd,nd->n", normal[0], self.total)
+        return np.einsum("knd,nd->kn", self.tangents, change) - np.einsum(
+            "knd,nd,n->kn", self.tangents, normal[1], leaning
+        )
+
+
+def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: Array) -> Array:
+    """Return how forces (n, dim) vary whose normals do by `varied` (n, dim)."""
+    change = multiplier[:, None] * varied
+    if tangential is not None:
+        change -= np.einsum("nd,nd->n", tangential, varied)[:, None] * normal
+    return change
+
+
+@dataclass(frozen=True, eq=False)
 class PointForces:
-    """`Linearised` for forces (n,) at paired points, whose constraints are the `rows` (n,) of m."""
+    """`Linearised` for forces (n,) at paired points, whose constraints are the `rows` (n,) of m.
+
+    `smooth` are the primary normals of the slips, where they are not those of the points.
+    """
 
     points: Points
     rows: Indices
     m: int
     multiplier: Array
+    slips: Slips | None = None
+    smooth: tuple[InterpolatedNormals, Array] | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
         """See `Linearised`."""
-        points, normal = self.points, self.points.normal
-        varied, gap = points.along(du), np.zeros(self.m)
-        gap[self.rows] = np.einsum("nd,nd->n", points.apart, varied.normal) - np.einsum("nd,nd->n", normal, varied.foot)
-        force = self.multiplier[:, None]
-        return points.spread(force * normal, force * varied.normal, varied.xi), gap
+        points, normal, slips = self.points, self.points.normal, self.slips
+        varied = points.along(du)
+        gap = np.einsum("nd,nd->n", points.apart, varied.normal) - np.einsum("nd,nd->n", normal, varied.foot)
+        gaps = np.zeros((1 if slips is None else 1 + len(slips.tangents), self.m))
+        gaps[0, self.rows] = gap
+        if slips is not None:
+            primary = varied.normal
+            if self.smooth is not None:
+                primary = self.smooth[0].along(du) + np.einsum("nid,ni->nd", self.smooth[1], varied.xi)
+            gaps[1:, self.rows] = slips.along(du, varied, points, None, (normal, varied.normal), primary)
+        tangential = None if slips is None else slips.force
+        force = self.multiplier[:, None] * normal
+        force = force if tangential is None else force + tangential
+        return points.spread(force, _turned(self.multiplier, tangential, normal, varied.normal), varied.xi), gaps
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,6 +478,8 @@ class WeightedForces:
 
     Attributes
     ----------
+    side : Surface
+        The secondary side.
     points : Points
     functions, tests : csr_array (m, n)
         Weights of the points in the gaps, divided by the weight of each constraint, and in the mean normals.
@@ -262,33 +488,41 @@ class WeightedForces:
     multiplier : ndarray (m,)
     nodal : NodalNormals or Points, optional
         Source of the normals of the constraints, where they are no means over the points.
+    slips : Slips, optional
     """
 
+    side: Surface
     points: Points
     functions: csr_array
     tests: csr_array
     normal: Array
     multiplier: Array
     nodal: NodalNormals | Points | None = None
+    slips: Slips | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
         """See `Linearised`."""
         varied = self.points.along(du)
         normal = self._normals(du, varied.normal)
-        gap = np.einsum("md,md->m", self.functions @ self.points.apart, normal)
-        gap -= np.einsum("md,md->m", self.normal, self.functions @ varied.foot)
-        force = self.functions.T @ (self.multiplier[:, None] * normal)
-        return self.points.spread(self._force, force, varied.xi), gap
+        gaps = np.einsum("md,md->m", self.functions @ self.points.apart, normal)[None]
+        gaps -= np.einsum("md,md->m", self.normal, self.functions @ varied.foot)
+        if self.slips is not None:
+            slips = self.slips.along(du, varied, self.points, self.functions, (self.normal, normal))
+            gaps = np.vstack([gaps, slips])
+        tangential = None if self.slips is None else self.slips.force
+        force = self.functions.T @ _turned(self.multiplier, tangential, self.normal, normal)
+        return self.points.spread(self._force, force, varied.xi), gaps
 
     @cached_property
     def _force(self) -> Array:
         """Forces at the points (n, dim) [force]."""
-        return np.asarray(self.functions.T @ (self.multiplier[:, None] * self.normal))
+        force = self.multiplier[:, None] * self.normal
+        return np.asarray(self.functions.T @ (force if self.slips is None else force + self.slips.force))
 
     @cached_property
     def _length(self) -> Array:
         """Lengths (m, 1) of the means that normals are parallel to."""
-        length = np.linalg.norm(self.tests @ self.points.normal, axis=1, keepdims=True)
+        length = np.linalg.norm(self._mean(self.points.normal), axis=1, keepdims=True)
         return np.where(length > 0.0, length, 1.0)
 
     def _normals(self, du: Array, at_points: Array) -> Array:
@@ -297,7 +531,13 @@ class WeightedForces:
             return -self.nodal.along(du)
         if self.nodal is not None:
             return self.nodal.along(du).normal
-        return across(self.normal, self.tests @ at_points) / self._length
+        return across(self.normal, self._mean(at_points)) / self._length
+
+    def _mean(self, vectors: Array) -> Array:
+        """Return integrals (m, dim) of vectors at the points (n, dim) with the tests of nodes."""
+        total = np.asarray(self.tests @ vectors)
+        self.side.add_across_ends(total)
+        return total
 
 
 def faced(

@@ -53,3 +53,18 @@ class Law:
         _, t, reach, radius = self.trial(y, gaps)
         along = np.maximum(reach[sliding], TINY)
         return t[:, sliding] / along, np.minimum(radius[sliding] / along, 1.0)
+
+    def linearised(self, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
+        """Return E and D (1 + k, 1 + k, q) of the equations ``E y + D gaps = 0`` of closed constraints `rows` (q,).
+
+        Gaps and slips of those that stick, of m, vanish; others have ``t = mu n d``, where d, the direction of t - s, varies.
+        """
+        parts, slipping = np.arange(len(y)), np.flatnonzero(~sticking[rows])
+        E, D = np.zeros((2, len(y), len(y), len(rows)))
+        D[parts, parts] = 1.0
+        d, turning = self.slide(y, gaps, rows[slipping])
+        turn = turning * (np.eye(len(d))[:, :, None] - d[:, None] * d)
+        D[1:, 1:, slipping] = turn
+        E[1:, 1:, slipping] = np.eye(len(d))[:, :, None] - turn
+        E[1:, 0, slipping] = -self.mu[rows[slipping]] * d
+        return E, D

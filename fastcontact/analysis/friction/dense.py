@@ -14,14 +14,16 @@ With large mu there may be several solutions; one of them is found.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
+from scipy.linalg import lu_solve
 
 from fastcontact.analysis.friction import lemke
 from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.linear.delassus import lu_factors
 
 # Accepted residual over the largest force where round-off prevents a smaller one.
 ACCEPTABLE = 1e-9
@@ -54,9 +56,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     parts, m = free.shape
     if not m:
         return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
-    # Each constraint is scaled by its own compliance, so that c = 1 suits all.
-    compliance = np.diag(F)[:m]
-    unit = 1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max()))
+    unit = _units(F, m)
     length = float(np.abs(free * unit).max()) or 1.0
     everywhere = np.tile(unit, parts)
     F, best, iterations, yielded = everywhere[:, None] * F * everywhere, None, 0, 0.0
@@ -127,32 +127,48 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tu
 
 def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:
     """Return the forces of `cone_newton.Linearised.step`."""
-    k, m = len(problem.free) - 1, problem.free.shape[1]
-    new = np.zeros_like(y)
-    rows = np.flatnonzero(closed)
-    q = len(rows)
-    if not q:
-        return new
-    unknown = (np.arange(1 + k)[:, None] * m + rows).ravel()
-    A, right = problem.F[np.ix_(unknown, unknown)], -problem.free[:, rows].ravel()
-    slipping = np.flatnonzero(~sticking[rows])
-    if len(slipping):
-        sliding = rows[slipping]
-        d, turning = problem.law.slide(y, gaps, sliding)
-        slips = [(1 + b) * q + slipping for b in range(k)]
-        compliance = [A[slips[b]] for b in range(k)]
-        free = [-right[slips[b]] for b in range(k)]
-        for a in range(k):
-            A[slips[a]], right[slips[a]] = 0.0, 0.0
-            A[slips[a], slips[a]] = 1.0
-            A[slips[a], slipping] -= problem.mu[sliding] * d[a]
-            for b in range(k) if k == 2 else ():
-                turn = turning * ((a == b) - d[a] * d[b])
-                A[slips[a], slips[b]] -= turn
-                A[slips[a]] += turn[:, None] * compliance[b]
-                right[slips[a]] -= turn * free[b]
-    new[:, rows] = _solved(A, right).reshape(1 + k, q)
+    new, rows = np.zeros_like(y), np.flatnonzero(closed)
+    if len(rows):
+        A, D = _equations(problem.law, problem.F, y, gaps, rows, sticking)
+        right = -np.einsum("abq,bq->aq", D, problem.free[:, rows])
+        new[:, rows] = _solved(A, right.ravel()).reshape(right.shape)
     return new
+
+
+def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
+    """Return A and D of the equations ``A y + D free = 0`` of closed constraints `rows` (q,), see `Law.linearised`."""
+    parts, among = np.arange(len(y)), np.arange(len(rows))
+    E, D = law.linearised(y, gaps, rows, sticking)
+    unknown = (parts[:, None] * y.shape[1] + rows).ravel()
+    A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), -1))
+    for b in parts:
+        A[:, among, b * len(rows) + among] += E[:, b]
+    return A.reshape(unknown.size, -1), D
+
+
+def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
+    """Return a function that returns how `forces` vary with gaps and slips, both (1 + k, m); F and mu as in `solve`."""
+    rows, unit = np.flatnonzero(forces.closed), _units(F, len(mu))
+    everywhere = np.tile(unit, len(forces.y))
+    A, D = _equations(
+        Law(mu), everywhere[:, None] * F * everywhere, forces.y / unit, forces.gaps * unit, rows, forces.sticking
+    )
+    factors = lu_factors(A) if len(rows) else None
+
+    def varied(gaps: Array) -> Array:
+        change = np.zeros_like(gaps)
+        if factors is not None:
+            right = -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
+            change[:, rows] = lu_solve(factors, right.ravel()).reshape(right.shape)
+        return change * unit
+
+    return varied
+
+
+def _units(F: Array, m: int) -> Array:
+    """Return the scale (m,) of forces by which each constraint has a compliance of one, so that c = 1 suits all."""
+    compliance = np.diag(F)[:m]
+    return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max())))
 
 
 def _solved(A: Array, right: Array) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.linalg import lstsq
@@ -19,7 +20,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.path import along
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Slid
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -180,10 +181,33 @@ def _among(
     full[:, rows], gaps[:, rows] = y, relative
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
+
+    # Equations have no friction, and slips that supports hold do not vary.
+    mu = np.where(equations, 0.0, constraints.coefficients[rows])
+    at_end = replace(result, sticking=result.sticking & ~equations)
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
         constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
+        response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, mu, at_end)) if path is None else None,
     )  # fmt: skip
+
+
+def _response(
+    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held: Mask, forces: tuple[Array, Array, dense.Forces]
+) -> Response:  # fmt: skip
+    """Return the response of a solution, given its rows, numbers and rotation, and what `dense.response` needs.
+
+    Slips `held` (k, q) do not vary.
+    """
+    (R, rows, Q), varied = among, dense.response(*forces)
+
+    def forces_of(values: Array) -> Array:
+        values = (values if Q is None else Q @ values).reshape(-1, len(rows))
+        values[1:][held] = 0.0
+        change = varied(values).ravel()
+        return change if Q is None else np.asarray(Q.T @ change)
+
+    return response(loaded, R, rows, forces_of)
 
 
 def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints) -> Slid:

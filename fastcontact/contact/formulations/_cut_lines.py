@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.contact.formulations._overlap import Coupling, Overlap
+from fastcontact.contact.formulations._overlap import Coupling, Overlap, OverlapPoints
 from fastcontact.contact.pairing import Candidates, pair
 from fastcontact.contact.projection import CORNER, facet_normals, nodal_normals
 from fastcontact.contact.search.closest import closest
@@ -181,7 +181,7 @@ def line_overlap(
         The smooth surfaces that facets approximate, if they are taken into account.
     """
     first = np.cumsum([0] + [len(block.facets) for block in primary.blocks])
-    masses, couplings, closer, number_of_first = [], [], [], 0
+    masses, couplings, closer, inside, number_of_first = [], [], [], [], 0
     axes = None if smoothing is None else [frames(side, reference, deformed) for side in (secondary, primary)]
     for block in secondary.blocks:
         n, k = block.facets.shape
@@ -195,6 +195,7 @@ def line_overlap(
         mass = np.zeros((n, k, k))
         np.add.at(mass, points.facet, area[:, None, None] * points.shape[:, :, None] * points.shape[:, None, :])
         masses.append(mass)
+        inside.append(OverlapPoints(points.facet, points.shape, area))
         heights = np.zeros((n, k, 2))
         if smoothing is not None and axes is not None:
             on_secondary = number_of_first + points.facet, points.xi[:, None]
@@ -211,4 +212,4 @@ def line_overlap(
             integrals = np.zeros((len(pairs), *products.shape[1:]))
             np.add.at(integrals, pair_of_end.ravel(), products)
             couplings.append(Coupling(block, other, pairs, integrals))
-    return Overlap(masses, couplings, closer)
+    return Overlap(masses, couplings, closer, inside)

@@ -17,7 +17,15 @@ from fastcontact.contact.cohesive_layer import bonded
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Compliance, Constraints
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions, alike, spanned, without
-from fastcontact.contact.linearised_geometry import Geometry, PointForces, faced
+from fastcontact.contact.linearised_geometry import (
+    Closing,
+    Geometry,
+    InterpolatedNormals,
+    NodalNormals,
+    PointForces,
+    Slips,
+    faced,
+)
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
@@ -286,12 +294,14 @@ class Formulation(ABC):
         """Return the constraints of paired candidates, with tangential rows where there is friction."""
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
-        positions, geometry = candidates.positions(self.points), self._geometry(candidates, pairing, at)
+        positions = candidates.positions(self.points)
         if not self.slides:
+            geometry = self._geometry(candidates, pairing, at)
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
         directions, rubbing = self.options.rubbing(tangents(pairing.normal, self._held_at(candidates)), candidates)
         along, slip0 = self.slips(candidates, pairing, rubbing, at)
         friction = self.options.coefficients(self.friction, candidates)
+        geometry = self._geometry(candidates, pairing, at, directions)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
 
     def _held_at(self, candidates: Candidates) -> Array | None:
@@ -302,18 +312,51 @@ class Formulation(ABC):
             np.einsum("nk,nkde->nde", candidates.shape, self.held.at(candidates.nodes)), 1.0 - LENGTH_ROUND_OFF
         )
 
-    def _geometry(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Geometry | None:
-        """Return how the gaps of paired candidates vary, where their normals are those of the primary side."""
+    def _geometry(
+        self, candidates: Candidates, pairing: Pairing, at: Configuration, directions: Sequence[Array] = ()
+    ) -> Geometry | None:
+        """Return how gaps of paired candidates, and slips along tangents (n, dim), vary; None for secondary normals."""
         if self.normals == "secondary":
             return None
         coordinates = self.points + at.displacement
 
-        def linearised(multiplier: Array) -> PointForces:
+        def linearised(multiplier: Array, tangential: Array) -> PointForces:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
-            return PointForces(points, rows, len(multiplier), multiplier[rows])
+            forces = PointForces(points, rows, len(multiplier), multiplier[rows])
+            if not directions:
+                return forces
+            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], at)
+            if not isinstance(self.primary, Surface) or self.slip != "symmetric":
+                return replace(forces, slips=slips)
+            averaged, smooth = points.averaged, None
+            if averaged is None:
+                place = pairing.places(self.primary, rows)
+                averaged = InterpolatedNormals.smooth(self.primary, coordinates, pairing.facet[rows], place)
+                smooth = averaged, averaged.bend(place.gradient)
+            local = np.zeros(len(coordinates), np.intp)
+            local[self.secondary.points] = np.arange(len(self.secondary.points))
+            nodal = NodalNormals(self.secondary, coordinates)
+            opposite = InterpolatedNormals(nodal, local[candidates.nodes[rows]], candidates.shape[rows])
+            closing = Closing.of(averaged.normal, opposite, points.motion @ slips.start)
+            slips = replace(slips, total=slips.total + closing.vector, closing=closing)
+            return replace(forces, slips=slips, smooth=smooth)
 
         return linearised
+
+    def _sliding(self, mean: csr_array, directions: Array, tangential: Array, at: Configuration) -> Slips:
+        """Return the slips due to the relative motion `mean` (m, n_points) and an obstacle's, along tangents (k, m, dim)."""
+        moved, turning = at.displacement - at.start, None
+        total = mean @ moved
+        if isinstance(self.primary, RigidSide):
+            total -= at.obstacle - at.obstacle_start
+            now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
+            turned = self.primary.turning(now, before, at.pose, at.pose_start)
+            if turned is not None:
+                none = np.zeros((1, now.shape[1]))
+                ends = (self.primary.turning(x, none, at.pose, at.pose_start) for x in (np.eye(now.shape[1]), none))
+                total, turning = total - turned, np.subtract(*ends)
+        return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration

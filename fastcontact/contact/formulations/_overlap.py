@@ -7,6 +7,7 @@ suffice.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -36,6 +37,14 @@ class Coupling:
     integrals: Array
 
 
+class OverlapPoints(NamedTuple):
+    """Integration points of a block: facet (n,), shape functions (n, k), reference area (n,), zero beside the overlap."""
+
+    facet: Indices
+    shape: Array
+    area: Array
+
+
 @dataclass(frozen=True, eq=False)
 class Overlap:
     """The overlap of two surfaces.
@@ -50,11 +59,14 @@ class Overlap:
         For each block, integrals of its shape functions times the distance by which the smooth surfaces are closer to each
         other than the facets, see `surface_smoothing`, along the normals that the secondary side faces [volume]. Against an
         obstacle, which has no points in the mesh, times the positions faced on it.
+    points : list of OverlapPoints, optional
+        For each block, the integration points, where they are known.
     """
 
     mass: list[Array]
     couplings: list[Coupling]
     closer: list[Array]
+    points: list[OverlapPoints] | None = None
 
 
 def obstacle_overlap(

@@ -32,14 +32,15 @@ from fastcontact.contact.formulations._cut_faces import face_overlap
 from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._overlap import Overlap, obstacle_overlap
+from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import NodalNormals, Points, WeightedForces, faced
+from fastcontact.contact.linearised_geometry import Closing, NodalNormals, Points, Slips, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.projection_kernels import BEYOND
+from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
 from fastcontact.mesh import elements
@@ -129,10 +130,10 @@ class WeightedMortar(Formulation):
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
+        geometry = partial(self._linearised, at, overlap, covered, kept, normal, weight)
         constraints = Constraints(
-            B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight),
-            geometry=partial(self._linearised, at, overlap, covered, kept, normal, weight),
-        )  # fmt: skip
+            B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight), geometry=geometry
+        )
         if not self.slides:
             return constraints
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
@@ -142,7 +143,8 @@ class WeightedMortar(Formulation):
             projectors[where] += along[where, :, None] * along[where, None, :]
         directions, rubbing = self.options.rubbing(tangents(normal, projectors), candidates)
         slips, beside = self._slips(rubbing, held, overlap, covered, kept, mean, rows, weight)
-        closing = self._closing(constraints, normal, at)
+        length, between = self._closing(constraints, normal, at)
+        closing = length[:, None] * between
         slip0 = self._slip0(mean, closing, rubbing, at)
         for along, still, more in beside:
             remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
@@ -154,31 +156,35 @@ class WeightedMortar(Formulation):
             directions=directions,
             friction=self.options.coefficients(self.friction, candidates),
             slip0=slip0,
+            geometry=partial(geometry, slipping=(np.stack(rubbing), mean, length)),
         )
 
     def _linearised(
         self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
-        multiplier: Array,
+        multiplier: Array, tangential: Array, slipping: tuple[Array, csr_array, Array] | None = None,
     ) -> WeightedForces:  # fmt: skip
-        """Return the linearisation of contact forces and mean gaps; see `linearised_geometry`.
+        """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        Gauss points of whole facets suffice: the integrand is continuous across the cuts.
+        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,).
+
+        Where the points of the segments are not known, Gauss points of whole facets replace them: the integrand is
+        continuous across the cuts.
         """
         deformed, acts = self.points + at.displacement, multiplier != 0.0
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
-            facets, T = np.flatnonzero(acts[block.local].any(axis=1)), self._test[number]
-            xi, weights = fine_rule(block.element)
-            shape = elements.get(block.element).shape(xi)
+            points, T = (
+                self._whole_facets(block) if overlap.points is None else overlap.points[number],
+                self._test[number],
+            )
+            facet, shape, area = (values[acts[block.local].any(axis=1)[points.facet]] for values in points)
             psi, _ = self._functions(T, mass, kept[block.local], self._fraction(number, covered))
-            measure = facet_measure(block.facets[facets], block.element, self.points, xi, self.axisymmetric)
-            area = measure * weights
-            columns = first + np.arange(area.size).reshape(area.shape)
-            functions.add(block.local[facets], columns, np.einsum("fak,qk,fq->faq", psi[facets], shape, area))
-            tests.add(block.local[facets], columns, np.einsum("ak,qk,fq->faq", T, shape, area))
-            nodes.append(np.repeat(block.facets[facets], len(xi), axis=0))
-            shapes.append(np.tile(shape, (len(facets), 1)))
-            first += area.size
+            columns = first + np.arange(len(facet))[:, None]
+            functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
+            tests.add(block.local[facet], columns, (area[:, None] * (shape @ T.T))[:, :, None])
+            nodes.append(block.facets[facet])
+            shapes.append(shape)
+            first += len(facet)
         candidates = Candidates(filled_up(nodes), filled_up(shapes))
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
@@ -186,7 +192,27 @@ class WeightedMortar(Formulation):
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
-        return WeightedForces(points, weighted, mean, normal, multiplier, self._own_normals(pairing, deformed, at.pose))
+        own = self._own_normals(pairing, deformed, at.pose)
+        slips = None if slipping is None else self._varied_slips(*slipping, normal, tangential, at)
+        return WeightedForces(self.secondary, points, weighted, mean, normal, multiplier, own, slips)
+
+    def _varied_slips(
+        self, directions: Array, mean: csr_array, length: Array, normal: Array, tangential: Array, at: Configuration
+    ) -> Slips:
+        """Return the slips of `_linearised`."""
+        slips = self._sliding(mean, directions, tangential, at)
+        if isinstance(self.primary, RigidSide) or self.slip != "symmetric":
+            return slips
+        nodal = NodalNormals(self.secondary, self.points + at.displacement)
+        closing = Closing.of(normal, nodal, mean @ slips.start, length)
+        return replace(slips, total=slips.total + closing.vector, closing=closing)
+
+    def _whole_facets(self, block: FacetBlock) -> OverlapPoints:
+        """Return Gauss points of whole facets."""
+        xi, weights = fine_rule(block.element)
+        area = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
+        facet = np.repeat(np.arange(len(area)), len(xi))
+        return OverlapPoints(facet, np.tile(elements.get(block.element).shape(xi), (len(area), 1)), area.ravel())
 
     def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
         """Return the variation of the nodal normals, where they are no means over the primary side."""
@@ -235,8 +261,8 @@ class WeightedMortar(Formulation):
             np.add.at(tested, block.local, full)
         return tested, full_area
 
-    def _closing(self, part: Constraints, normal: Array, at: Configuration) -> Array:
-        """Return the gaps (m, dim) that the step closes, along the directions in which closing is no slip [length].
+    def _closing(self, part: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
+        """Return by which lengths (m,) the step closes gaps [length], and in which directions (m, dim) that is no slip.
 
         As in `Formulation`: along the mean of both sides' normals, or along the normal of an obstacle.
         """
@@ -246,7 +272,7 @@ class WeightedMortar(Formulation):
             between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), TINY)  # zero where nothing is faced
         lean = np.einsum("nd,nd->n", normal, between)
         gap = np.where(part.usable & (lean > 0.0), part.gaps(at.start), 0.0)
-        return (gap / np.where(lean > 0.0, lean, 1.0))[:, None] * between
+        return gap / np.where(lean > 0.0, lean, 1.0), between
 
     def _slips(
         self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], overlap: Overlap, covered: list[Array],
