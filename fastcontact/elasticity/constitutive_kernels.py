@@ -87,12 +87,12 @@ def _hooke(D, strain, stress):
 
 
 @kernel
-def _linear(D, F, P, A):
+def _linear(D, F, everywhere, P, A):
     """Hooke's law for small strains, by moduli D (6, 6); return the energy density."""
     strain = 0.5 * (F + F.T)
     for i in range(3):
         strain[i, i] -= 1.0
-    for row in range(9):
+    for row in range(9 if everywhere else 0):
         for column in range(9):
             A[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
     return _hooke(D, strain, P)
@@ -111,7 +111,7 @@ def _yield_stress(constants, p):
 
 
 @kernel
-def _plastic(constants, F, old, new, P, A):
+def _plastic(constants, F, everywhere, old, new, P, A):
     """Von Mises plasticity with the radial return (Simo and Hughes, 1998, boxes 3.1 and 3.2); return the elastic energy.
 
     Deviatoric part with tabulated isotropic hardening and linear kinematic hardening (Prager).
@@ -147,6 +147,8 @@ def _plastic(constants, F, old, new, P, A):
             P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (third if i == j else 0.0) - new[c])
             energy += P[i, j] * P[i, j] / (4.0 * mu)
     new[7] = work + kinematic / 3.0 * (after - before)
+    if not (everywhere or increment > 0.0):
+        return energy
     shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
     turn = 0.0
     if increment > 0.0:
@@ -316,18 +318,19 @@ def _ogden(constants, F, P, A):
 
 
 @kernel
-def respond(constants, D, F, J, G, old, new, P, A):
+def respond(constants, D, F, J, G, everywhere, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
     The volumetric part of the law, with the bulk modulus ``constants[2]``, is not included. D (6, 6) are the moduli of
-    Hooke's laws, J and G (3, 3) the determinant of F and its derivative.
+    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is not filled at small
+    strains without plastic flow.
     """
     law = int(constants[0])
     new[:] = old
     if law == LINEAR:
-        return _linear(D, F, P, A)
+        return _linear(D, F, everywhere, P, A)
     if law == PLASTIC:
-        return _plastic(constants, F, old, new, P, A)
+        return _plastic(constants, F, everywhere, old, new, P, A)
     if law == SAINT_VENANT:
         return _saint_venant(D, F, P, A)
     if law == INVARIANTS:

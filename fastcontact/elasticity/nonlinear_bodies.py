@@ -86,6 +86,7 @@ class NonlinearBodies:
         self._averaged = field.averaged & (kinematics != "plane_stress")
         self._constants = self._rows()
         self._pattern: Sparsity = sparsity(mesh)
+        self._blocks = len(self._pattern.indices), mesh.dim, mesh.dim
 
     def _rows(self) -> Array:
         """Return the constants (n_moduli, n_constants) of all laws."""
@@ -134,9 +135,25 @@ class NonlinearBodies:
         ConvergenceError
             If a cell is inverted, or plane stress does not converge at a point.
         """
+        data = np.zeros((0, *self._blocks[1:]))
+        if tangent:
+            data = np.zeros(self._blocks) if self.finite else self._elastic.copy()
+        return self._assembled(displacement, before, rise, geometric, data, not self.finite)
+
+    @cached_property
+    def _elastic(self) -> Array:
+        """Blocks (n_blocks, dim, dim) of the tangent without plastic flow at small strains [force / length]."""
+        data = np.zeros(self._blocks)
+        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, WHOLE, data, False)
+        return data
+
+    def _assembled(
+        self, displacement: Array, before: Mapping[str, Array], rise: Array | None, geometric: int, data: Array,
+        elastic: bool,
+    ) -> DeformedBodies:  # fmt: skip
+        """Return the result of `at`; `data` (n_blocks, dim, dim) receive the tangent, see `body_kernels.linearise`."""
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
-        data, force = np.zeros((len(pattern.indices) if tangent else 0, dim, dim)), np.zeros((mesh.n_points, dim))
-        history, stress, energy = {}, {}, np.zeros(2)
+        history, stress, force, energy = {}, {}, np.zeros((mesh.n_points, dim)), np.zeros(2)
         finite, degrees = (self.finite, geometric), np.zeros(0) if rise is None else rise
         flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", *finite
         for name, cells in mesh.solids.items():
@@ -154,8 +171,8 @@ class NonlinearBodies:
                 rows = slice(*row_ranges[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
-                    bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, data, force,  # noqa: B023
-                    new[rows], cauchy[rows], energies[rows],  # noqa: B023
+                    bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, elastic, data,  # noqa: B023
+                    force, new[rows], cauchy[rows], energies[rows],  # noqa: B023
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
@@ -167,7 +184,7 @@ class NonlinearBodies:
         size = mesh.n_points * dim
 
         def whole() -> bsr_array:
-            if not tangent:
+            if not len(data):
                 return self.at(displacement, before, rise=rise, geometric=geometric).K
             return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
