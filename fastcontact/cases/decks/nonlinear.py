@@ -8,7 +8,7 @@ from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Material
 from fastcontact.cases.decks.refusals import refusing
 from fastcontact.elasticity.materials import LinearElastic
-from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
+from fastcontact.elasticity.nonlinear_materials import STRAINS, ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 
 # Poisson's ratio of hyperelastic materials with zero compressibility constant, as in CalculiX.
 UNGIVEN = 0.475
@@ -81,14 +81,15 @@ def _law(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     """Return the strain measure of the model, and the reason why NLGEOM is not followed; empty if it is."""
-    finite = [law for law in laws if getattr(law, "strain", "small") == "finite"]
-    if finite:
+    if any("small" not in getattr(law, "strains", STRAINS) for law in laws):
         return "finite", ""
     if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
         return "small", ""
     reasons = {
-        "plasticity": any(isinstance(law, ElasticPlastic) for law in laws),
-        "a nearly incompressible elastic material": any(law.averaged for law in laws),
+        "kinematic hardening": any(isinstance(law, ElasticPlastic) and law.kinematic for law in laws),
+        "a nearly incompressible elastic material": any(
+            law.averaged and not isinstance(law, ElasticPlastic) for law in laws
+        ),
         "initial stresses": bool(content.stresses),
         "couplings, rigid bodies and multi-point constraints": bool(
             content.links or content.pins or content.multi_points
