@@ -92,12 +92,12 @@ def _dilatation(F, finite, G):
 
 
 @kernel
-def _add_volumetric(F, G, pressure, turning, bulk, P, A):
-    """Add the volumetric part: `pressure` dJ/dF to P, and `bulk` dJ/dF dJ/dF plus `turning` d2J/dF2 to A."""
+def _add_volumetric(F, G, pressure, turning, bulk, tangent, P, A):
+    """Add the volumetric part: `pressure` dJ/dF to P; if `tangent`, `bulk` dJ/dF dJ/dF plus `turning` d2J/dF2 to A."""
     along = G.reshape(9)
     for row in range(9):
         P[row // 3, row % 3] += pressure * along[row]
-        for column in range(9):
+        for column in range(9 if tangent else 0):
             A[row, column] += bulk * along[row] * along[column]
     if turning != 0.0:
         add_second_derivative(F, turning, A)
@@ -130,9 +130,9 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
     F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
     for _ in range(THROUGH):
         J = _dilatation(F, finite, G)
-        energy = respond(constants, D, F, J, G, old, new, P, A)
+        energy = respond(constants, D, F, J, G, True, old, new, P, A)
         pressure = bulk * (J - 1.0)
-        _add_volumetric(F, G, pressure, pressure if finite else 0.0, bulk, P, A)
+        _add_volumetric(F, G, pressure, pressure if finite else 0.0, bulk, True, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= ENOUGH * A[8, 8]:
@@ -146,10 +146,11 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 
 
 @kernel
-def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, F, old, new, P, A, G):
+def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, old, new, P, A, G):
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
-    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder; see `linearise` and `_through`.
+    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder; see `linearise`, `_through` and,
+    for `everywhere`, `respond`.
     """
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
@@ -157,23 +158,33 @@ def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geomet
             _leave_out_initial_stress(G, determinant(F), P, 0.0, A)
         return energy, settled
     J = _dilatation(F, finite, G)
-    energy = respond(constants, D, F, J, G, old, new, P, A) + 0.5 * bulk * (J - 1.0) ** 2
+    energy = respond(constants, D, F, J, G, everywhere, old, new, P, A) + 0.5 * bulk * (J - 1.0) ** 2
     pressure += bulk * (J - 1.0)
     turning = pressure if finite and geometric == 2 else 0.0
     if finite and geometric == 0:
         turning = min(pressure, 0.0)
         _leave_out_initial_stress(G, J, P, turning, A)
-    _add_volumetric(F, G, pressure, turning, bulk, P, A)
+    _add_volumetric(F, G, pressure, turning, bulk, everywhere or new[6] > old[6], P, A)
     return energy, True
+
+
+@kernel
+def _subtract_elastic(constants, D, bulk, plane_stress, A):
+    """Subtract the elastic tangent at small strains, without the projected dilatation, from A (9, 9)."""
+    none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
+    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, np.eye(3), none, new, P, of_elasticity, G)
+    A -= of_elasticity
 
 
 @kernel
 def _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected):
     """Fill the Cholesky factor `mass` (m, m) of the polynomials' mass matrix, and the dilatation in orthonormal ones.
 
-    `projected` (m, n_nodes * dim + 1) are its derivatives by displacements, first those of x, and the dilatation itself.
+    `projected` (m, n_nodes * dim + 1) are its derivatives by displacements, first those of x, and the dilatation itself, or
+    only the latter (m, 1).
     """
     n_q, dim, n_nodes = gradient.shape
+    last = projected.shape[1] - 1
     mass[:], projected[:] = 0.0, 0.0
     for q in range(n_q):
         J = _dilatation(F[q], finite, G)
@@ -181,7 +192,9 @@ def _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected)
             share = volume[q] * polynomials[q, k]
             for n in range(k + 1):
                 mass[k, n] += share * polynomials[q, n]
-            projected[k, dim * n_nodes] += share * (J - 1.0)
+            projected[k, last] += share * (J - 1.0)
+            if last == 0:
+                continue
             for i in range(dim):
                 for j in range(dim):
                     for a in range(n_nodes):
@@ -290,7 +303,7 @@ def _assemble(local, slots, inside, data):
 def linearise(
     points, cells, N, dN, weights, polynomials, axisymmetric, plane_stress, finite, geometric, displacement,
     constants, moduli, bulk, expansion, rise,
-    material, old, slots, owner, part, data, force, new, stress, energy,
+    material, old, slots, owner, part, elastic, data, force, new, stress, energy,
 ):  # fmt: skip
     """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in rows of nodes of a `part`.
 
@@ -300,7 +313,8 @@ def linearise(
     and the number of a cell, zero and -1 on success. A temperature `rise` (n_points,), possibly empty, causes strains of
     `expansion` (n_materials, 6) per degree. `geometric` 2 selects the full tangent; 1 leaves out the second derivative
     of J under pressure; 0 also leaves out the initial-stress stiffness and the second derivative of J under tension, so
-    that the tangent is positive semidefinite. If `data` is empty, no tangent is computed.
+    that the tangent is positive semidefinite. If `data` is empty, no tangent is computed; if `elastic`, it holds the
+    elastic tangent of small strains, and points with plastic flow add the difference.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
@@ -310,7 +324,11 @@ def linearise(
     F, G, thicker, pressure = np.empty((n_q, 3, 3)), np.empty((3, 3)), np.ones(n_q), np.empty(n_q)
     P, A, product, history = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(9)
     local, forces = np.empty((n_nodes, dim, dim, n_nodes)), np.empty((dim, n_nodes))
-    mass, projected, inside = np.empty((m, m)), np.empty((m, n_nodes * dim + 1)), np.empty(n_nodes, np.bool_)
+    mass, projected, inside = (
+        np.empty((m, m)),
+        np.empty((m, 1 if elastic else n_nodes * dim + 1)),
+        np.empty(n_nodes, np.bool_),
+    )
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):
             continue
@@ -326,25 +344,29 @@ def linearise(
             if finite and not determinant(F[q]) > 0.0:
                 return INVERTED, c
         local[:], forces[:], pressure[:] = 0.0, 0.0, 0.0
-        stored, dissipated, mean = 0.0, 0.0, bulk[material[c, 0], 0]
+        stored, dissipated, mean, stiffens = 0.0, 0.0, bulk[material[c, 0], 0], tangent and not elastic
         if mean > 0.0:
             _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected)
             stored += _pressures(mean, polynomials, mass, projected, pressure)
-            if tangent:
+            if tangent and not elastic:
                 _add_projected_tangent(mean, projected, local)
         for q in range(n_q):
             row = material[c, q]
             density, settled = _respond(
                 constants[row], moduli[row], bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric,
-                F[q], old[c, q], history, P, A, G,
+                not elastic, F[q], old[c, q], history, P, A, G,
             )  # fmt: skip
             if not settled:
                 return NO_PLANE_STRESS, c
             stored += volume[q] * density
             dissipated += volume[q] * history[7]
             _forces(gradient[q], hoop[q], volume[q], P, forces)
-            if tangent:
+            flows = history[6] > old[c, q, 6]
+            if tangent and elastic and flows:
+                _subtract_elastic(constants[row], moduli[row], bulk[row, 1], plane_stress, A)
+            if tangent and (flows or not elastic):
                 _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
+                stiffens = True
             if inside[0]:
                 new[c, q] = history
                 _cauchy(F[q], P, finite, stress[c, q])
@@ -354,6 +376,6 @@ def linearise(
             if inside[b]:
                 for i in range(dim):
                     force[cells[c, b], i] += forces[i, b]
-        if tangent:
+        if stiffens:
             _assemble(local, slots[c], inside, data)
     return 0, -1

@@ -13,11 +13,13 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 
-LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN = range(5)
+LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
 # Relative excess of the trial stress over the yield stress that counts as round-off.
 YIELDING = 1e-12
 # Relative difference of squared stretches below which the tangent treats them as equal.
 EQUAL = 1e-7
+# The same for second divided differences, for which a series is used below it.
+CLOSE = 1e-3
 
 
 @kernel
@@ -87,12 +89,12 @@ def _hooke(D, strain, stress):
 
 
 @kernel
-def _linear(D, F, P, A):
+def _linear(D, F, everywhere, P, A):
     """Hooke's law for small strains, by moduli D (6, 6); return the energy density."""
     strain = 0.5 * (F + F.T)
     for i in range(3):
         strain[i, i] -= 1.0
-    for row in range(9):
+    for row in range(9 if everywhere else 0):
         for column in range(9):
             A[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
     return _hooke(D, strain, P)
@@ -111,7 +113,7 @@ def _yield_stress(constants, p):
 
 
 @kernel
-def _plastic(constants, F, old, new, P, A):
+def _plastic(constants, F, everywhere, old, new, P, A):
     """Von Mises plasticity with the radial return (Simo and Hughes, 1998, boxes 3.1 and 3.2); return the elastic energy.
 
     Deviatoric part with tabulated isotropic hardening and linear kinematic hardening (Prager).
@@ -147,6 +149,8 @@ def _plastic(constants, F, old, new, P, A):
             P[i, j] = 2.0 * mu * (0.5 * (F[i, j] + F[j, i]) - (third if i == j else 0.0) - new[c])
             energy += P[i, j] * P[i, j] / (4.0 * mu)
     new[7] = work + kinematic / 3.0 * (after - before)
+    if not (everywhere or increment > 0.0):
+        return energy
     shear = 2.0 * mu * (1.0 - 2.0 * mu * flow)
     turn = 0.0
     if increment > 0.0:
@@ -184,6 +188,57 @@ def _pushed(F, S, C, P, A):
                 for n in range(3):
                     value += half[row, 3 * n + m] * F[k, n]
                 A[row, 3 * k + m] = value
+
+
+@kernel
+def _slope(x, y):
+    """Return the divided difference of ln(x) / 2 at x and y."""
+    difference = (x - y) / y
+    return 0.5 / x if difference == 0.0 else 0.5 * np.log1p(difference) / (x - y)
+
+
+@kernel
+def _bend(x, y, z):
+    """Return the second divided difference of ln(x) / 2 at x <= y <= z."""
+    if z - x > CLOSE * z:
+        return (_slope(y, z) - _slope(x, y)) / (z - x)
+    mean = (x + y + z) / 3.0
+    a, b, c = x / mean - 1.0, y / mean - 1.0, z / mean - 1.0
+    return ((a**3 + b**3 + c**3) / 15.0 - (a * a + b * b + c * c) / 8.0 - 0.5) * 0.5 / mean**2
+
+
+@kernel
+def _logarithmic(constants, F, old, new, P, A):
+    """Plasticity in the space of logarithmic strains (Miehe, Apel and Lambrecht, 2002); return the elastic energy.
+
+    `_plastic` relates the strain ln(F^T F) / 2 and its conjugate stress T. Derivatives of the strain in principal axes are
+    divided differences (Daleckii and Krein).
+    """
+    C, T, D, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9))
+    _right_cauchy_green(F, C)
+    squared, axes = np.linalg.eigh(C)
+    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, old, new, T, D)
+    slope = np.empty((3, 3))
+    for a in range(3):
+        for b in range(3):
+            slope[a, b] = 2.0 * _slope(squared[a], squared[b])
+            for i in range(3):
+                for j in range(3):
+                    turn[3 * i + j, 3 * a + b] = axes[i, a] * axes[j, b]
+    T, factor = axes.T @ T @ axes, slope.reshape(9)
+    moduli = turn.T @ D @ turn * factor
+    moduli *= factor.reshape(9, 1)
+    for a in range(3):
+        for b in range(3):
+            for c in range(3):
+                low, high = min(a, b, c), max(a, b, c)
+                value = T[a, c] * _bend(squared[low], squared[a + b + c - low - high], squared[high])
+                for row in (3 * a + b, 3 * b + a):
+                    for column in (3 * b + c, 3 * c + b):
+                        moduli[row, column] += value
+                        moduli[column, row] += value
+    _pushed(F, axes @ (slope * T) @ axes.T, turn @ moduli @ turn.T, P, A)
+    return energy
 
 
 @kernel
@@ -316,18 +371,21 @@ def _ogden(constants, F, P, A):
 
 
 @kernel
-def respond(constants, D, F, J, G, old, new, P, A):
+def respond(constants, D, F, J, G, everywhere, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
     The volumetric part of the law, with the bulk modulus ``constants[2]``, is not included. D (6, 6) are the moduli of
-    Hooke's laws, J and G (3, 3) the determinant of F and its derivative.
+    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is not filled at small
+    strains without plastic flow.
     """
     law = int(constants[0])
     new[:] = old
     if law == LINEAR:
-        return _linear(D, F, P, A)
+        return _linear(D, F, everywhere, P, A)
     if law == PLASTIC:
-        return _plastic(constants, F, old, new, P, A)
+        return _plastic(constants, F, everywhere, old, new, P, A)
+    if law == LOGARITHMIC:
+        return _logarithmic(constants, F, old, new, P, A)
     if law == SAINT_VENANT:
         return _saint_venant(D, F, P, A)
     if law == INVARIANTS:

@@ -12,7 +12,7 @@ from scipy.sparse import bsr_array
 from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import body_kernels, dilatation
-from fastcontact.elasticity.constitutive_kernels import LINEAR, SAINT_VENANT
+from fastcontact.elasticity.constitutive_kernels import LINEAR, LOGARITHMIC, PLASTIC, SAINT_VENANT
 from fastcontact.elasticity.dilatation import REMAINDER
 from fastcontact.elasticity.energy import gradients_at
 from fastcontact.elasticity.material_field import MaterialField, material_field
@@ -86,6 +86,7 @@ class NonlinearBodies:
         self._averaged = field.averaged & (kinematics != "plane_stress")
         self._constants = self._rows()
         self._pattern: Sparsity = sparsity(mesh)
+        self._blocks = len(self._pattern.indices), mesh.dim, mesh.dim
 
     def _rows(self) -> Array:
         """Return the constants (n_moduli, n_constants) of all laws."""
@@ -94,6 +95,8 @@ class NonlinearBodies:
         rows = np.zeros((len(constants_of_laws), max(4, *map(len, constants_of_laws))))
         for row, constants in zip(rows, constants_of_laws, strict=True):
             row[: len(constants)] = constants
+            if self.finite and constants[0] == PLASTIC:
+                row[0] = LOGARITHMIC
         return np.ascontiguousarray(rows[self._owner])
 
     @property
@@ -134,9 +137,25 @@ class NonlinearBodies:
         ConvergenceError
             If a cell is inverted, or plane stress does not converge at a point.
         """
+        data = np.zeros((0, *self._blocks[1:]))
+        if tangent:
+            data = np.zeros(self._blocks) if self.finite else self._elastic.copy()
+        return self._assembled(displacement, before, rise, geometric, data, not self.finite)
+
+    @cached_property
+    def _elastic(self) -> Array:
+        """Blocks (n_blocks, dim, dim) of the tangent without plastic flow at small strains [force / length]."""
+        data = np.zeros(self._blocks)
+        self._assembled(np.zeros_like(self.mesh.points), self.beginning, None, WHOLE, data, False)
+        return data
+
+    def _assembled(
+        self, displacement: Array, before: Mapping[str, Array], rise: Array | None, geometric: int, data: Array,
+        elastic: bool,
+    ) -> DeformedBodies:  # fmt: skip
+        """Return the result of `at`; `data` (n_blocks, dim, dim) receive the tangent, see `body_kernels.linearise`."""
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
-        data, force = np.zeros((len(pattern.indices) if tangent else 0, dim, dim)), np.zeros((mesh.n_points, dim))
-        history, stress, energy = {}, {}, np.zeros(2)
+        history, stress, force, energy = {}, {}, np.zeros((mesh.n_points, dim)), np.zeros(2)
         finite, degrees = (self.finite, geometric), np.zeros(0) if rise is None else rise
         flags = self.kinematics == "axisymmetric", self.kinematics == "plane_stress", *finite
         for name, cells in mesh.solids.items():
@@ -154,8 +173,8 @@ class NonlinearBodies:
                 rows = slice(*row_ranges[number])  # noqa: B023
                 status, cell = body_kernels.linearise(
                     mesh.points, cells[rows], N, dN, weights, polynomials, *flags, displacement, self._constants, moduli,  # noqa: B023
-                    bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, data, force,  # noqa: B023
-                    new[rows], cauchy[rows], energies[rows],  # noqa: B023
+                    bulk, self._expansion, degrees, numbers[rows], old[rows], slots[rows], owner, number, elastic, data,  # noqa: B023
+                    force, new[rows], cauchy[rows], energies[rows],  # noqa: B023
                 )  # fmt: skip
                 return status, int(cell) + rows.start
 
@@ -167,7 +186,7 @@ class NonlinearBodies:
         size = mesh.n_points * dim
 
         def whole() -> bsr_array:
-            if not tangent:
+            if not len(data):
                 return self.at(displacement, before, rise=rise, geometric=geometric).K
             return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
 
@@ -183,36 +202,44 @@ class NonlinearBodies:
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
         """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, except for the volume."""
-        fields = (
-            {name: self._stretches(name, bodies, displacement) for name in self._cells}
-            if self.finite
-            else {name: self._yielding(name, bodies) for name in self._cells}
-        )
+        fields = {name: self._fields(name, bodies, displacement) for name in self._cells}
         names = field_names(self._materials, "finite" if self.finite else "small")
         return {name: np.concatenate([field[i] for field in fields.values()]) for i, name in enumerate(names)}
 
-    def _yielding(self, name: str, bodies: DeformedBodies) -> tuple[Array, Array]:
-        """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells."""
+    def _fields(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
+        """Return the values (n_cells,) of `field_names` for the cells of an element."""
+        J, fields = np.ones(self._cells[name].shape), []
+        if self.finite:
+            logarithms, volume = self._logarithms(name, bodies, displacement)
+            J = np.exp(logarithms.sum(axis=2))
+            fields = [(volume * J).sum(axis=1) / volume.sum(axis=1), _farthest(logarithms.reshape(len(J), -1))]
+        if any(isinstance(law, ElasticPlastic) for law in self._materials):
+            fields += self._yielding(name, bodies, J)
+        return fields
+
+    def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
+        """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells.
+
+        The stress that yields is the Kirchhoff stress: J (n_cells, n_q) times the Cauchy stress.
+        """
         history, owner = bodies.history[name], self._owner[self._cells[name]]
         strain = history[..., PLASTIC_STRAIN]
         ratio = np.zeros(strain.shape)
         for index, law in enumerate(self._materials):
             if isinstance(law, ElasticPlastic):
                 at = owner == index
-                stress = bodies.stress[name][at]
+                stress = J[at][:, None] * bodies.stress[name][at]
                 relative = stress - 2.0 / 3.0 * law.kinematic * history[at][:, : stress.shape[1]]
                 ratio[at] = von_mises(relative) / law.yield_at(strain[at])
-        return strain.max(axis=1), ratio.max(axis=1)
+        return [strain.max(axis=1), ratio.max(axis=1)]
 
-    def _stretches(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array]:
-        """Return v / V of cells (n_cells,), and their largest principal logarithmic strain by magnitude."""
+    def _logarithms(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array]:
+        """Return the principal logarithmic strains (n_cells, n_q, 3) of cells, and volumes (n_cells, n_q)."""
         F, volume = self._deformation(name, displacement, slice(None))
         if self.kinematics == "plane_stress":
             F[..., 2, 2] += bodies.history[name][..., ACROSS]
         stretches = np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)  # squared; a third of the time of singular values
-        logarithms = 0.5 * np.log(stretches)
-        ratio = (volume * np.exp(logarithms.sum(axis=2))).sum(axis=1) / volume.sum(axis=1)
-        return ratio, _farthest(logarithms.reshape(len(F), -1))
+        return 0.5 * np.log(stretches), volume
 
     def _deformation(self, name: str, displacement: Array, cells: slice) -> tuple[Array, Array]:
         """Return F (n_cells, n_q, 3, 3) at quadrature points, without out-of-plane strain in plane stress, and volumes."""
@@ -237,9 +264,8 @@ def _farthest(values: Array) -> Array:
 
 def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:
     """Return the names of the cell fields in steps with these materials; none for linear bodies."""
-    if strain == "finite":
-        return "J", "logarithmic_strain"
-    return ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
+    plastic = ("plastic_strain", "yield_ratio") if any(isinstance(law, ElasticPlastic) for law in materials) else ()
+    return (*(("J", "logarithmic_strain") if strain == "finite" else ()), *plastic)
 
 
 def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialField) -> NonlinearBodies | None:
@@ -251,13 +277,10 @@ def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialFi
 
 def check_law(law: Material, strain: str) -> None:
     """Raise ModelError if a material does not support these strains."""
-    if isinstance(law, NonlinearElastic) and law.strain != strain:
-        wanted = (
-            f"Model(..., strain='{law.strain}')"
-            if law.strain == "finite"
-            else "strain='small', the default: finite-strain plasticity is not available"
-        )
-        raise ModelError(f"{type(law).__name__} is for {law.strain} strains: take {wanted}")
+    if isinstance(law, NonlinearElastic) and strain not in law.strains:
+        raise ModelError(f"{type(law).__name__} is for finite strains: take Model(..., strain='finite')")
+    if strain == "finite" and isinstance(law, ElasticPlastic) and law.kinematic:
+        raise ModelError("kinematic hardening is for small strains: leave kinematic out, or strain='finite'")
     if law.incompatible_modes and (strain == "finite" or isinstance(law, NonlinearElastic)):
         raise ModelError("incompatible modes are available for linear bodies only: leave incompatible_modes out")
     if strain == "finite" and not isinstance(law, NonlinearElastic) and law.averaged:

@@ -28,7 +28,7 @@ LARGEST_PLASTIC_STRAIN = 0.5
 class NonlinearElastic(LinearElastic):
     """Base of nonlinear laws; as a `LinearElastic` it represents their initial elasticity."""
 
-    strain: str  # kinematics of the law
+    strains: tuple[str, ...] = STRAINS  # kinematics of the law
 
     def _check_numbers(self) -> None:
         """Raise ModelError if E or nu is not a number: constants of these laws do not vary."""
@@ -44,7 +44,7 @@ class NonlinearElastic(LinearElastic):
     @property
     def averaged(self) -> bool:  # type: ignore[override]
         """Whether elements that support it project the dilatation, except in plane stress."""
-        nearly = self.strain == "small" or self.nu >= NEARLY_INCOMPRESSIBLE
+        nearly = "small" in self.strains or self.nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 
     @property
@@ -56,7 +56,11 @@ class NonlinearElastic(LinearElastic):
 @typed(ModelError)
 @dataclass(frozen=True)
 class ElasticPlastic(NonlinearElastic):
-    """Von Mises plasticity with associated flow, for small strains (Simo and Hughes, 1998, chapter 3).
+    """Von Mises plasticity with associated flow (Simo and Hughes, 1998, chapter 3).
+
+    With ``strain="finite"`` the same law relates the logarithmic strain and its conjugate stress (Miehe, Apel and Lambrecht,
+    Comput. Methods Appl. Mech. Engrg. 191, 2002): uniaxial stresses and strains are true ones, up to the elastic change of
+    volume, and the yield stress is one of the Kirchhoff stress.
 
     Parameters
     ----------
@@ -70,7 +74,7 @@ class ElasticPlastic(NonlinearElastic):
         `yield_stress`), may be omitted.
     kinematic : float
         Modulus of linear kinematic hardening: slope of the stress over the plastic strain in uniaxial tension (Prager,
-        1956) [pressure].
+        1956) [pressure]; small strains only.
     volumetric : str
         As of `LinearElastic`; ``"auto"`` always projects the dilatation, if the element allows it, since plastic flow
         preserves the volume.
@@ -93,8 +97,6 @@ class ElasticPlastic(NonlinearElastic):
     yield_stress: float = field(kw_only=True)
     hardening: Any = field(default=(), kw_only=True)
     kinematic: float = field(default=0.0, kw_only=True)
-
-    strain = "small"
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -147,7 +149,7 @@ class ElasticPlastic(NonlinearElastic):
 class Hyperelastic(NonlinearElastic):
     """Hyperelasticity of finite strains: an isochoric part and ``U(J) = K (J - 1)^2 / 2``."""
 
-    strain = "finite"
+    strains = ("finite",)
 
 
 @typed(ModelError)

@@ -13,6 +13,7 @@ from fastcontact.cases.decks.content import Content, Material
 from fastcontact.elasticity.anisotropic_materials import Anisotropic, Orthotropic
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import (
+    STRAINS,
     ElasticPlastic,
     MooneyRivlin,
     NeoHookean,
@@ -251,14 +252,15 @@ def conductivity_of(material: Material, block: Block) -> float | tuple[float, ..
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
     """Return the strain measure of the model, and the reason why NLGEOM is not followed; empty if it is."""
-    finite = [law for law in laws if getattr(law, "strain", "small") == "finite"]
-    if finite:
+    if any("small" not in getattr(law, "strains", STRAINS) for law in laws):
         return "finite", ""
     if content.heat == "alone" or not any(step.nonlinear for step in content.steps):
         return "small", ""
     reasons = {
-        "plasticity": any(isinstance(law, ElasticPlastic) for law in laws),
-        "a nearly incompressible elastic material": any(law.averaged for law in laws),
+        "kinematic hardening": any(isinstance(law, ElasticPlastic) and law.kinematic for law in laws),
+        "a nearly incompressible elastic material": any(
+            law.averaged and not isinstance(law, ElasticPlastic) for law in laws
+        ),
         "initial stresses": bool(content.stresses),
         "couplings, rigid bodies and multi-point constraints": bool(
             content.links or content.pins or content.multi_points

@@ -10,7 +10,7 @@ from scipy.sparse import bsr_array, csc_array, eye_array
 from scipy.sparse.linalg import spilu
 
 from fastcontact._jit.parallel import on_one_blas_thread
-from fastcontact.arrays import Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_kernels
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
@@ -52,8 +52,25 @@ def reordered(K: bsr_array, order: Indices) -> csc_array:
     return csc_array((rows.data, rows.indices, rows.indptr), shape=K.shape)  # symmetric: rows are columns
 
 
+class Kept(NamedTuple):
+    """Data of the last factorisation: entries of the matrix, offsets of the update matrices that are kept, by supernode.
+
+    `factors` are L, D and these update matrices; see `factorisation_kernels`.
+    """
+
+    entries: Array
+    offsets: NDArray[np.int64]
+    factors: tuple[Array, Array, Array]
+
+
+NO_FACTORS = np.empty(0), np.empty(0), np.empty(0)
+
+
 class SymbolicFactors:
     """Symbolic factorisation of symmetric matrices with a common pattern.
+
+    From the second matrix on, those parts of the last factors are reused whose entries of the matrix are the same, such as
+    the elastic region around a plastic zone: the result is that of a complete factorisation, to the bit.
 
     Parameters
     ----------
@@ -75,6 +92,9 @@ class SymbolicFactors:
         self._nodes = supernodes(self._first, self._tree, late[order[self._tree.order]])
         self._position = np.empty(n, np.intp)
         self._position[order[self._tree.order]] = np.arange(n)
+        above = self._tree.parent[self._nodes.first[1:] - 1].astype(np.int64)
+        self._above = np.where(above < 0, -1, np.searchsorted(self._nodes.first, above, side="right") - 1)
+        self._kept = Kept(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
 
     def serves(self, K: bsr_array, last: Indices) -> bool:
         """Return whether a matrix has the pattern."""
@@ -94,14 +114,29 @@ class SymbolicFactors:
         start = np.concatenate([[0], np.cumsum(np.repeat(nodes.first[1:] + below, width) - np.arange(n))])
         values, d = np.empty(start[-1]), np.empty(n)
         sizes = factorisation_kernels.room(tree.parent, nodes.first, nodes.begin)
+        source, target, updates = self._planned(A)
         bad = factorisation_kernels.factorise(
-            A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start, values, d
-        )
+            A.indptr, A.indices, A.data, tree.order, tree.place, tree.parent, *nodes, sizes, start,
+            source, self._kept.factors, target, updates, values, d,
+        )  # fmt: skip
         if bad >= 0:
             if abs(d[bad]) <= LENGTH_ROUND_OFF * A.diagonal()[tree.order[bad]]:
                 raise singular()
             raise ModelError("the stiffness matrix is not positive definite: check the material and the cells")
+        if self._reordered is not None:
+            self._kept = Kept(A.data, target, (values, d, updates) if (target >= 0).any() else NO_FACTORS)
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
+
+    def _planned(self, A: csc_array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
+        """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and room for the update matrices."""
+        nodes, kept, size = self._nodes, self._kept, 0
+        source, target = np.full(len(self._above), factorisation_kernels.ANEW), np.full(len(self._above), -1)
+        if len(kept.entries):
+            size = factorisation_kernels.plan(
+                A.indptr, A.data, kept.entries, self._tree.order, self._above, nodes.first, nodes.begin, kept.offsets,
+                source, target,
+            )  # fmt: skip
+        return source, target, np.empty(size)
 
     def _numbered(self, K: bsr_array) -> csc_array:
         """Return K in the order of elimination; the permutation of its numbers is cached from the second matrix on."""

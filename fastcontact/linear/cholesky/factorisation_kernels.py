@@ -3,7 +3,8 @@
 
 Every supernode assembles a dense frontal matrix from its own columns of the matrix and the update matrices of its children in
 the elimination tree. Its columns are eliminated there, and the update matrix is passed to the parent.
-Fronts are symmetric, and only their upper triangles count: row j of a front is column j of L.
+Fronts are symmetric, and only their upper triangles count: row j of a front is column j of L. Subtrees in which the matrix
+has not changed since the last factorisation keep their columns of L, and the update matrix that their root passes on.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ Offsets = NDArray[np.int64]
 PANEL, ROWS = 48, 96
 # Smallest number of multiplications for which a product is passed to BLAS.
 SMALL = 20_000
+# Supernodes that are factorised, and those below the root of a subtree that keeps its columns, in `plan`.
+ANEW, BELOW = -2, -1
 
 
 @interpretable_kernel
@@ -43,9 +46,53 @@ def room(parent: Numbers, first: Offsets, begin: Offsets) -> tuple[int, int]:
 
 
 @kernel
+def plan(
+    start: Numbers, values: Array, before: Array, order: Numbers, above: Offsets, first: Offsets, begin: Offsets,
+    kept: Offsets, source: Offsets, target: Offsets,
+) -> int:  # fmt: skip
+    """Plan the factorisation of a matrix after that of a matrix with the same pattern; return the size of updates to keep.
+
+    Parameters
+    ----------
+    start, order, first, begin
+        As of `factorise`.
+    values, before : ndarray
+        Entries of the matrix, and of the last one.
+    above : ndarray of int (n_supernodes,)
+        Parents of supernodes, or -1.
+    kept : ndarray of int (n_supernodes,)
+        Offsets of the update matrices that are kept of the last factorisation, or -1.
+    source : ndarray of int (n_supernodes,)
+        Filled with `ANEW`, `BELOW`, or for the root of a subtree that keeps its columns, the offset of its update matrix.
+    target : ndarray of int (n_supernodes,)
+        Filled with the offsets of the update matrices to keep, those of the largest subtrees without a change, or -1.
+    """
+    count, size = len(above), 0
+    changed = np.zeros(count, np.bool_)
+    for s in range(count):
+        for j in range(first[s], first[s + 1]):
+            for k in range(start[order[j]], start[order[j] + 1]):
+                changed[s] |= values[k] != before[k]
+        if changed[s] and above[s] >= 0:
+            changed[above[s]] = True
+    for s in range(count - 1, -1, -1):
+        root = above[s] < 0
+        source[s], target[s] = ANEW, -1
+        if not root and source[above[s]] != ANEW:
+            source[s] = BELOW
+        elif not changed[s]:
+            source[s] = kept[s] if kept[s] >= 0 else ANEW
+        if not changed[s] and (root or changed[above[s]]):
+            target[s] = size
+            size += (begin[s + 1] - begin[s]) ** 2
+    return size
+
+
+@kernel
 def factorise(
     start: Numbers, rows: Numbers, values: Array, order: Numbers, position: Numbers, parent: Numbers, first: Offsets,
-    begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets, L: Array, d: Array,
+    begin: Offsets, below: Numbers, sizes: tuple[int, int], begins: Offsets,
+    source: Offsets, last: tuple[Array, Array, Array], target: Offsets, updates: Array, L: Array, d: Array,
 ) -> int:  # fmt: skip
     """Fill L and `d` (n,); return the first column whose pivot, then in `d`, is not positive, or -1.
 
@@ -64,6 +111,12 @@ def factorise(
         See `room`.
     begins : ndarray of int (n + 1,)
         Offsets of the columns of L.
+    source, target : ndarray of int (n_supernodes,)
+        See `plan`.
+    last : (ndarray, ndarray, ndarray)
+        L, `d` and `updates` of the last factorisation.
+    updates : ndarray
+        Filled with the update matrices to keep.
     L : ndarray
         Filled column by column, the unit diagonal first.
     d : ndarray (n,)
@@ -80,21 +133,30 @@ def factorise(
     top = used = 0
     for s in range(count):
         low, high, rest = first[s], first[s + 1], below[begin[s] : begin[s + 1]]
-        size = high - low + len(rest)
-        F = front[: size * size].reshape(size, size)
-        _gather(start, rows, values, order, position, low, high, rest, local, F)
-        while top > 0 and low <= parent[first[left[top - 1] + 1] - 1] < high:
-            top -= 1
-            child = below[begin[left[top]] : begin[left[top] + 1]]
-            m = len(child)
-            used -= m * m
-            _add(waiting[used : used + m * m].reshape(m, m), child, local, F)
-        bad = _eliminated(F, high - low, one, other, product)
-        if bad >= 0:
-            d[low + bad] = F[bad, bad]
-            return low + bad
         m = len(rest)
-        _store(F, low, high - low, begins, L, d, waiting[used : used + m * m].reshape(m, m))
+        if source[s] == ANEW:
+            size = high - low + m
+            F = front[: size * size].reshape(size, size)
+            _gather(start, rows, values, order, position, low, high, rest, local, F)
+            while top > 0 and low <= parent[first[left[top - 1] + 1] - 1] < high:
+                top -= 1
+                child = below[begin[left[top]] : begin[left[top] + 1]]
+                n = len(child)
+                used -= n * n
+                _add(waiting[used : used + n * n].reshape(n, n), child, local, F)
+            bad = _eliminated(F, high - low, one, other, product)
+            if bad >= 0:
+                d[low + bad] = F[bad, bad]
+                return low + bad
+            _store(F, low, high - low, begins, L, d, waiting[used : used + m * m].reshape(m, m))
+        else:
+            L[begins[low] : begins[high]] = last[0][begins[low] : begins[high]]
+            d[low:high] = last[1][low:high]
+            if source[s] == BELOW:
+                continue
+            waiting[used : used + m * m] = last[2][source[s] : source[s] + m * m]
+        if target[s] >= 0:
+            updates[target[s] : target[s] + m * m] = waiting[used : used + m * m]
         if m:
             left[top] = s
             top += 1

@@ -14,6 +14,7 @@ PLASTIC = fc.ElasticPlastic(
     E=100.0, nu=0.3, yield_stress=0.3, hardening=[(0.0, 0.3), (0.01, 0.5), (0.1, 2.0)], kinematic=4.0
 )
 LAWS = {
+    "plastic, finite": (fc.ElasticPlastic(E=100.0, nu=0.3, yield_stress=0.3, hardening=PLASTIC.hardening), "finite"),
     "Hooke": (fc.LinearElastic(E=100.0, nu=0.3), "small"),
     "nearly incompressible": (fc.LinearElastic(E=100.0, nu=0.499), "small"),
     "plastic": (PLASTIC, "small"),
@@ -122,7 +123,7 @@ def test_threads_do_not_change_bits(monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda: fc.Yeoh(1.0, 0.0, 0.0, bulk=0.0), "the bulk modulus = 0.0 must be a positive number"),
         (lambda: fc.Ogden([1.0, 2.0], [2.0], bulk=10.0), "2 mu and 1 alpha"),
         (lambda: fc.Ogden(1.0, 0.0, bulk=10.0), "no alpha zero"),
-        (lambda: model_with(PLASTIC, "finite"), "ElasticPlastic is for small strains"),
+        (lambda: model_with(PLASTIC, "finite"), "kinematic hardening is for small strains"),
         (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: take NeoHookean"),
     ],
 )  # fmt: skip
