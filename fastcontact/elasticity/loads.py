@@ -126,7 +126,7 @@ class Pressure(Load):
     ramp: Table | None = None
 
     def cells(self, mesh: Mesh) -> dict[str, Numbers]:
-        """As for other loads, oriented so that their normals point outwards."""
+        """Return the facets (n, n_nodes) of int by element type, oriented so that their normals point outwards."""
         return {name: outward(mesh, self.group, name, block) for name, block in facets_of(mesh, self.group).items()}
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
@@ -174,7 +174,7 @@ class VolumeLoad(Load):
         return (EVERYWHERE,) if self.groups is None else self.groups
 
     def cells(self, mesh: Mesh) -> dict[str, Numbers]:
-        """As for other loads."""
+        """Return the solid cells (n, n_nodes) of int by element type."""
         return {name: mesh.cells[name][rows] for name, rows in solid_rows(mesh, self.groups).items()}
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
@@ -394,7 +394,10 @@ def _turned(measure: Array, x: Array, kinematics: str) -> Array:
 
 
 def measured_points(mesh: Mesh, element: str, cells: Numbers, kinematics: str) -> tuple[Array, Array, Array]:
-    """Return `cell_points` of solid cells, and `facet_points` of facets with areas (f, q) [length^2]."""
+    """Return positions (c, q, dim) [length], shape functions (q, n) [-] and volumes or areas (c, q) [length^dim].
+
+    Those of `cell_points`, or of `facet_points` if `cells` (c, n) of int are facets, which have areas.
+    """
     if elements.get(element).dim == mesh.dim:
         return cell_points(mesh, element, cells, kinematics)
     x, N, normal = facet_points(mesh, element, cells, kinematics)

@@ -74,6 +74,7 @@ def test_a_sweep_calls_the_function_with_all_choices():
     assert all(math.isclose(point.values["bore"], BORE, rel_tol=0.05) for point in found.points)
     single = fc.parameter_sweep(tube, [0.5, 0.25], quantities={"bore": bore}, executor=ThreadPoolExecutor(2))
     assert list(single.table()["size"]) == [0.5, 0.25]
+    assert not {"h"} & {*single.table().dtype.names, *single.as_dict()["points"][0]}  # unknown of solved steps
     assert list(single.table()["bore"]) == list(found.table()["bore"][::2])
     frame = pytest.importorskip("pandas").DataFrame(single.table())
     assert frame.equals(single.to_pandas())
