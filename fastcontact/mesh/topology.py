@@ -25,6 +25,8 @@ from fastcontact.mesh.mesh import Mesh
 
 Found = TypeVar("Found")
 Further = ParamSpec("Further")
+# Nodes nearer to each other, or to a line, than this fraction of the size of the mesh coincide, or lie on the line.
+IN_LINE = 1e-6
 
 
 def corner_areas(mesh: Mesh, name: str) -> Array:
@@ -270,10 +272,6 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     points = nodes[order].astype(np.int32)
     lengths = np.linalg.norm(np.diff(mesh.points[points], axis=0), axis=1)
     return OrderedLine(points, np.concatenate([[0.0], np.cumsum(lengths)]))
-
-
-# Nodes nearer to each other, or to a line, than this fraction of the size of the mesh coincide, or lie on the line.
-IN_LINE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)

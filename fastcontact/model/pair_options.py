@@ -22,6 +22,59 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.ramp import History, Table, table_of
 
 
+class FormulationOptions(TypedDict, total=False):
+    """Options of formulations: those of all first, then those of single ones."""
+
+    friction: float | None
+    surface_smoothing: bool | None
+    slip: str | None
+    normals: str | ArrayLike | None
+    projection_tolerance: float | None
+    opposite: str | None
+    multipliers: str | None
+    augmentation: float | None
+    integration: str | None
+    n_gauss: int | None
+
+
+class SharedOptions(TypedDict, total=False):
+    """Options of every contact pair, whatever its formulation."""
+
+    kind: str | None
+    clearance: Value | None
+    clearance_primary: Value | None
+    clearance_ramp: History
+    friction_ramp: History
+    excluded: str | Sequence[str] | None
+    frictionless: str | Sequence[str] | None
+    frictionless_along: ArrayLike | None
+    penalty: float | Sequence[tuple[float, float]] | Mapping[str, float] | None
+    tangential_penalty: Value | None
+    cohesion: Mapping[str, float | str] | None
+    adhesion: Mapping[str, float] | None
+    wear: float | None
+    conductance: Any
+    friction_heat: float | None
+    obstacle_temperature: float | None
+    search_distance: float | None
+
+
+class ContactOptions(FormulationOptions, SharedOptions, total=False):
+    """Options of `add_contact` other than the sides."""
+
+
+SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))
+# Required and optional numbers of a cohesive layer and of adhesion.
+LAWS = {
+    "cohesion": (
+        ("strength", "energy"),
+        ("stiffness", "shear_strength", "shear_energy", "exponent", "initiation", "mixed_mode"),
+    ),
+    "adhesion": (("strength", "work"), ("stiffness",)),
+}
+CHOICES = {"initiation": ("bk", "quadratic", "maximum"), "mixed_mode": ("bk", "power")}
+
+
 def pair_options(
     name: str, options: Mapping[str, Any], mesh: Mesh, side: Surface, *, against_obstacle: bool
 ) -> PairOptions:
@@ -54,17 +107,6 @@ def pair_options(
         obstacle_temperature=options.get("obstacle_temperature"),
         cohesion=_cohesion(name, options),
     )
-
-
-# Required and optional numbers of a cohesive layer and of adhesion.
-LAWS = {
-    "cohesion": (
-        ("strength", "energy"),
-        ("stiffness", "shear_strength", "shear_energy", "exponent", "initiation", "mixed_mode"),
-    ),
-    "adhesion": (("strength", "work"), ("stiffness",)),
-}
-CHOICES = {"initiation": ("bk", "quadratic", "maximum"), "mixed_mode": ("bk", "power")}
 
 
 def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
@@ -262,47 +304,3 @@ def _function(name: str, value: Any) -> Field | None:
         return None
     check_value(name, value)
     return partial(evaluated, value, name=name)
-
-
-class FormulationOptions(TypedDict, total=False):
-    """Options of formulations: those of all first, then those of single ones."""
-
-    friction: float | None
-    surface_smoothing: bool | None
-    slip: str | None
-    normals: str | ArrayLike | None
-    projection_tolerance: float | None
-    opposite: str | None
-    multipliers: str | None
-    augmentation: float | None
-    integration: str | None
-    n_gauss: int | None
-
-
-class SharedOptions(TypedDict, total=False):
-    """Options of every contact pair, whatever its formulation."""
-
-    kind: str | None
-    clearance: Value | None
-    clearance_primary: Value | None
-    clearance_ramp: History
-    friction_ramp: History
-    excluded: str | Sequence[str] | None
-    frictionless: str | Sequence[str] | None
-    frictionless_along: ArrayLike | None
-    penalty: float | Sequence[tuple[float, float]] | Mapping[str, float] | None
-    tangential_penalty: Value | None
-    cohesion: Mapping[str, float | str] | None
-    adhesion: Mapping[str, float] | None
-    wear: float | None
-    conductance: Any
-    friction_heat: float | None
-    obstacle_temperature: float | None
-    search_distance: float | None
-
-
-class ContactOptions(FormulationOptions, SharedOptions, total=False):
-    """Options of `add_contact` other than the sides."""
-
-
-SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))

@@ -19,6 +19,7 @@ LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
 LONGEST_QUOTED = 80
 LARGEST_WHOLE = 1 << 53  # beyond, not every integer is a floating-point number
+Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True, slots=True)
@@ -359,9 +360,6 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"
         raise block.refuse(f"{target_name} includes itself")
     yield from _blocks(target, given, source)
-
-
-Entry = TypeVar("Entry")
 
 
 @contextmanager

@@ -18,6 +18,11 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
+# Least numbers of nodes by kind.
+LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
+# Points closer to a line or point than this fraction of their extent have no direction from it.
+FLAT = 1e-9
+
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
     """Add a rotation point for every reference node, before the mesh is made."""
@@ -120,12 +125,6 @@ def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
     if link.orientation:
         axes = local_axes(orientation_of(deck_mesh.content, link.orientation, link.location), deck_mesh.points[point])
     return axes[[component - 1 for component in link.components if component <= deck_mesh.dim], : deck_mesh.dim]
-
-
-# Least numbers of nodes by kind.
-LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Points closer to a line or point than this fraction of their extent have no direction from it.
-FLAT = 1e-9
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:

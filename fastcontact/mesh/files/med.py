@@ -29,16 +29,19 @@ NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.val
 # The order of face centres is bottom, sides all round, top in MED, and -x, +x, -y, +y, bottom, top here.
 _FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
 NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
-
 NAME_SIZE = 64
 COMPONENT_SIZE = 16
 NO_PROFILE = "MED_NO_PROFILE_INTERNAL"
 NO_STEP = -1
 FLOAT64 = 6
-
 AXES = ("X", "Y", "Z")
 # Suffixes of MED files, including code_aster's for meshes and results.
 MED_SUFFIXES = (".med", ".mmed", ".rmed")
+GROUP_NAME_SIZE = 80
+FAMILY_NAME_SIZE = 64
+# Number of folder levels between a mesh and its families: one, for those of points or of cells.
+LEVELS = 2
+Families = dict[int, tuple[str, ...]]
 
 
 class MedContent(NamedTuple):
@@ -388,14 +391,6 @@ def _read_instant(file: Any, support: Any, n_values: int, n_components: int) -> 
             raise FileError(f"profile '{name}' refers to point {rows.max() + 1} of {n_values}: write the file anew")
         field[rows] = values_of_profile
     return field
-
-
-GROUP_NAME_SIZE = 80
-FAMILY_NAME_SIZE = 64
-# Number of folder levels between a mesh and its families: one, for those of points or of cells.
-LEVELS = 2
-
-Families = dict[int, tuple[str, ...]]
 
 
 def checked_name(kind: str, name: str, size: int) -> bytes:

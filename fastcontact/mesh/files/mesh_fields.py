@@ -22,6 +22,7 @@ SAME_PLACE = 1e-6
 OVER = ("cells", "points")
 # Tolerance of the times of a file, relative to the latest.
 SAME_TIME = 1e-9
+VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
 
 
 @typed(FileError)
@@ -194,9 +195,6 @@ def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> Non
                 f"{name} has {len(members)} different values at {_in_space(point[None])[0]}, where bodies touch: write it on "
                 "the nodes of this mesh, in their order"
             )
-
-
-VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
 
 
 class FileField(NamedTuple):

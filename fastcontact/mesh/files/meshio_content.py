@@ -24,9 +24,12 @@ NODE_ORDER: dict[str, Orders] = {
     **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
     **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
 }
-
 # Errors caused by inconsistent arrays, which meshio reads without checks.
 UNFIT = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
+VERTEX = "vertex"
+# Largest number of unknown kinds of cells in a message, and of characters of each name.
+SHOWN = 12
+Groups = dict[str, AnyArray]
 
 
 def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict[str, int]]:
@@ -115,13 +118,6 @@ def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
     for name, members in content["point_sets"].items():
         _add(groups, {name: np.asarray(members, np.intp).reshape(-1)})
     return groups
-
-
-VERTEX = "vertex"
-# Largest number of unknown kinds of cells in a message, and of characters of each name.
-SHOWN = 12
-
-Groups = dict[str, AnyArray]
 
 
 @dataclass(frozen=True, eq=False)
