@@ -22,7 +22,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 # Relative residual of the first solution of a step by an iterative solver, and of later ones relative to the last change of
 # the displacement and to the last residual: more accuracy than that of the pairing is useless.
-RESIDUAL = 0.03
+FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 # With friction the tolerance falls at least to this fraction of the last one: inaccurate linear solutions may be what
 # keeps the residual of the friction law from decreasing.
 LEAST_FALL = 0.2
@@ -56,7 +56,7 @@ class Tolerances:
         self, solver: LinearSolver, criteria: Criteria, begin_inexact: bool, round_off: float, expected: float
     ) -> None:
         self._solver, self._criteria, self._round_off, self._expected = solver, criteria, round_off, expected
-        self._residual = max(solver.tolerance, RESIDUAL) if begin_inexact else solver.tolerance
+        self._residual = max(solver.tolerance, FIRST_RESIDUAL) if begin_inexact else solver.tolerance
 
     @property
     def inexact(self) -> bool:
