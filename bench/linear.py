@@ -20,12 +20,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
 from scipy.sparse import csr_array
 from threadpoolctl import threadpool_limits
 
 import fastcontact as fc
+from fastcontact._jit import decorators
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import Problem, near_nullspace, prepare
@@ -46,8 +46,10 @@ def timed(work: Any) -> tuple[Any, float, float]:
 def triad() -> float:
     """Return the bandwidth of a core [GB per CPU second], ``p = z + beta p`` on long vectors, median of nine."""
     z, p = np.ones(20_000_000), np.ones(20_000_000)
-    krylov_kernels.turn(0.5, z, p)
-    return float(np.median([24e-9 * len(z) / timed(lambda: krylov_kernels.turn(0.5, z, p))[1] for _ in range(9)]))
+    krylov_kernels.turn(0, len(p), 0.5, z, p)
+    return float(
+        np.median([24e-9 * len(z) / timed(lambda: krylov_kernels.turn(0, len(p), 0.5, z, p))[1] for _ in range(9)])
+    )
 
 
 def material(model: fc.Model) -> fc.Model:
@@ -176,7 +178,7 @@ def measure(name: str, dofs: int, count: int, with_pyamg: bool) -> dict[str, Any
     solver, model = problem.solver, problem.model
     assert isinstance(solver, Amg)
     n = model.n_dofs
-    found: dict[str, Any] = {"problem": name, "n_dofs": n, "threads": numba.get_num_threads()}
+    found: dict[str, Any] = {"problem": name, "n_dofs": n, "threads": decorators.threads()}
     found |= {"triad_GB_per_cpu_s": bandwidth, "setup_cpu_s": setup}
     if with_pyamg:
         found["pyamg"] = peer(problem)

@@ -12,10 +12,8 @@ from typing import Any
 
 from fastcontact._version import __version__ as __version__
 
-# Idle threads sleep. Spinning is the default of GNU OpenMP, and costs ten times the CPU time as soon as other processes use
-# the same cores; OpenBLAS threads spin, too, for a tenth of a second after their creation. Both libraries read the setting
-# once: when the first parallel kernel runs, and when NumPy or SciPy is first imported.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+# OpenBLAS threads spin for a tenth of a second after their creation. The library reads the setting once, when NumPy or SciPy
+# is first imported.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging

@@ -86,10 +86,10 @@ def bandwidths(solver, size):
     """Return the bytes a second that a sum over `size` bytes reads; bytes and seconds of products with the finest matrix."""
     import numpy as np
 
-    from fastcontact.linear.krylov import krylov_kernels
+    from fastcontact.linear.krylov.iterations import Iteration
 
-    long, sums = np.ones(size // 8), np.empty(-(-(size // 8) // krylov_kernels.CHUNK))
-    found = {"read_rate": size / _fastest(lambda: krylov_kernels.dot(long, long, sums))}
+    long, iteration = np.ones(size // 8), Iteration(size // 8)
+    found = {"read_rate": size / _fastest(lambda: iteration.dot(long, long))}
     A, n = solver.hierarchy.levels[0].A, solver.hierarchy.n
     where = sum(part.nbytes for part in (A.storage[:3] if A.storage[3] else (A.indptr, A.indices)))
     for name, matrix, parts in (("single", A, (A.data,)), ("exact", solver.K.scaled, solver.K.scaled.exact)):

@@ -24,13 +24,12 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numba
 from numba.core import types
 from numba.np.numpy_support import from_dtype
 from numpy import dtype
 
 from fastcontact._jit import cache as kernel_files
-from fastcontact._jit import compiling
+from fastcontact._jit import compiling, decorators
 
 TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
@@ -207,7 +206,7 @@ def expect(runs: Sequence[str]) -> None:
     helpers in worker processes, with a single thread, without a kernel cache, or if the interpreter is embedded in another
     program.
     """
-    new, helpers = [run for run in runs if run not in _helped], min(numba.get_num_threads() - 1, MOST)
+    new, helpers = [run for run in runs if run not in _helped], min(decorators.threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
     if not new or helpers < 1 or multiprocessing.parent_process() is not None or not python or not kernel_files.files:
         return

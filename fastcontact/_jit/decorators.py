@@ -1,4 +1,4 @@
-"""Decorators of kernels: disk cache, strict floating-point arithmetic, threads.
+"""Decorators of kernels: disk cache, strict floating-point arithmetic; number of threads.
 
 Kernels are compiled at their first call, never at import. If no folder is writable for the cache, they are compiled
 in every process instead, with one line in the log.
@@ -6,7 +6,6 @@ in every process instead, with one line in the log.
 
 from __future__ import annotations
 
-import contextlib
 import gc
 import logging
 import os
@@ -18,7 +17,6 @@ import numba
 from numba.core import event
 
 from fastcontact._jit import cache, compiling, interpreting
-from fastcontact.errors import FastcontactError
 
 log = logging.getLogger("fastcontact")
 
@@ -59,12 +57,13 @@ class _Compilations(event.Listener):  # type: ignore[misc]
 
 
 event.register("numba:compile", _Compilations())
-_forked_without_threads = False
+# Set by NUMBA_NUM_THREADS, otherwise the number of processors.
+_threads = int(getattr(numba.config, "NUMBA_NUM_THREADS", 1))
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` lazily in nopython mode, with the disk cache if available."""
-    return _compile(function, parallel=False)
+    return _compile(function)
 
 
 def interpretable_kernel(function: Callable[..., Any]) -> Any:
@@ -77,26 +76,18 @@ def interpretable_kernel(function: Callable[..., Any]) -> Any:
     return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
 
 
-def parallel_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, with `prange` loops spread over threads; iterations must write disjoint memory.
-
-    With NUMBA_BOUNDSCHECK=1 the loops run in one thread, since Numba checks no indices in parallel loops.
-    """
-    return _compile(function, parallel=not getattr(numba.config, "BOUNDSCHECK", None))
-
-
 def summing_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, for long sums of products, vectorised with another order of summation that is the same in every run.
 
     It is for results whose last bits may differ between processors, as in BLAS, and must neither call nor be called by
     others.
     """
-    return _compile(function, parallel=False, fastmath=ANY_ORDER)
+    return _compile(function, fastmath=ANY_ORDER)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
     """Like `kernel`, for parts of hot loops: Numba inlines the code at each call."""
-    return _compile(function, parallel=False, inline="always")
+    return _compile(function, inline="always")
 
 
 def innermost_kernel(function: Callable[..., Any]) -> Any:
@@ -104,11 +95,11 @@ def innermost_kernel(function: Callable[..., Any]) -> Any:
 
     Small arrays then stay in registers, where `inlined_kernel` leaves them in memory.
     """
-    return _compile(function, parallel=False, forceinline=True)
+    return _compile(function, forceinline=True)
 
 
-def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
-    options: dict[str, Any] = {"fastmath": fastmath, "parallel": parallel, "nogil": True, "error_model": "numpy"}
+def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **inlining: Any) -> Any:
+    options: dict[str, Any] = {"fastmath": fastmath, "nogil": True, "error_model": "numpy"}
     options["no_cfunc_wrapper"] = True  # an unused second entry point for C
     options |= inlining
     try:
@@ -127,31 +118,10 @@ def _compile(function: Callable[..., Any], parallel: bool, fastmath: set[str] = 
     return numba.njit(cache=False, **options)(function)
 
 
-def _notice_fork() -> None:
-    global _forked_without_threads
-    with contextlib.suppress(ValueError):  # no parallel kernel was loaded yet: the child starts its own threads
-        _forked_without_threads = numba.threading_layer() == "omp" and compiled()
-
-
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_notice_fork)
     os.register_at_fork(
         after_in_child=compiling.waiters.clear
     )  # a child does not receive reports of its parent's helpers
-
-
-def check_threads() -> None:
-    """Raise FastcontactError in a child forked after the start of kernel threads, where parallel kernels would end it.
-
-    The threads of GNU OpenMP do not survive a fork; the library ends such a child without an exception, and a process
-    pool then waits forever.
-    """
-    if _forked_without_threads:
-        raise FastcontactError(
-            "this process was forked after its parent had started the threads of the compiled kernels, and those do not "
-            "survive a fork: start processes by multiprocessing's 'spawn' or 'forkserver', or set "
-            "NUMBA_THREADING_LAYER=workqueue"
-        )
 
 
 def compiled() -> bool:
@@ -160,10 +130,11 @@ def compiled() -> bool:
 
 
 def set_threads(count: int) -> None:
-    """Set the number of threads that parallel kernels use in this process."""
-    numba.set_num_threads(count)
+    """Set the number of threads that kernels use in this process."""
+    global _threads
+    _threads = count
 
 
 def threads() -> int:
-    """Return the number of threads that parallel kernels use in this process."""
-    return int(numba.get_num_threads())
+    """Return the number of threads that kernels use in this process."""
+    return _threads

@@ -7,12 +7,11 @@ matrix, or its own cells; there are no sums across threads.
 from __future__ import annotations
 
 import itertools
+import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from functools import lru_cache, wraps
+from concurrent.futures import ThreadPoolExecutor, wait
+from functools import cache, lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar
-
-import numpy as np
 
 from fastcontact._jit import decorators
 from fastcontact.arrays import AnyArray
@@ -20,18 +19,42 @@ from fastcontact.arrays import AnyArray
 Result = TypeVar("Result")
 Part = TypeVar("Part")
 Given = ParamSpec("Given")
-# With fewer cells, of this number of nodes, threads cost more to start than they save.
-WORTHWHILE, NODES = 20_000, 4
+# Up to this work other threads cost more to wake (0.03 ms) than they save; the nodes of a cell where none are given.
+WORTHWHILE, NODES = 80_000, 4
 MOST = 255
 
 
+@cache
+def _pool() -> ThreadPoolExecutor:
+    """Return the threads of this process, which are created as they are needed and then kept."""
+    return ThreadPoolExecutor(MOST, "fastcontact")
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # threads do not survive a fork
+
+
 def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result]:
-    """Return the results of `work` on every part: the first runs in this thread, the others in one new thread each."""
+    """Return the results of `work` on every part: the first runs in this thread, the others in one more thread each."""
     if len(parts) == 1:
         return [work(parts[0])]
-    with ThreadPoolExecutor(len(parts) - 1) as pool:
-        others = pool.map(work, parts[1:])
-        return [work(parts[0]), *others]
+    others = [_pool().submit(work, part) for part in parts[1:]]
+    try:
+        first = work(parts[0])
+    finally:
+        wait(others)  # they use the arguments of this call
+    return [first, *(other.result() for other in others)]
+
+
+def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
+    """Call ``kernel(low, high, *arguments)`` for ranges that together cover 0 to `count`, each in a thread.
+
+    `work` is that for one of the `count` rows or cells, see `portions`; 0 for rows that must be computed in order.
+    """
+    if count * work <= WORTHWHILE:
+        kernel(0, count, *arguments)
+    else:
+        shared(lambda portion: kernel(*portion, *arguments), portions(count, work))
 
 
 @lru_cache(maxsize=1)
@@ -62,12 +85,12 @@ def read_only(numbers: AnyArray) -> AnyArray:
     return view
 
 
-def portions(count: int, nodes: int = NODES) -> list[tuple[int, int]]:
+def portions(count: int, work: float = NODES) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one per thread, or a single one for little work.
 
-    The work for each of the `count` cells grows with its number of `nodes`.
+    The `work` for each of the `count` cells is counted in nodes of a cell, of some ten nanoseconds each.
     """
-    if count * nodes < WORTHWHILE * NODES:
+    if count * work <= WORTHWHILE:
         return [(0, count)]
-    ends = np.linspace(0, count, min(decorators.threads(), MOST) + 1).astype(int).tolist()
-    return list(itertools.pairwise(ends))
+    n = min(decorators.threads(), MOST, count)
+    return list(itertools.pairwise(count * k // n for k in range(n + 1)))

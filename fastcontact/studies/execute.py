@@ -176,7 +176,7 @@ class Worker(SpawnProcess):
 
 
 class Spawning(SpawnContext):
-    """Context that spawns processes and keeps a list of them. Forked children of a process with OpenMP threads die."""
+    """Context that spawns processes and keeps a list of them."""
 
     def __init__(self) -> None:
         super().__init__()

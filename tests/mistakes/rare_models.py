@@ -9,7 +9,6 @@ from library import Mistake, blocks, pair_of, square, with_load
 
 import fastcontact as fc
 from fastcontact import topology
-from fastcontact._jit import decorators as _jit
 from fastcontact.contact.configuration import Configuration
 from fastcontact.linear import choice as linear
 from fastcontact.mesh.generate import block, box, half_spheres
@@ -57,11 +56,6 @@ def no_lines():
     return topology.ordered_line(mesh, "BLOCK")
 
 
-def forked(patch):
-    patch.setattr(_jit, "_forked_without_threads", True)
-    _jit.check_threads()
-
-
 def without(patch, *modules):
     for name in modules:
         patch.setitem(sys.modules, name, None)
@@ -104,8 +98,6 @@ def solid_stress_on_axis():
 MISTAKES = [
     Mistake("a criterion that is no force", lambda: fc.Criteria(absolute=-1.0), fc.ModelError,
             r"the convergence criterion absolute = -1\.0 must be a force >= 0, or None"),
-    Mistake("a forked process with threads", forked, fc.errors.FastcontactError,
-            r"this process was forked after its parent had started the threads .*: start processes by multiprocessing's 'spawn'"),
     Mistake("a penalty where constraints have no areas", formulation_without_areas, fc.ContactError,
             r"formulation 'mortar' supports no penalty: leave out the option"),
     Mistake("unknown multipliers", lambda: pair_of("CONT_UPPER", "CONT_LOWER", formulation="mortar", multipliers="dul"),

@@ -1,26 +1,21 @@
-"""Read beyond the end of an array in a serial and in a parallel kernel, and print the error of each."""
+"""Read beyond the end of an array in a kernel, alone and in threads, and print the error of each."""
 
-import numba
 import numpy as np
 
-from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact._jit.decorators import kernel
+from fastcontact._jit.parallel import WORTHWHILE, spread
 
 
 @kernel
-def beyond(values, k):
-    return values[k]
-
-
-@parallel_kernel
-def beyond_together(values, out):
-    for k in numba.prange(len(out)):
+def beyond(low, high, values, out):
+    for k in range(low, high):
         out[k] = values[k]
 
 
 if __name__ == "__main__":
-    for call in (lambda: beyond(np.zeros(2), 2), lambda: beyond_together(np.zeros(2), np.zeros(3))):
+    for work in (1, WORTHWHILE):
         try:
-            call()
+            spread(beyond, 3, work, np.zeros(2), np.zeros(3))
             print("nothing")
         except IndexError:
             print("IndexError")

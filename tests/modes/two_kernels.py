@@ -1,4 +1,4 @@
-"""Call two compiled functions, one of them parallel: print as JSON whether they are correct and came from the cache."""
+"""Call two compiled functions, one of them interpretable: print as JSON whether they are correct and came from the cache."""
 
 import json
 import logging
@@ -13,7 +13,7 @@ from fastcontact.linear.krylov import krylov_kernels  # noqa: E402
 
 interpreting.SECONDS = -1.0  # not Python in the place of a kernel
 a, b = np.arange(40.0), np.arange(40.0)
-krylov_kernels.turn(2.0, a, b)
+krylov_kernels.turn(0, 40, 2.0, a, b)
 stats = [kernel.stats for kernel in (krylov_kernels.turn, norms_kernels.largest_difference.compiled)]
 found = {
     "right": norms_kernels.largest_difference(3.0 * a, b) == 0.0,

@@ -11,8 +11,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fastcontact.arrays import Array
+from fastcontact._jit.parallel import spread
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.linear.krylov import krylov_kernels
+from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 
 # ``multiply(p, q)`` fills q (n,) with ``A p``; ``precondition(r, norm, z)`` fills z (n,) with an approximation of ``A^-1 r``,
 # given the 2-norm of r.
@@ -22,6 +24,11 @@ Precondition = Callable[[Array, float, Array], None]
 KEPT = 20
 # A step of conjugate residuals fails if the residual stays above this fraction.
 LOST = 0.98
+
+
+def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
+    """Fill `b` (n,) with ``factor a``, in the precision of b."""
+    spread(krylov_kernels.scaled, len(a), WORK_OF_NUMBER, factor, a, b)
 
 
 class Iteration:
@@ -42,12 +49,13 @@ class Iteration:
 
     def __init__(self, n: int) -> None:
         self.x, self.r, self.z, self.q = (np.zeros(n) for _ in range(4))
-        self._sums = np.empty(-(-n // krylov_kernels.CHUNK))
+        self._sums = np.empty(-(-n // CHUNK))
         self.norm = 0.0
 
     def dot(self, a: Array, b: Array) -> float:
         """Return the dot product of two vectors (n,)."""
-        return float(krylov_kernels.dot(a, b, self._sums))
+        spread(krylov_kernels.dot, len(self._sums), WORK_OF_NUMBER * CHUNK, a, b, self._sums)
+        return float(krylov_kernels.total(self._sums))
 
     def start(self) -> None:
         """Restart from `x` and its residual `r`, both set by the caller."""
@@ -55,7 +63,12 @@ class Iteration:
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
         """Step ``x += alpha p``, ``r -= alpha q``."""
-        self.norm = float(np.sqrt(krylov_kernels.advance(alpha, p, q, self.x, self.r, self._sums)))
+        self.norm = float(np.sqrt(self._stepped(alpha, p, q, self.x, self.r)))
+
+    def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:
+        """Step ``x += alpha p``, ``r -= alpha q``; return the square of the norm of r."""
+        spread(krylov_kernels.advance, len(self._sums), WORK_OF_NUMBER * CHUNK, alpha, p, q, x, r, self._sums)
+        return float(krylov_kernels.total(self._sums))
 
 
 class ConjugateGradients(Iteration):
@@ -89,7 +102,7 @@ class ConjugateGradients(Iteration):
             change = -self._alpha * self.dot(self.q, self.z)
             beta = change / self._rz
         self._rz = rz
-        krylov_kernels.turn(beta, self.z, self.p)
+        spread(krylov_kernels.turn, len(self.p), WORK_OF_NUMBER, beta, self.z, self.p)
         multiply(self.p, self.q)
         curvature = self.dot(self.p, self.q)
         if not (rz > 0.0 and curvature > 0.0):
@@ -135,7 +148,7 @@ class ConjugateResiduals(Iteration):
         multiply(z, q)
         square = before = self.dot(q, q)
         for direction, image in self._kept:
-            square = krylov_kernels.advance(self.dot(q, image), direction, image, z, q, self._sums)
+            square = self._stepped(self.dot(q, image), direction, image, z, q)
         if not square > np.finfo(float).eps ** 2 * before:
             return False
         self._advance(self.dot(self.r, q) / square, z, q)
@@ -149,6 +162,6 @@ class ConjugateResiduals(Iteration):
             pair = self._kept.popleft()
         else:
             pair = self._spare.pop() if self._spare else (np.empty_like(z), np.empty_like(q))
-        krylov_kernels.scaled(1.0 / size, z, pair[0])
-        krylov_kernels.scaled(-1.0 / size, q, pair[1])
+        scaled(1.0 / size, z, pair[0])
+        scaled(-1.0 / size, q, pair[1])
         self._kept.append(pair)

@@ -1,12 +1,19 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Vector operations of conjugate gradients: sums in fixed chunks, equal for any number of threads."""
+"""Vector operations of conjugate gradients: sums in fixed chunks, equal for any number of threads.
 
-from numba import prange
+Kernels work on chunks, or numbers, `low` to ``high - 1``: see `_jit.parallel.spread`.
+"""
 
-from fastcontact._jit.decorators import kernel, parallel_kernel
+import numpy as np
+
+from fastcontact._jit.decorators import kernel
 
 # Length of the chunks.
 CHUNK = 4096
+# Work of kernels for a number, see `_jit.parallel.portions`.
+WORK_OF_NUMBER = 0.5
+# First index of a whole range: for a literal 0, or an unsigned number, Numba would compile another copy of `stretch_dot`.
+FIRST = np.int64(0)
 
 
 @kernel
@@ -25,48 +32,43 @@ def stretch_dot(a, b, low, high):
 
 
 @kernel
-def _total(sums):
+def total(sums):
+    """Return the sum of the `sums` of chunks, in their order."""
     total = 0.0
     for k in range(sums.shape[0]):
         total += sums[k]
     return total
 
 
-@parallel_kernel
-def dot(a, b, sums):
-    """Return the dot product of `a` and `b` (n,); `sums` (ceil(n / CHUNK),) is work space."""
+@kernel
+def dot(low, high, a, b, sums):
+    """Fill `sums` (ceil(n / CHUNK),) with the dot products of the chunks of `a` and `b` (n,)."""
     n = a.shape[0]
-    for c in prange(sums.shape[0]):
+    for c in range(low, high):
         sums[c] = stretch_dot(a, b, c * CHUNK, min(n, (c + 1) * CHUNK))
-    return _total(sums)
 
 
 @kernel
-def _advance_part(alpha, p, q, x, r, low, high):
-    for i in range(low, high):
-        x[i] += alpha * p[i]
-        r[i] -= alpha * q[i]
-    return stretch_dot(r, r, low, high)
-
-
-@parallel_kernel
-def advance(alpha, p, q, x, r, sums):
-    """Step ``x += alpha p``, ``r -= alpha q`` and return the square of the norm of r."""
+def advance(low, high, alpha, p, q, x, r, sums):
+    """Step ``x += alpha p``, ``r -= alpha q``, and fill `sums` with the squared norms of the chunks of r."""
     n = x.shape[0]
-    for c in prange(sums.shape[0]):
-        sums[c] = _advance_part(alpha, p, q, x, r, c * CHUNK, min(n, (c + 1) * CHUNK))
-    return _total(sums)
+    for c in range(low, high):
+        begin, end = c * CHUNK, min(n, (c + 1) * CHUNK)
+        for i in range(begin, end):
+            x[i] += alpha * p[i]
+            r[i] -= alpha * q[i]
+        sums[c] = stretch_dot(r, r, begin, end)
 
 
-@parallel_kernel
-def turn(beta, z, p):
+@kernel
+def turn(low, high, beta, z, p):
     """Update the search direction: ``p = z + beta p``."""
-    for i in prange(p.shape[0]):
+    for i in range(low, high):
         p[i] = z[i] + beta * p[i]
 
 
-@parallel_kernel
-def scaled(factor, a, b):
+@kernel
+def scaled(low, high, factor, a, b):
     """Fill `b` with ``factor a``, in the precision of b."""
-    for i in prange(a.shape[0]):
+    for i in range(low, high):
         b[i] = factor * a[i]

@@ -5,19 +5,15 @@ A block matrix comes as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``
 `matrix.BlockMatrix`. The block size comes as two tuples of zeros, ``rows`` of length m and ``cols`` of length n: lengths of
 tuples are known to the compiler. Views of blocks inside the loops would cost four times as much.
 
-Every row is summed by one thread in a fixed order, so results are the same for any number of threads.
+Kernels with `low` and `high` compute these rows, see `_jit.parallel.spread`. Every row is summed by one thread in a fixed
+order, so results are the same for any number of threads.
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit.decorators import kernel, parallel_kernel
-from fastcontact.linear.krylov.krylov_kernels import stretch_dot
+from fastcontact._jit.decorators import kernel
+from fastcontact.linear.krylov.krylov_kernels import FIRST, stretch_dot
 from fastcontact.linear.multigrid.block_products import row_times
-from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, FIRST
-
-# Number of block rows up to which waking another thread costs more than it saves.
-ALONE = 4 * CHUNK
 
 
 @kernel
@@ -36,7 +32,11 @@ def _part(share, z, i):
 
 
 @kernel
-def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
+def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
+    """Fill `y` (n_rows * m,) with ``share * z + factor * A @ x``; z and y may be the same array.
+
+    The `numbers` are the entries of A, as a tuple of arrays, one or two: see `split_matrix_kernels`.
+    """
     m = len(rows)
     for i in range(low, high):
         sums = row_times(indices, numbers, x, indptr[i], indptr[i + 1], rows, cols)
@@ -44,22 +44,14 @@ def _multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows,
             y[m * i + r] = _part(share, z, m * i + r) + factor * sums[r]
 
 
-@parallel_kernel
-def multiply(indptr, indices, numbers, x, factor, share, z, y, rows, cols):
-    """Fill `y` (n_rows * m,) with ``share * z + factor * A @ x``; z and y may be the same array.
-
-    The `numbers` are the entries of A, as a tuple of arrays, one or two: see `split_matrix_kernels`.
-    """
-    n = indptr.shape[0] - 1
-    if n <= ALONE:
-        _multiply(FIRST, n, indptr, indices, numbers, x, factor, share, z, y, rows, cols)
-        return
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _multiply(c * CHUNK, min(n, (c + 1) * CHUNK), indptr, indices, numbers, x, factor, share, z, y, rows, cols)
-
-
 @kernel
-def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
+def relax(low, high, inverse, r, first, second, d, x, rows, begin):
+    """Make one step of a Chebyshev iteration: ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
+
+    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be initialised; with
+    `begin`, x starts from zero and need not be either (Saad, Iterative Methods for Sparse Linear Systems, 2003,
+    algorithm 12.1).
+    """
     m = len(rows)
     for i in range(low, high):
         for a in range(m):
@@ -71,22 +63,6 @@ def _relax(low, high, inverse, r, first, second, d, x, rows, begin):
                 x[m * i + a] = step
             else:
                 x[m * i + a] += step
-
-
-@parallel_kernel
-def relax(inverse, r, first, second, d, x, rows, begin):
-    """Make one step of a Chebyshev iteration: ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
-
-    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be initialised; with
-    `begin`, x starts from zero and need not be either (Saad, Iterative Methods for Sparse Linear Systems, 2003,
-    algorithm 12.1).
-    """
-    n = r.shape[0] // len(rows)
-    if n <= ALONE:
-        _relax(FIRST, n, inverse, r, first, second, d, x, rows, begin)
-        return
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _relax(c * CHUNK, min(n, (c + 1) * CHUNK), inverse, r, first, second, d, x, rows, begin)
 
 
 @kernel
@@ -124,26 +100,16 @@ def solve_dense(L, reciprocal, b, work, x):
 
 
 @kernel
-def _subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
+def subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
+    """Subtract ``A x`` from the block rows `numbers` of `y`, all different, for a matrix A of square blocks.
+
+    `indices` number the blocks of x; `data` come as a tuple, as in `multiply`.
+    """
     m = len(rows)
     for i in range(low, high):
         sums = row_times(indices, data, x, indptr[i], indptr[i + 1], rows, rows)
         for r in range(m):
             y[m * numbers[i] + r] -= sums[r]
-
-
-@parallel_kernel
-def subtract_rows(numbers, indptr, indices, data, x, y, rows):
-    """Subtract ``A x`` from the block rows `numbers` of `y`, all different, for a matrix A of square blocks.
-
-    `indices` number the blocks of x; `data` come as a tuple, as in `multiply`.
-    """
-    n = numbers.shape[0]
-    if n <= ALONE:
-        _subtract_rows(FIRST, n, numbers, indptr, indices, data, x, y, rows)
-        return
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        _subtract_rows(c * CHUNK, min(n, (c + 1) * CHUNK), numbers, indptr, indices, data, x, y, rows)
 
 
 @kernel

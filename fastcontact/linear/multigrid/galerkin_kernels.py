@@ -3,18 +3,14 @@
 
 Block matrices come as arrays, see `matrix.BlockMatrix`, block sizes m and n as tuples of zeros, `rows` and `cols`; numbers
 that may be split as a tuple, see `split_matrix_kernels`; which blocks are stored as `storage`, see
-`symmetric_storage_kernels`. Rows are computed one by one in a fixed order.
+`symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1``, one by one in a fixed order.
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
-from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK, part_of, place_of
-
-# Number of parts of Galerkin products, each with its own work space.
-PARTS = 8
+from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, place_of
 
 
 @kernel
@@ -33,30 +29,22 @@ def _near(i, indptr, indices, storage, data, square, near):
     return count
 
 
-@parallel_kernel
-def graph(indptr, indices, storage, data, size):
-    """Return the offsets and columns of the nonzero off-diagonal blocks.
+@kernel
+def count_near(low, high, indptr, indices, storage, data, square, widest, count):
+    """Fill `count` (n_rows,) with the number of nonzero off-diagonal blocks of rows of up to `widest` blocks.
 
     A row without neighbours is a node without coupling: all its unknowns are supported.
     """
-    n = indptr.shape[0] - 1
-    start, widest = np.zeros(n + 1, np.int32), 0
-    for i in range(n):
-        widest = max(widest, indptr[i + 1] - indptr[i])
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        near = np.empty(widest, np.int32)
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            start[i + 1] = _near(i, indptr, indices, storage, data, size * size, near)
-    for i in range(n):
-        start[i + 1] += start[i]
-    neighbours = np.empty(start[n], np.int32)
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        near = np.empty(widest, np.int32)
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            count = _near(i, indptr, indices, storage, data, size * size, near)
-            for e in range(count):
-                neighbours[start[i] + e] = near[e]
-    return start, neighbours
+    near = np.empty(widest, np.int32)
+    for i in range(low, high):
+        count[i] = _near(i, indptr, indices, storage, data, square, near)
+
+
+@kernel
+def find_near(low, high, indptr, indices, storage, data, square, start, neighbours):
+    """Fill the columns `neighbours` of the nonzero off-diagonal blocks, with the row pointers `start`."""
+    for i in range(low, high):
+        _near(i, indptr, indices, storage, data, square, neighbours[start[i] : start[i + 1]])
 
 
 @kernel
@@ -79,21 +67,12 @@ def _aggregates_of(i, indptr, indices, aggregate, aggregates):
     return count
 
 
-@parallel_kernel
-def count_prolongator(indptr, indices, aggregate):
-    """Return the row pointers of the smoothed prolongator: each node and its neighbours, by aggregate."""
-    n = indptr.shape[0] - 1
-    widest = 0
-    for i in range(n):
-        widest = max(widest, indptr[i + 1] - indptr[i])
-    start = np.zeros(n + 1, np.int32)
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        aggregates = np.empty(widest, np.int32)
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            start[i + 1] = _aggregates_of(i, indptr, indices, aggregate, aggregates)
-    for i in range(n):
-        start[i + 1] += start[i]
-    return start
+@kernel
+def count_prolongator(low, high, indptr, indices, aggregate, widest, count):
+    """Fill `count` (n_nodes,) with the number of aggregates of each node and its neighbours, up to `widest`."""
+    aggregates = np.empty(widest, np.int32)
+    for i in range(low, high):
+        count[i] = _aggregates_of(i, indptr, indices, aggregate, aggregates)
 
 
 @kernel
@@ -144,27 +123,37 @@ def _smooth_row(
                 out[base + r * n + c] = first - omega * s
 
 
-@parallel_kernel
-def smooth_prolongator(indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, out, rows, cols):
-    """Return the columns of ``(I - omega D^-1 A) T`` with the row pointers `start`, and fill its blocks into `out`.
+@kernel
+def smooth_prolongator(
+    low,
+    high,
+    indptr,
+    indices,
+    storage,
+    data,
+    inverse,
+    aggregate,
+    tentative,
+    omega,
+    start,
+    widest,
+    columns,
+    out,
+    rows,
+    cols,
+):
+    """Fill the columns of ``(I - omega D^-1 A) T``, with the row pointers `start`, and its blocks `out`.
 
     `tentative` (n_nodes * m * n,) is the block of T in each node's own aggregate; `aggregate` is -1 for nodes in none.
+    `widest` is the largest number of blocks in a row of the result.
     """
-    n = indptr.shape[0] - 1
-    m = len(rows)
-    widest = 0
-    for i in range(n):
-        widest = max(widest, start[i + 1] - start[i])
-    columns = np.empty(start[n], np.int32)
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        near = np.empty(widest + 1, np.int32)
-        sums = np.empty((widest + 1) * m * len(cols))
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            _smooth_row(
-                i, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, near, sums,
-                rows, cols,
-            )  # fmt: skip
-    return columns
+    near = np.empty(widest, np.int32)
+    sums = np.empty(widest * len(rows) * len(cols))
+    for i in range(low, high):
+        _smooth_row(
+            i, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, near, sums,
+            rows, cols,
+        )  # fmt: skip
 
 
 @kernel
@@ -190,22 +179,21 @@ def _reach(row, indptr, indices, start, columns, tstart, torigin, seen, near, se
     return n_near, n_found
 
 
-@parallel_kernel
-def count_galerkin(indptr, indices, start, columns, tstart, torigin, count, near_count):
-    """Fill, for each coarse row of ``P.T A P``, the numbers of its blocks and of fine nodes in its sum."""
+@kernel
+def count_galerkin(low, high, indptr, indices, start, columns, tstart, torigin, count, near_count):
+    """Fill, for coarse rows of ``P.T A P``, the numbers of their blocks and of fine nodes in their sums."""
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
-    for part in prange(PARTS):
-        seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
-        seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
-        for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
-            near_count[row], count[row] = _reach(
-                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
-            )
+    seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
+    seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+    for row in range(low, high):
+        near_count[row], count[row] = _reach(
+            row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
+        )
 
 
 @kernel
 def _galerkin_row(
-    row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, low,
+    row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, first,
     places, out, rows, cols,
 ):  # fmt: skip
     """Compute one row: first ``Z = A P_I`` for the fine nodes near it, then ``P.T Z``, transposed since A is symmetric."""
@@ -226,49 +214,33 @@ def _galerkin_row(
     for e in range(n_near):
         j, base = near[e], e * m * n
         for k in range(start[j], start[j + 1]):
-            block = (low + places[columns[k]]) * n * n
+            block = (first + places[columns[k]]) * n * n
             add_transposed(out, block, (products,), base, P, k * m * n, (cols, rows, cols))
 
 
-@parallel_kernel
+@kernel
 def galerkin(
-    indptr,
-    indices,
-    storage,
-    data,
-    start,
-    columns,
-    P,
-    tstart,
-    torigin,
-    tslot,
-    low,
-    largest,
-    out_columns,
-    out,
-    rows,
-    cols,
-):
-    """Fill the columns and blocks of ``P.T A P``, A symmetric; `low` are its row pointers, `out` holds zeros.
+    low, high, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot, into, largest, out_columns, out,
+    rows, cols,
+):  # fmt: skip
+    """Fill the columns and blocks of ``P.T A P``, A symmetric; `into` are its row pointers, `out` holds zeros.
 
     `largest` is the largest number of fine nodes in the sum of a coarse row.
     """
     n, n_coarse = indptr.shape[0] - 1, tstart.shape[0] - 1
-    m, size = len(rows), len(cols)
-    for part in prange(PARTS):
-        seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
-        seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
-        place, places = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
-        products = np.empty(largest * m * size)
-        for row in range(part * n_coarse // PARTS, (part + 1) * n_coarse // PARTS):
-            n_near, n_found = _reach(
-                row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
-            )
-            reached[:n_found].sort()
-            for e in range(n_found):
-                places[reached[e]] = e
-                out_columns[low[row] + e] = reached[e]
-            _galerkin_row(
-                row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
-                low[row], places, out, rows, cols,
-            )  # fmt: skip
+    seen, near = np.full(n, -1, np.int32), np.empty(n, np.int32)
+    seen_coarse, reached = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+    place, places = np.empty(n, np.int32), np.empty(n_coarse, np.int32)
+    products = np.empty(largest * len(rows) * len(cols))
+    for row in range(low, high):
+        n_near, n_found = _reach(
+            row, indptr, indices, start, columns, tstart, torigin, seen, near, seen_coarse, reached
+        )
+        reached[:n_found].sort()
+        for e in range(n_found):
+            places[reached[e]] = e
+            out_columns[into[row] + e] = reached[e]
+        _galerkin_row(
+            row, near, n_near, place, products, indptr, indices, storage, data, start, columns, P, tstart, torigin, tslot,
+            into[row], places, out, rows, cols,
+        )  # fmt: skip

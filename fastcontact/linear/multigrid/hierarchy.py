@@ -17,11 +17,12 @@ import numpy as np
 from numpy.typing import DTypeLike
 from scipy.sparse import csr_matrix
 
+from fastcontact._jit.parallel import spread
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.level import Level
-from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointers, widest_row
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
@@ -74,7 +75,7 @@ class Hierarchy:
         from pyamg.aggregation.tentative import fit_candidates
 
         size, n = len(A.rows), len(A.indptr) - 1
-        start, near = galerkin_kernels.graph(A.indptr, A.indices, A.storage, A.data, size)
+        start, near = graph(A)
         ones = np.ones(len(near), np.int8)
         aggregates, _ = standard_aggregation(csr_matrix((ones, near, start), shape=(n, n)))
         n_coarse, n_modes = aggregates.shape[1], modes.shape[1]
@@ -88,14 +89,24 @@ class Hierarchy:
         tentative[member] = T.data.reshape(len(member), -1)
         del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
-        cols = (0,) * n_modes
-        indptr = galerkin_kernels.count_prolongator(A.indptr, A.indices, aggregate)
+        cols, count = (0,) * n_modes, np.empty(n, np.int32)
+        spread(
+            galerkin_kernels.count_prolongator,
+            n,
+            WORK_OF_ROW,
+            A.indptr,
+            A.indices,
+            aggregate,
+            widest_row(A.indptr),
+            count,
+        )
+        indptr, widest = pointers(count), int(count.max(initial=0))
         # In the precision of the cycle from the start, so that the coarse matrix is the exact product of the
         # prolongators used.
-        blocks = np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
-        columns = galerkin_kernels.smooth_prolongator(
-            A.indptr, A.indices, A.storage, A.exact, level.inverse, aggregate, tentative.ravel(), omega, indptr, blocks,
-            A.rows, cols,
+        columns, blocks = np.empty(indptr[-1], np.int32), np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
+        spread(
+            galerkin_kernels.smooth_prolongator, n, WORK_OF_ROW, A.indptr, A.indices, A.storage, A.exact, level.inverse,
+            aggregate, tentative.ravel(), omega, indptr, widest, columns, blocks, A.rows, cols,
         )  # fmt: skip
         del tentative
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
@@ -159,6 +170,17 @@ class Hierarchy:
             level.relax(level.r, *factor)
 
 
+def graph(A: BlockMatrix) -> tuple[Numbers, Numbers]:
+    """Return the offsets and columns of the nonzero off-diagonal blocks of A."""
+    n = len(A.indptr) - 1
+    arguments, count = (A.indptr, A.indices, A.storage, A.data, len(A.rows) ** 2), np.empty(n, np.int32)
+    spread(galerkin_kernels.count_near, n, WORK_OF_ROW, *arguments, widest_row(A.indptr), count)
+    start = pointers(count)
+    neighbours = np.empty(start[-1], np.int32)
+    spread(galerkin_kernels.find_near, n, WORK_OF_ROW, *arguments, start, neighbours)
+    return start, neighbours
+
+
 def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
     """Return the offsets of the blocks of each of n block columns, their rows, ascending, and their numbers."""
     numbers = np.arange(len(P.indices), dtype=np.int32)
@@ -170,12 +192,24 @@ def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbe
     """Return ``P.T A P`` for a symmetric A; `index` from `by_columns`."""
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
-    galerkin_kernels.count_galerkin(A.indptr, A.indices, P.indptr, P.indices, index[0], index[1], count, near)
-    indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    work = WORK_OF_ROW * len(A.indptr) // max(1, n_coarse)
+    spread(
+        galerkin_kernels.count_galerkin,
+        n_coarse,
+        work,
+        A.indptr,
+        A.indices,
+        P.indptr,
+        P.indices,
+        *index[:2],
+        count,
+        near,
+    )
+    indptr = pointers(count)
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)
-    galerkin_kernels.galerkin(
-        A.indptr, A.indices, A.storage, A.exact, P.indptr, P.indices, P.data, *index, indptr, int(near.max(initial=0)),
-        columns, out, P.rows, P.cols,
+    spread(
+        galerkin_kernels.galerkin, n_coarse, work, A.indptr, A.indices, A.storage, A.exact, P.indptr, P.indices, P.data,
+        *index, indptr, int(near.max(initial=0)), columns, out, P.rows, P.cols,
     )  # fmt: skip
     return BlockMatrix(indptr, columns, out, P.cols, P.cols)

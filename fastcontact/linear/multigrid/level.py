@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fastcontact._jit.parallel import spread
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
-from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.matrix import WORK_OF_BLOCK, WORK_OF_ROW, BlockMatrix
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
@@ -73,11 +74,20 @@ class Level:
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
         """Make a Chebyshev step: see `cycle_kernels.relax`."""
         kind = r.dtype.type
-        cycle_kernels.relax(self.inverse, r, kind(first), kind(second), self.d, self.x, self.A.rows, begin)
+        self.scale(r, kind(first), kind(second), self.d, self.x, begin)
         if self.free_motions is not None:
             self.free_motions.correct(r, second, self.d, self.x)
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
+
+    def scale(
+        self, r: AnyArray, first: np.floating, second: np.floating, d: AnyArray, x: AnyArray, begin: bool
+    ) -> None:
+        """Make the part of `relax` that scales by the inverse diagonal blocks, for other vectors `d` and `x`."""
+        rows = self.A.rows
+        spread(
+            cycle_kernels.relax, self.n // len(rows), WORK_OF_BLOCK, self.inverse, r, first, second, d, x, rows, begin
+        )
 
     def residual(self) -> None:
         """Fill `r` with ``b - A x``."""
@@ -92,7 +102,18 @@ class Level:
             self.springs.subtract_forces(x, r)
         if self.change is not None:
             numbers, indptr, indices, data = self.change
-            cycle_kernels.subtract_rows(numbers, indptr, indices, (data,), x, r, self.A.rows)
+            spread(
+                cycle_kernels.subtract_rows,
+                len(numbers),
+                WORK_OF_ROW,
+                numbers,
+                indptr,
+                indices,
+                (data,),
+                x,
+                r,
+                self.A.rows,
+            )
 
     def restrict(self, coarse: AnyArray) -> None:
         """Restrict the residual `r`, which is overwritten, to the right-hand side of the next coarser level."""

@@ -14,7 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact._jit.parallel import spread
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
+from fastcontact.linear.krylov.krylov_kernels import WORK_OF_NUMBER
 from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
 
 Storage = tuple[Numbers, Numbers, Numbers, int]
@@ -24,6 +26,10 @@ ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int
 # Number of parts of the rows of a symmetric matrix, and their smallest size: enough parts for many threads, and small
 # enough for their results to stay in the cache. More parts store more blocks twice.
 PARTS, SHORTEST = 32, 1024
+# Work of kernels for a row of blocks and for a single block, see `_jit.parallel.portions`.
+WORK_OF_ROW, WORK_OF_BLOCK = 20, 4
+# Numbers of rows and of single numbers that are stored in one thread where they may overwrite those of others.
+FEW_ROWS, FEW_NUMBERS = 256, 4096
 
 
 @dataclass(eq=False)
@@ -76,12 +82,15 @@ class BlockMatrix:
         kind = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
         if self.storage is not ALL:
-            symmetric_storage_kernels.multiply(
-                self.storage, numbers, x, kind(factor), kind(share), z, y, self.rows
+            length, n = self.storage[3], len(self.indptr) - 1
+            spread(
+                symmetric_storage_kernels.multiply, -(-n // length), WORK_OF_ROW * length, self.storage, numbers, x,
+                kind(factor), kind(share), z, y, self.rows,
             )  # fmt: skip
             return
-        cycle_kernels.multiply(
-            self.indptr, self.indices, numbers, x, kind(factor), kind(share), z, y, self.rows, self.cols
+        spread(
+            cycle_kernels.multiply, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, numbers, x, kind(factor),
+            kind(share), z, y, self.rows, self.cols,
         )  # fmt: skip
 
     def diagonal_blocks(self) -> Array:
@@ -100,9 +109,10 @@ class BlockMatrix:
     def row_sums(self, u: Array) -> Array:
         """Return ``|A| |u|``, shape (n,), of a square matrix, from its high part."""
         out = np.empty(len(u))
-        symmetric_storage_kernels.row_sums(
-            self.indptr, self.indices, self.storage, (self.data,), u, len(self.rows), out
-        )
+        spread(
+            symmetric_storage_kernels.row_sums, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, self.storage,
+            (self.data,), u, len(self.rows), out,
+        )  # fmt: skip
         return out
 
     def rows_of(self, dofs: Indices) -> csr_array:
@@ -121,7 +131,17 @@ class BlockMatrix:
         """Return a square matrix as SciPy's, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
-        symmetric_storage_kernels.expand(self.indptr, self.indices, self.storage, self.exact, size, data)
+        spread(
+            symmetric_storage_kernels.expand,
+            n,
+            WORK_OF_ROW,
+            self.indptr,
+            self.indices,
+            self.storage,
+            self.exact,
+            size,
+            data,
+        )
         return bsr_array((data.reshape(-1, size, size), self.indices, self.indptr), shape=2 * (n * size,))
 
 
@@ -238,21 +258,26 @@ def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
 
 def _keep_stored(indptr: Numbers, indices: Numbers, storage: Storage, numbers: AnyArray, square: int) -> None:
     """Move the stored blocks, of `square` numbers, to the beginning of the numbers of all blocks."""
-    start, widest = storage[0], int(np.diff(indptr).max(initial=0))
+    start, widest = storage[0], widest_row(indptr)
     end, n = 0, len(indptr) - 1
-    while end < n:  # rows whose stored blocks lie before unread ones: in parallel, otherwise one chunk
+    while end < n:  # rows whose stored blocks lie before unread ones: in parallel; otherwise few rows
         first = end
         behind = int(np.searchsorted(start, indptr[first], side="right")) - 1
-        end = max(behind, min(n, first + symmetric_storage_kernels.CHUNK))
-        symmetric_storage_kernels.store_rows(first, end, widest, indptr, indices, storage, numbers, square, numbers)
+        end = max(behind, min(n, first + FEW_ROWS))
+        work = WORK_OF_ROW if end == behind else 0
+        spread(
+            symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, numbers,
+            square, numbers,
+        )  # fmt: skip
 
 
 def _halve(unit: float, numbers: AnyArray, high: AnyArray) -> None:
     """Fill the high parts (n,) of ``unit numbers``; the low parts overwrite the first half of the numbers."""
     end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
     while end < n:
-        first, end = end, min(n, max(2 * end, end + split_matrix_kernels.CHUNK))
-        split_matrix_kernels.split(first, end, unit, numbers, high, low)
+        first, end = end, min(n, max(2 * end, end + FEW_NUMBERS))
+        work = WORK_OF_NUMBER if end <= 2 * first else 0
+        spread(split_matrix_kernels.split, end - first, work, first, unit, numbers, high, low)
 
 
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
@@ -263,12 +288,22 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     n = len(indptr) - 1
     length = max(SHORTEST, -(-n // PARTS))
     count = np.empty(n, np.int32)
-    symmetric_storage_kernels.count_stored(indptr, indices, length, count)
+    spread(symmetric_storage_kernels.count_stored, n, WORK_OF_ROW, indptr, indices, length, count)
     if count.min(initial=0) < 0:
         return ALL
-    start = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+    start = pointers(count)
     upper, columns = np.empty(n, np.int32), np.empty(start[-1], np.int32)
-    symmetric_storage_kernels.arrange(indptr, indices, start, upper, columns, length)
+    spread(symmetric_storage_kernels.arrange, n, WORK_OF_ROW, indptr, indices, start, upper, columns, length)
     storage = start, upper, columns, length
-    symmetric_storage_kernels.missing(indptr, indices, storage, count)
+    spread(symmetric_storage_kernels.missing, n, WORK_OF_ROW, indptr, indices, storage, count)
     return ALL if count.any() else storage
+
+
+def pointers(count: Numbers) -> Numbers:
+    """Return the row pointers (n + 1,) of rows with `count` (n,) entries."""
+    return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
+
+
+def widest_row(indptr: Numbers) -> int:
+    """Return the largest number of entries in a row."""
+    return int(np.diff(indptr).max(initial=0))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from fastcontact._jit.parallel import spread
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import restriction_kernels
-from fastcontact.linear.multigrid.matrix import PARTS, SHORTEST, BlockMatrix
+from fastcontact.linear.multigrid.matrix import PARTS, SHORTEST, WORK_OF_ROW, BlockMatrix
 
 
 class Restriction:
@@ -34,7 +35,10 @@ class Restriction:
 
     def multiply(self, x: AnyArray, y: AnyArray) -> None:
         """Fill `y` with ``P.T x``."""
-        P = self.P
-        restriction_kernels.multiply_transposed(
-            P.indptr, P.indices, P.data, self._ends, self._first, self._last, self._begin, x, self._work, y, P.rows, P.cols
+        P, parts = self.P, (self._first, self._last, self._begin)
+        n_parts, n = len(self._begin), len(y) // len(P.cols)
+        spread(
+            restriction_kernels.add_parts, n_parts, WORK_OF_ROW * (len(P.indptr) - 1) // n_parts, P.indptr, P.indices, P.data,
+            self._ends, *parts, x, self._work, P.rows, P.cols,
         )  # fmt: skip
+        spread(restriction_kernels.gather, n, n_parts, *parts, self._work, y, P.cols)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.round_off import ROUND_OFF
 
@@ -45,7 +44,7 @@ def largest_eigenvalue(level: Level) -> float:
     old_alpha, beta, rz = 1.0, 0.0, 0.0
     kind = r.dtype.type
     for step in range(min(LANCZOS_STEPS, level.n)):
-        cycle_kernels.relax(level.inverse, r, kind(0), kind(1), scratch, z, level.A.rows, True)
+        level.scale(r, kind(0), kind(1), scratch, z, True)
         if level.free_motions is not None:
             level.free_motions.correct(r, 1.0, scratch, z)
         if level.eliminated is not None:

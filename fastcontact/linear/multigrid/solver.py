@@ -12,18 +12,17 @@ import logging
 import numpy as np
 from scipy.sparse import bsr_array
 
-from fastcontact._jit.decorators import check_threads
 from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.delassus import InverseColumns
 from fastcontact.linear.elimination.elimination import Elimination
-from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import (
     ConjugateGradients,
     ConjugateResiduals,
     Iteration,
     Multiply,
     Precondition,
+    scaled,
 )
 from fastcontact.linear.multigrid.border import Border
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
@@ -109,7 +108,6 @@ class Multigrid:
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
-        check_threads()
         n = K.shape[0]
         self.K = ScaledMatrix(K, self.precision, release)
         self._modes = rigid_modes.astype(np.float32)  # for a second set-up: single precision suffices
@@ -144,7 +142,6 @@ class Multigrid:
         A hierarchy for the same pivots with nearly the same weights is kept: it preconditions equally well, since only the
         neighbourhood of the pivots matters. Coupled pivots have sparse weights there.
         """
-        check_threads()  # every solution begins here, including those of a child process forked after the set-up
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
             known = self._hierarchy_springs
@@ -358,9 +355,9 @@ class Multigrid:
 
     def _cycle(self, r: Array, norm: float, z: Array) -> None:
         top = self.hierarchy.levels[0]
-        krylov_kernels.scaled(1.0 / norm, r, top.b)
+        scaled(1.0 / norm, r, top.b)
         self.hierarchy.cycle()
-        krylov_kernels.scaled(norm * self.K.unit, top.x, z)
+        scaled(norm * self.K.unit, top.x, z)
 
     def multiplier(self, elimination: Elimination | None, u: Array, f: Array, springs: Springs | None = None) -> Array:
         """Return the multipliers (m,) of the equations at the displacement `u`."""

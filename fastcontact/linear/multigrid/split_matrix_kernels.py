@@ -6,24 +6,21 @@ split, (numbers,) where they are not.
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit.decorators import kernel, parallel_kernel
-from fastcontact.linear.krylov.krylov_kernels import CHUNK
+from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
 
 
-@parallel_kernel
-def split(first, end, factor, numbers, high, low):
-    """Fill the parts of ``factor`` times numbers `first` to ``end - 1``.
+@kernel
+def split(begin, end, shift, factor, numbers, high, low):
+    """Fill the parts of ``factor`` times numbers ``shift + begin`` to ``shift + end - 1``.
 
-    `low` may share memory with the beginning of `numbers` if ``end <= 2 first``, or if there is one chunk.
+    `low` may share memory with the beginning of `numbers`: a number is read before its memory is overwritten.
     """
-    for c in prange((end - first + CHUNK - 1) // CHUNK):
-        for k in range(first + c * CHUNK, min(end, first + (c + 1) * CHUNK)):
-            number = factor * numbers[k]
-            high[k] = number
-            low[k] = number - np.float64(high[k])
+    for k in range(shift + begin, shift + end):
+        number = factor * numbers[k]
+        high[k] = number
+        low[k] = number - np.float64(high[k])
 
 
 @kernel

@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
+from fastcontact._jit.parallel import spread
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.multigrid import symmetric_change_kernels
 from fastcontact.linear.multigrid.local_change import LocalChange
-from fastcontact.linear.multigrid.matrix import BlockMatrix
+from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointers
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
@@ -86,13 +87,17 @@ def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
     """Return ``rows @ P``."""
     size, n_coarse, count = len(P.rows), int(P.indices.max()) + 1, np.empty(rows.shape[0], np.int32)
     through = P.indptr, P.indices
-    symmetric_change_kernels.count_restricted(rows.indptr, rows.indices, *through, size, n_coarse, count)
-    low = _pointers(count)
-    nodes, numbers = np.empty(low[-1], np.int32), np.zeros(int(low[-1]) * len(P.cols))
-    symmetric_change_kernels.restrict(
-        rows.indptr, rows.indices, rows.data, *through, P.data, size, n_coarse, low, nodes, numbers, P.cols
-    )
-    return _Restricted(low, nodes, numbers)
+    spread(
+        symmetric_change_kernels.count_restricted, len(count), WORK_OF_ROW, rows.indptr, rows.indices, *through, size,
+        n_coarse, count,
+    )  # fmt: skip
+    into = pointers(count)
+    nodes, numbers = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * len(P.cols))
+    spread(
+        symmetric_change_kernels.restrict, len(count), WORK_OF_ROW, rows.indptr, rows.indices, rows.data, *through, P.data,
+        size, n_coarse, into, nodes, numbers, P.cols,
+    )  # fmt: skip
+    return _Restricted(into, nodes, numbers)
 
 
 def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
@@ -104,17 +109,14 @@ def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) ->
     by_column = csr_array((slots, row_of_node[E.nodes], E.indptr), shape=(len(E.indptr) - 1, k)).tocsc()
     rows, pattern = (by_column.indptr, by_column.indices), (H.indptr, row_of_node[H.nodes])
     count = np.empty(k, np.int32)
-    symmetric_change_kernels.count_products(*rows, *pattern, k, count)
-    into = _pointers(count)
+    spread(symmetric_change_kernels.count_products, k, WORK_OF_ROW, *rows, *pattern, k, count)
+    into = pointers(count)
     columns, blocks = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * size * size)
-    symmetric_change_kernels.products(
-        *rows, by_column.data, E.numbers, *pattern, H.numbers, k, into, columns, blocks, cols
-    )
+    spread(
+        symmetric_change_kernels.products, k, WORK_OF_ROW, *rows, by_column.data, E.numbers, *pattern, H.numbers, k, into,
+        columns, blocks, cols,
+    )  # fmt: skip
     half = bsr_array((blocks.reshape(-1, size, size), columns, into), shape=(k * size, k * size))
     total = bsr_array(half + half.T)
     total.sort_indices()
     return LocalChange(nodes, total)
-
-
-def _pointers(count: Numbers) -> Numbers:
-    return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)

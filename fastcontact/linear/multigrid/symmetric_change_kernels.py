@@ -2,15 +2,13 @@
 """Factors D and G of a symmetric update ``D.T G + G.T D``, restricted and multiplied.
 
 Sparse rows are given by ``indptr`` and ``indices``, in any order, and numbers. Restricted ones have a block of ``len(cols)``
-numbers for each coarse node. Every row of a result is computed by one thread in a fixed order.
+numbers for each coarse node. Kernels with `low` and `high` compute these rows of a result, each in a fixed order.
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit.decorators import kernel, parallel_kernel
+from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
-from fastcontact.linear.multigrid.symmetric_storage_kernels import CHUNK
 
 
 @kernel
@@ -35,81 +33,75 @@ def diagonal(indptr, indices, data, low, columns, values, slot, size, out):
             sums[columns[e]] = 0.0
 
 
-@parallel_kernel
-def count_restricted(indptr, indices, start, columns, size, n_coarse, count):
+@kernel
+def count_restricted(low, high, indptr, indices, start, columns, size, n_coarse, count):
     """Fill `count` (n_rows,) with the number of coarse nodes of rows restricted by the prolongator `start`, `columns`."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        seen = np.full(n_coarse, -1, np.int32)
-        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            n_columns = 0
-            for e in range(indptr[row], indptr[row + 1]):
-                i = indices[e] // size
-                for k in range(start[i], start[i + 1]):
-                    if seen[columns[k]] != row:
-                        seen[columns[k]] = row
-                        n_columns += 1
-            count[row] = n_columns
+    seen = np.full(n_coarse, -1, np.int32)
+    for row in range(low, high):
+        n_columns = 0
+        for e in range(indptr[row], indptr[row + 1]):
+            i = indices[e] // size
+            for k in range(start[i], start[i + 1]):
+                if seen[columns[k]] != row:
+                    seen[columns[k]] = row
+                    n_columns += 1
+        count[row] = n_columns
 
 
-@parallel_kernel
-def restrict(indptr, indices, data, start, columns, P, size, n_coarse, low, nodes, out, cols):
+@kernel
+def restrict(low, high, indptr, indices, data, start, columns, P, size, n_coarse, into, nodes, out, cols):
     """Fill the products of rows with a prolongator: coarse nodes `nodes` (n_blocks,) and their blocks `out`.
 
-    `low` (n_rows + 1,) are the row pointers of the result, `out` holds zeros.
+    `into` (n_rows + 1,) are the row pointers of the result, `out` holds zeros.
     """
-    n, width = indptr.shape[0] - 1, len(cols)
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
-        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            at = low[row]
-            for e in range(indptr[row], indptr[row + 1]):
-                i, a = indices[e] // size, indices[e] % size
-                for k in range(start[i], start[i + 1]):
-                    J = columns[k]
-                    if seen[J] != row:
-                        seen[J], column_slot[J], nodes[at] = row, at, J
-                        at += 1
-                    add_product(out, column_slot[J] * width, (data,), e, P, (k * size + a) * width, ((0,), (0,), cols))
+    width = len(cols)
+    seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+    for row in range(low, high):
+        at = into[row]
+        for e in range(indptr[row], indptr[row + 1]):
+            i, a = indices[e] // size, indices[e] % size
+            for k in range(start[i], start[i + 1]):
+                J = columns[k]
+                if seen[J] != row:
+                    seen[J], column_slot[J], nodes[at] = row, at, J
+                    at += 1
+                add_product(out, column_slot[J] * width, (data,), e, P, (k * size + a) * width, ((0,), (0,), cols))
 
 
-@parallel_kernel
-def count_products(start, origin, low, nodes, n_coarse, count):
+@kernel
+def count_products(low, high, start, origin, rows, nodes, n_coarse, count):
     """Fill `count` (n_rows,) with the number of blocks in each block row of `products`."""
-    n = start.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        seen = np.full(n_coarse, -1, np.int32)
-        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            number = 0
-            for e in range(start[row], start[row + 1]):
-                for k in range(low[origin[e]], low[origin[e] + 1]):
-                    if seen[nodes[k]] != row:
-                        seen[nodes[k]] = row
-                        number += 1
-            count[row] = number
+    seen = np.full(n_coarse, -1, np.int32)
+    for row in range(low, high):
+        number = 0
+        for e in range(start[row], start[row + 1]):
+            for k in range(rows[origin[e]], rows[origin[e] + 1]):
+                if seen[nodes[k]] != row:
+                    seen[nodes[k]] = row
+                    number += 1
+        count[row] = number
 
 
-@parallel_kernel
-def products(start, origin, slot, E, low, nodes, H, n_coarse, into, columns, out, cols):
+@kernel
+def products(low, high, start, origin, slot, E, rows, nodes, H, n_coarse, into, columns, out, cols):
     """Fill block rows of ``E.T H``: columns, ascending, and blocks.
 
     E is given by its block columns: `start` (n_rows + 1,), the row `origin` and the block `slot` of each entry; H by rows, as
-    `low`, `nodes` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` contains zeros.
+    `rows`, `nodes` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` contains zeros.
     """
-    n, width = start.shape[0] - 1, len(cols)
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
-        for row in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            at = into[row]
-            for e in range(start[row], start[row + 1]):
-                for k in range(low[origin[e]], low[origin[e] + 1]):
-                    if seen[nodes[k]] != row:
-                        seen[nodes[k]], columns[at] = row, nodes[k]
-                        at += 1
-            columns[into[row] : at].sort()
-            for k in range(into[row], at):
-                column_slot[columns[k]] = k
-            for e in range(start[row], start[row + 1]):
-                for k in range(low[origin[e]], low[origin[e] + 1]):
-                    to = column_slot[nodes[k]] * width * width
-                    add_transposed(out, to, (E,), slot[e] * width, H, k * width, (cols, (0,), cols))
+    width = len(cols)
+    seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)
+    for row in range(low, high):
+        at = into[row]
+        for e in range(start[row], start[row + 1]):
+            for k in range(rows[origin[e]], rows[origin[e] + 1]):
+                if seen[nodes[k]] != row:
+                    seen[nodes[k]], columns[at] = row, nodes[k]
+                    at += 1
+        columns[into[row] : at].sort()
+        for k in range(into[row], at):
+            column_slot[columns[k]] = k
+        for e in range(start[row], start[row + 1]):
+            for k in range(rows[origin[e]], rows[origin[e] + 1]):
+                to = column_slot[nodes[k]] * width * width
+                add_transposed(out, to, (E,), slot[e] * width, H, k * width, (cols, (0,), cols))

@@ -9,19 +9,13 @@ The storage is a tuple ``storage = (start, upper, columns, length)``: the stored
 ``start[i + 1] - 1``, `columns` their block columns, `length` is that of parts. Blocks between parts come first, then the
 diagonal block, then, from ``upper[i]`` on, those of the upper triangle; each group has ascending columns. With ``length =
 0`` every block of the pattern ``indptr``, ``indices`` is stored, in its order. Numbers come as a tuple, see
-`split_matrix_kernels`.
+`split_matrix_kernels`. Kernels with `low` and `high` process these rows.
 """
 
 import numpy as np
-from numba import prange
 
-from fastcontact._jit.decorators import innermost_kernel, kernel, parallel_kernel
+from fastcontact._jit.decorators import innermost_kernel, kernel
 from fastcontact.linear.multigrid.block_products import row_times, row_times_both_ways
-
-# Number of block rows processed by a thread at a time.
-CHUNK = 256
-# First row of a single part: for a literal 0, or an unsigned number, Numba would compile another copy of functions on parts.
-FIRST = np.int64(0)
 
 
 @innermost_kernel
@@ -72,59 +66,53 @@ def entry_of(numbers, slot, a, b, size):
     return np.float64(numbers[0][k])
 
 
-@parallel_kernel
-def count_stored(indptr, indices, length, count):
+@kernel
+def count_stored(low, high, indptr, indices, length, count):
     """Fill `count` (n_rows,) with the number of stored blocks of each row; -1 if it is not sorted or has no diagonal."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            low = i // length * length
-            n_stored, diagonal, ascending = 0, False, True
-            for k in range(indptr[i], indptr[i + 1]):
-                if indices[k] >= i or indices[k] < low:
-                    n_stored += 1
-                if indices[k] == i:
-                    diagonal = True
-                if k > indptr[i] and indices[k] <= indices[k - 1]:
-                    ascending = False
-            count[i] = n_stored if diagonal and ascending else -1
+    for i in range(low, high):
+        first = i // length * length
+        n_stored, diagonal, ascending = 0, False, True
+        for k in range(indptr[i], indptr[i + 1]):
+            if indices[k] >= i or indices[k] < first:
+                n_stored += 1
+            if indices[k] == i:
+                diagonal = True
+            if k > indptr[i] and indices[k] <= indices[k - 1]:
+                ascending = False
+        count[i] = n_stored if diagonal and ascending else -1
 
 
-@parallel_kernel
-def arrange(indptr, indices, start, upper, columns, length):
+@kernel
+def arrange(low, high, indptr, indices, start, upper, columns, length):
     """Fill `upper` (n_rows,) and `columns` of a storage; see the module."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            low = i // length * length
-            at, behind = start[i], 0
-            for k in range(indptr[i], indptr[i + 1]):
-                j = indices[k]
-                if j < low or j >= low + length:
-                    columns[at] = j
-                    at += 1
-                elif j > i:
-                    behind += 1
-            columns[at] = i
-            upper[i] = at + 1
-            at += 1
-            for k in range(indptr[i], indptr[i + 1]):
-                if i < indices[k] < low + length:
-                    columns[at] = indices[k]
-                    at += 1
+    for i in range(low, high):
+        first = i // length * length
+        at, behind = start[i], 0
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if j < first or j >= first + length:
+                columns[at] = j
+                at += 1
+            elif j > i:
+                behind += 1
+        columns[at] = i
+        upper[i] = at + 1
+        at += 1
+        for k in range(indptr[i], indptr[i + 1]):
+            if i < indices[k] < first + length:
+                columns[at] = indices[k]
+                at += 1
 
 
-@parallel_kernel
-def missing(indptr, indices, storage, counts):
+@kernel
+def missing(low, high, indptr, indices, storage, counts):
     """Fill `counts` (n_rows,) with the number of blocks of each row that are not stored."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            part, count = part_of(storage, i), 0
-            for k in range(indptr[i], indptr[i + 1]):
-                if place_of(storage, part, i, indices[k], k)[0] < 0:
-                    count += 1
-            counts[i] = count
+    for i in range(low, high):
+        part, count = part_of(storage, i), 0
+        for k in range(indptr[i], indptr[i + 1]):
+            if place_of(storage, part, i, indices[k], k)[0] < 0:
+                count += 1
+        counts[i] = count
 
 
 @kernel
@@ -141,47 +129,41 @@ def _store_row(i, indptr, indices, storage, numbers, square, row, out):
             out[at * square + e] = row[(k - begin) * square + e]
 
 
-@parallel_kernel
-def store_rows(first, end, widest, indptr, indices, storage, numbers, square, out):
-    """Fill the stored blocks of rows `first` to ``end - 1`` into `out`, from `numbers`, with `square` numbers per block.
+@kernel
+def store_rows(low, high, first, widest, indptr, indices, storage, numbers, square, out):
+    """Fill the stored blocks of rows from ``first + low`` on into `out`, from `numbers`, with `square` numbers per block.
 
-    Rows have up to `widest` blocks. `out` may be the beginning of `numbers` where ``start[end] <= indptr[first]``, or where
-    there is one chunk.
+    Rows have up to `widest` blocks. `out` may be the beginning of `numbers`: a row is read before its memory is overwritten.
     """
-    for c in prange((end - first + CHUNK - 1) // CHUNK):
-        row = np.empty(widest * square)
-        for i in range(first + c * CHUNK, min(end, first + (c + 1) * CHUNK)):
-            _store_row(i, indptr, indices, storage, numbers, square, row, out)
+    row = np.empty(widest * square)
+    for i in range(first + low, first + high):
+        _store_row(i, indptr, indices, storage, numbers, square, row, out)
 
 
-@parallel_kernel
-def expand(indptr, indices, storage, numbers, size, out):
+@kernel
+def expand(low, high, indptr, indices, storage, numbers, size, out):
     """Fill `out` (n_blocks * size * size,) with all blocks of the pattern, in double precision."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            part = part_of(storage, i)
-            for k in range(indptr[i], indptr[i + 1]):
-                slot = place_of(storage, part, i, indices[k], k)
-                for a in range(size):
-                    for b in range(size):
-                        out[(k * size + a) * size + b] = entry_of(numbers, slot, a, b, size)
-
-
-@parallel_kernel
-def row_sums(indptr, indices, storage, numbers, x, size, out):
-    """Fill `out` (n,) with ``|A| |x|``, which bounds the round-off of ``A x``."""
-    n = indptr.shape[0] - 1
-    for c in prange((n + CHUNK - 1) // CHUNK):
-        for i in range(c * CHUNK, min(n, (c + 1) * CHUNK)):
-            part = part_of(storage, i)
+    for i in range(low, high):
+        part = part_of(storage, i)
+        for k in range(indptr[i], indptr[i + 1]):
+            slot = place_of(storage, part, i, indices[k], k)
             for a in range(size):
-                out[i * size + a] = 0.0
-            for k in range(indptr[i], indptr[i + 1]):
-                slot = place_of(storage, part, i, indices[k], k)
-                for a in range(size):
-                    for b in range(size):
-                        out[i * size + a] += abs(entry_of(numbers, slot, a, b, size) * x[indices[k] * size + b])
+                for b in range(size):
+                    out[(k * size + a) * size + b] = entry_of(numbers, slot, a, b, size)
+
+
+@kernel
+def row_sums(low, high, indptr, indices, storage, numbers, x, size, out):
+    """Fill `out` (n,) with ``|A| |x|``, which bounds the round-off of ``A x``."""
+    for i in range(low, high):
+        part = part_of(storage, i)
+        for a in range(size):
+            out[i * size + a] = 0.0
+        for k in range(indptr[i], indptr[i + 1]):
+            slot = place_of(storage, part, i, indices[k], k)
+            for a in range(size):
+                for b in range(size):
+                    out[i * size + a] += abs(entry_of(numbers, slot, a, b, size) * x[indices[k] * size + b])
 
 
 @kernel
@@ -197,16 +179,12 @@ def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
             y[m * i + r] += factor * (of_row[r] + both[r])
 
 
-@parallel_kernel
-def multiply(storage, numbers, x, factor, share, z, y, rows):
-    """Fill `y` (n,) with ``share z + factor A x``; z and y may be the same array, x not.
+@kernel
+def multiply(low, high, storage, numbers, x, factor, share, z, y, rows):
+    """Fill parts `low` to ``high - 1`` of `y` (n,) with ``share z + factor A x``; z and y may be the same array, x not.
 
-    Threads process whole parts, so that every number of y is summed by one thread, in a fixed order.
+    Each part is processed by one thread, so that every number of y is summed in a fixed order.
     """
     n, length = y.shape[0] // len(rows), storage[3]
-    count = (n + length - 1) // length
-    if count == 1:
-        _multiply_part(FIRST, n, storage, numbers, x, factor, share, z, y, rows)
-        return
-    for p in prange(count):
+    for p in range(low, high):
         _multiply_part(p * length, min(n, (p + 1) * length), storage, numbers, x, factor, share, z, y, rows)

@@ -1,5 +1,7 @@
 """Work shared by threads: ranges cover everything, with the same bits for any number of threads."""
 
+import threading
+
 import numpy as np
 import pytest
 from models import elastic_model
@@ -75,14 +77,40 @@ def test_parts_work_on_equally_many_cells(threads, element):
 
 
 def test_little_work_is_not_shared():
-    assert parallel.portions(parallel.WORTHWHILE - 1) == [(0, parallel.WORTHWHILE - 1)]
+    little = parallel.WORTHWHILE // parallel.NODES
+    assert parallel.portions(little) == [(0, little)]
 
 
 def test_a_fifth_of_the_cells_is_worthwhile_with_five_times_the_nodes(monkeypatch):
     monkeypatch.setattr(_jit, "threads", lambda: 2)
-    enough = parallel.WORTHWHILE // 5
-    assert len(parallel.portions(enough - 1, 5 * parallel.NODES)) == 1
-    assert len(parallel.portions(enough, 5 * parallel.NODES)) == 2
+    little = parallel.WORTHWHILE // (5 * parallel.NODES)
+    assert len(parallel.portions(little, 5 * parallel.NODES)) == 1
+    assert len(parallel.portions(little + 1, 5 * parallel.NODES)) == 2
+
+
+def test_rows_are_spread_over_threads_and_an_error_in_one_of_them_is_raised(threads):
+    threads(3)
+    ranges, idents = [], set()
+
+    def rows(low, high, wrong):
+        ranges.append((low, high))
+        idents.add(threading.get_ident())
+        if low <= wrong < high:
+            raise ValueError(wrong)
+        barrier.wait(10.0)
+
+    barrier = threading.Barrier(3)
+    parallel.spread(rows, 10, 1, -1)
+    assert sorted(ranges) == [(0, 3), (3, 6), (6, 10)]
+    assert len(idents) == 3
+    barrier = threading.Barrier(2)
+    for wrong in (0, 9):
+        with pytest.raises(ValueError, match=str(wrong)):
+            parallel.spread(rows, 10, 1, wrong)
+    ranges.clear()
+    barrier = threading.Barrier(1)
+    parallel.spread(rows, 10, 0, -1)
+    assert ranges == [(0, 10)]
 
 
 @pytest.mark.parametrize("element", ["tri3", "tri6", "quad4", "quad8", "tet4", "tet10", "hex8", "hex20", "wedge6"])

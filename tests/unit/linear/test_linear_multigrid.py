@@ -4,23 +4,24 @@ import logging
 import tracemalloc
 from dataclasses import replace
 
-import numba
 import numpy as np
 import pytest
 from pairwise import first_of
 from scipy.sparse import bsr_array, csr_array, diags_array, eye_array
 
 import fastcontact as fc
+from fastcontact._jit import parallel
+from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.errors import ModelError
 from fastcontact.linear.elimination.elimination import eliminate
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.iterations import ConjugateGradients
-from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
+from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.coarse import Coarse
 from fastcontact.linear.multigrid.constrained_hierarchy import ConstrainedHierarchy
-from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, product
+from fastcontact.linear.multigrid.hierarchy import Hierarchy, by_columns, graph, product
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.smoother import chebyshev, largest_eigenvalue
 from fastcontact.linear.solvers.amg import Amg
@@ -92,11 +93,11 @@ def test_a_chebyshev_step_is_block_jacobi_with_memory(size):
     r, d, x = (rng.normal(size=n * size) for _ in range(3))
     step = np.einsum("nij,nj->ni", expected, r.reshape(n, size)).ravel()
     d1, x1 = d.copy(), x.copy()
-    cycle_kernels.relax(inverse, r, 0.3, 0.7, d1, x1, (0,) * size, False)
+    cycle_kernels.relax(0, n, inverse, r, 0.3, 0.7, d1, x1, (0,) * size, False)
     assert d1 == pytest.approx(0.3 * d + 0.7 * step, abs=1e-9)
     assert x1 == pytest.approx(x + d1, abs=1e-9)
     d2, x2 = np.full_like(d, np.nan), np.full_like(x, np.nan)
-    cycle_kernels.relax(inverse, r, 0.0, 0.7, d2, x2, (0,) * size, True)
+    cycle_kernels.relax(0, n, inverse, r, 0.0, 0.7, d2, x2, (0,) * size, True)
     assert x2 == pytest.approx(0.7 * step, abs=1e-9)
     assert np.array_equal(d2, x2)
 
@@ -136,11 +137,13 @@ def test_vector_kernels_are_those_of_numpy():
     for n in (5, 4096, 40_003):
         p, q, x, r = rng.normal(size=(4, n))
         sums = np.empty(-(-n // krylov_kernels.CHUNK))
-        assert krylov_kernels.dot(p, q, sums) == pytest.approx(p @ q, rel=1e-10, abs=1e-10 * n)
+        krylov_kernels.dot(0, len(sums), p, q, sums)
+        assert krylov_kernels.total(sums) == pytest.approx(p @ q, rel=1e-10, abs=1e-10 * n)
         x1, r1, p1, single = x.copy(), r.copy(), p.copy(), np.empty(n, np.float32)
-        assert krylov_kernels.advance(0.3, p, q, x1, r1, sums) == pytest.approx((r - 0.3 * q) @ (r - 0.3 * q))
-        krylov_kernels.turn(0.2, q, p1)
-        krylov_kernels.scaled(2.0, p, single)
+        krylov_kernels.advance(0, len(sums), 0.3, p, q, x1, r1, sums)
+        assert krylov_kernels.total(sums) == pytest.approx((r - 0.3 * q) @ (r - 0.3 * q))
+        krylov_kernels.turn(0, n, 0.2, q, p1)
+        krylov_kernels.scaled(0, n, 2.0, p, single)
         assert np.allclose(x1, x + 0.3 * p, rtol=0, atol=1e-14)
         assert np.allclose(p1, q + 0.2 * p, rtol=0, atol=1e-14)
         assert np.array_equal(single, (2.0 * p).astype(np.float32))
@@ -164,7 +167,7 @@ def test_the_graph_is_that_of_blocks_with_a_number():
     A.data[rng.random(len(A.data)) < 0.3] = 0.0
     A.data[::5, 0, :] = 0.0
     own = matrix_of(A)
-    start, near = galerkin_kernels.graph(own.indptr, own.indices, own.storage, own.data, 2)
+    start, near = graph(own)
     rows = np.repeat(np.arange(700), np.diff(A.indptr))
     there = (A.data != 0.0).any(axis=(1, 2)) & (A.indices != rows)
     np.testing.assert_array_equal(near, A.indices[there])
@@ -326,13 +329,13 @@ def test_springs_side_by_side_may_push_along_other_rows():
     assert Springs(R, one).beside(None).rows is R
 
 
-@pytest.mark.parametrize("rows", [5, 2000])  # one thread, and many
-def test_rows_subtracted_from_others(rows):
+def test_rows_subtracted_from_others():
+    rows = 200
     A, rng = random_blocks(3, 3, rows, 40)
     numbers, x, y = rng.permutation(rows).astype(np.int32), rng.normal(size=120), rng.normal(size=3 * rows)
     expected = y.reshape(-1, 3).copy()
     expected[numbers] -= (A @ x).reshape(-1, 3)
-    cycle_kernels.subtract_rows(numbers, A.indptr, A.indices, (A.data.ravel(),), x, y, (0, 0, 0))
+    cycle_kernels.subtract_rows(0, rows, numbers, A.indptr, A.indices, (A.data.ravel(),), x, y, (0, 0, 0))
     assert y == pytest.approx(expected.ravel())
 
 
@@ -391,16 +394,17 @@ def test_pyamg_finds_the_same_and_takes_as_many_iterations(equations):
     assert solver.counters.iterations <= oracle.counters.iterations + 3
 
 
-def test_bits_do_not_depend_on_the_number_of_threads():
+def test_bits_do_not_depend_on_the_number_of_threads(monkeypatch):
     found = []
-    before = numba.get_num_threads()
-    for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
-        numba.set_num_threads(threads)
+    before = threads()
+    monkeypatch.setattr(parallel, "WORTHWHILE", 1000)
+    for count in (1, 2, 3):
+        set_threads(count)
         solver, f, fixed = prepared()
         u, multiplier = solver.load(f).solve(contact_rows(fixed), np.full(6, 1e-3))
         found.append((u.tobytes(), multiplier.tobytes(), solver.counters.iterations))
-    numba.set_num_threads(before)
-    assert found[0] == found[1]
+    set_threads(before)
+    assert found[0] == found[1] == found[2]
 
 
 def test_going_on_under_other_equations_is_starting_there():

@@ -5,7 +5,7 @@ import pytest
 from pairwise import first_of
 from scipy.sparse import csr_array
 
-from fastcontact._jit import decorators
+from fastcontact._jit import decorators, parallel
 from fastcontact.linear.multigrid import restriction
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.restriction import Restriction
@@ -37,11 +37,12 @@ def prolongator(rows, columns, m, n, dtype, spread):
 )
 def test_products_are_those_of_the_transpose_on_any_number_of_threads(dtype, m, n, spread, monkeypatch):
     monkeypatch.setattr(restriction, "SHORTEST", 20)
+    monkeypatch.setattr(parallel, "WORTHWHILE", 100)
     P, dense = prolongator(500, 60, m, n, dtype, spread)
     R, x = Restriction(P), np.random.default_rng(0).normal(size=500 * m).astype(dtype)
     threads, found = decorators.threads(), []
     try:
-        for count in (1, threads):
+        for count in (1, 2):
             decorators.set_threads(count)
             found.append(np.full(60 * n, np.nan, dtype))
             R.multiply(x, found[-1])
