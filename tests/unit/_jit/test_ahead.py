@@ -69,7 +69,7 @@ def started(monkeypatch):
     found = []
     monkeypatch.setattr(ahead, "start", lambda runs, helpers: found.append((runs, helpers)) or [])
     monkeypatch.setattr(ahead, "MOST", 3)
-    monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 2)
+    monkeypatch.setattr(ahead.decorators, "threads", lambda: 2)
     monkeypatch.setattr(ahead.kernel_files, "files", {len: None})
     monkeypatch.setattr(compiling, "count", 0)
     monkeypatch.setattr(compiling, "helpers", [])
@@ -115,7 +115,7 @@ def test_no_help_where_python_may_run_all_that_is_not_kept(started, monkeypatch)
 @pytest.mark.parametrize("spoilt", ["one thread", "works for another", "not kept", "part of a program"])
 def test_no_help(started, monkeypatch, spoilt):
     if spoilt == "one thread":
-        monkeypatch.setattr(ahead.numba, "get_num_threads", lambda: 1)
+        monkeypatch.setattr(ahead.decorators, "threads", lambda: 1)
     elif spoilt == "works for another":
         monkeypatch.setattr(ahead.multiprocessing, "parent_process", object)
     elif spoilt == "not kept":
