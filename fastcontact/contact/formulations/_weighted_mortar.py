@@ -189,7 +189,7 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
-        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
+        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, closest=True)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
         own = self._own_normals(pairing, deformed, at.pose)
