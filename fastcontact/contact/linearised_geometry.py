@@ -179,13 +179,13 @@ class _SurfacePoints:
         [length]
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
-    along : ndarray (n, dim), optional
-        Fixed directions of the projection; None for the normals themselves, and closest points for facet normals.
+    closest : bool
+        Whether the points face their closest points, instead of those along the normals; for facet normals both are the same.
     """
 
     def __init__(
         self, candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface, coordinates: Array,
-        normals: object, along: Array | None,
+        normals: object, closest: bool,
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
@@ -194,25 +194,30 @@ class _SurfacePoints:
         self._spreading = [csr_array(matrix.T) for matrix in (self.motion, *self._slopes)]
         self.axes = self.slopes(coordinates)
         self.apart = self.motion @ coordinates
-        self.normal = pairing.normal[rows]
-        self.averaged: InterpolatedNormals | None = None
+        self.normal, self.averaged = pairing.normal[rows], None
+        self._bend = np.zeros_like(self.axes)
+        self._facet: Array | None = None  # facet normals, where these vary
+        if normals == "facet" or closest:
+            self._facet, bend = self.normal, self._facet_bend(primary, coordinates, facet, pairing.xi[rows], at)
         if normals == "facet":
-            self._bend = self._facet_normals(primary, coordinates, facet, pairing.xi[rows], at)
+            self._bend = bend
         elif isinstance(normals, str):
             self.averaged = InterpolatedNormals.smooth(primary, coordinates, facet, at)
             self.normal, self._bend = self.averaged.normal, self.averaged.bend(at.gradient)
         else:
-            self._bend = np.zeros_like(self.axes)
-        self._varies = isinstance(normals, str)
-        # The component along the direction d of the projection is left out of ``a_i dxi_i + g dn = dv``.
-        frame = np.stack(tangents(self.normal if along is None else along), axis=1)
-        self._gap = (
-            np.einsum("nd,nd->n", self.apart, self.normal)[:, None] if along is None else np.zeros((len(rows), 1))
+            self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
+        # The component along the direction d of the projection is left out of ``a_i dxi_i + g dd = dv``.
+        along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
+        frame = np.stack(tangents(along), axis=1)
+        self._closest, self._bent, self._gap = (
+            closest,
+            normals == "facet",
+            np.einsum("nd,nd->n", self.apart, along)[:, None],
         )
-        inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * self._bend))
+        inverse = np.linalg.inv(np.einsum("ntd,nid->nti", frame, self.axes + self._gap[:, :, None] * bend))
         self._inverse = inverse @ frame
 
-    def _facet_normals(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
+    def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Prepare the variation of facet normals; return their derivatives (n, dim - 1, dim) along the facet."""
         self._up = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
         second = _second_derivatives(primary, facet, xi)
@@ -223,19 +228,16 @@ class _SurfacePoints:
         """Return the derivatives (n, dim - 1, dim) along facets of nodal values (n_points, dim) at the facing points."""
         return np.stack([slope @ values for slope in self._slopes], axis=1)
 
-    def _turned_in_place(self, du: Array) -> Array:
-        """Return the variation of normals (n, dim) at fixed reference coordinates of the projections."""
-        if not self._varies:
-            return np.zeros_like(self.normal)
-        if self.averaged is not None:
-            return self.averaged.along(du)
-        leans = np.einsum("nid,nd->ni", self.slopes(du), self.normal)
-        return -np.einsum("nid,ni->nd", self._up, leans)
-
     def along(self, du: Array) -> Variation:
         """Return how projections and normals vary with displacements (n_points, dim) [length]."""
-        still, moved = self._turned_in_place(du), self.motion @ du
-        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * still)
+        moved, facets = self.motion @ du, np.zeros_like(self.normal)
+        if self._facet is not None:
+            leans = np.einsum("nid,nd->ni", self.slopes(du), self._facet)
+            facets = -np.einsum("nid,ni->nd", self._up, leans)
+        still = facets if self._bent else np.zeros_like(facets)
+        if self.averaged is not None:
+            still = self.averaged.along(du)
+        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * (facets if self._closest else still))
         foot = np.einsum("nid,ni->nd", self.axes, xi)
         return Variation(xi, foot, still + np.einsum("nid,ni->nd", self._bend, xi))
 
@@ -542,15 +544,15 @@ class WeightedForces:
 
 def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
-    normals: object, pose: Pose, along: Array | None = None,
+    normals: object, pose: Pose, closest: bool = False,
 ) -> Points:  # fmt: skip
     """Return the points `rows` (n,) of a `pairing` computed at `coordinates` (n_points, dim) [length].
 
-    The primary side is an obstacle in its `pose`, or has `normals` as in `pairing.pair`. Where points are projected along
-    other, fixed directions, these are `along` (n, dim).
+    The primary side is an obstacle in its `pose`, or has `normals` as in `pairing.pair`; with `closest`, it is paired with
+    facet normals instead.
     """
     if not isinstance(primary, RigidSide):
-        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, along)
+        return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest)
     return _ObstaclePoints(
         shapes_at(candidates.shape[rows], candidates.nodes[rows], len(coordinates)), primary, coordinates, pose
     )

@@ -352,10 +352,11 @@ class Formulation(ABC):
             total -= at.obstacle - at.obstacle_start
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
             turned = self.primary.turning(now, before, at.pose, at.pose_start)
-            if turned is not None:
-                none = np.zeros((1, now.shape[1]))
-                ends = (self.primary.turning(x, none, at.pose, at.pose_start) for x in (np.eye(now.shape[1]), none))
-                total, turning = total - turned, np.subtract(*ends)
+            if turned is not None:  # it is affine in the positions
+                ends = np.vstack([np.zeros(now.shape[1]), np.eye(now.shape[1])])
+                varied = self.primary.turning(ends, ends[:1], at.pose, at.pose_start)
+                assert varied is not None
+                total, turning = total - turned, varied[1:] - varied[0]
         return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
 
     def slips(

@@ -165,19 +165,15 @@ class WeightedMortar(Formulation):
     ) -> WeightedForces:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,).
-
-        Where the points of the segments are not known, Gauss points of whole facets replace them: the integrand is
+        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,). Where the points of the segments are not known, Gauss points of whole facets replace them: the integrand is
         continuous across the cuts.
         """
         deformed, acts = self.points + at.displacement, multiplier != 0.0
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
-            points, T = (
-                self._whole_facets(block) if overlap.points is None else overlap.points[number],
-                self._test[number],
-            )
-            facet, shape, area = (values[acts[block.local].any(axis=1)[points.facet]] for values in points)
+            inside = self._whole_facets(block) if overlap.points is None else overlap.points[number]
+            facet, shape, area = (values[acts[block.local].any(axis=1)[inside.facet]] for values in inside)
+            T = self._test[number]
             psi, _ = self._functions(T, mass, kept[block.local], self._fraction(number, covered))
             columns = first + np.arange(len(facet))[:, None]
             functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
@@ -189,7 +185,7 @@ class WeightedMortar(Formulation):
         pairing = pair(candidates.positions(deformed), self.primary, deformed, BEYOND, "facet", at.pose)
         rows, size = np.flatnonzero(pairing.paired), (len(multiplier), first)
         along = "facet" if self.normals == "secondary" else self.normals
-        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, pairing.normal[rows])
+        points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, closest=True)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
         own = self._own_normals(pairing, deformed, at.pose)
