@@ -51,8 +51,9 @@ class Forest:
     ----------
     mesh : Mesh
         Two-dimensional mesh of line2, tri3 and quad4 cells.
-    curves : iterable of Curve, optional
-        Exact shapes of the boundary: new points of facets on a curve are moved onto it.
+    curves : iterable of Circle, optional
+        Exact shapes of the boundary, or other objects with `group` and `project`: new points of facets on a curve are
+        moved onto it.
 
     Raises
     ------
@@ -65,7 +66,7 @@ class Forest:
     >>> from fastcontact import generate
     >>> forest = generate.Forest(generate.block(divisions=(2, 2)))
     >>> forest.refine(np.array([True, False, False, False]))
-    >>> mesh = forest.mesh()
+    >>> mesh, leaves = forest.mesh()
     """
 
     def __init__(self, mesh: Mesh, curves: Iterable[Curve] = ()) -> None:

@@ -51,13 +51,14 @@ def graded_block(
         Extent downward, `width` by default [length].
     contact_radius, contact_radius_y : float, optional
         Distances along x, and along y in three dimensions, up to which `contact_size` holds; width/10 and `contact_radius`
-        by default; half as deep. Choose them a little wider than the contact [length].
+        by default. Below the surface `contact_size` holds to half of this distance. Choose them a little wider than the
+        contact [length].
     contact_size : float, optional
         Edges at the contact, a tenth of the smaller radius by default [length].
     size : float, optional
         Longest edges far from the contact, width/4 by default [length].
     growth : float
-        Increase of the edges over the distance beyond, until they reach `size`.
+        Increase of the edge length per unit of distance outside this region, until it reaches `size`.
 
     Returns
     -------
@@ -185,7 +186,7 @@ def crowned_blocks(
     contact_size : float
         Smallest length of edges [length].
     growth : float
-        Ratio of the lengths of adjacent edges beyond, more than 1.
+        Ratio of the lengths of adjacent edges outside `contact_radius`, more than 1.
 
     Returns
     -------

@@ -58,14 +58,16 @@ def half_spheres(
     contact_radius : float, optional
         Triangles only: distance from the pole up to which `contact_size` holds, 0 by default [length].
     arc_sizes : (float, float), optional
-        Quadrangles only: segments of the arc at its pole and at D, in geometric progression between; R/250 and R/25 by
-        default. Both are reduced by a common factor so that the number of segments is an integer [length].
+        Quadrangles only: lengths of the segments of the arc at its pole C and at its end D, in geometric progression
+        between; R/250 and R/25 by default. Both are reduced by a common factor so that the number of segments is an
+        integer [length].
     segments : int, optional
-        Quadrangles only: segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and P-B;
-        15 by default.
+        Quadrangles only: number of segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and
+        P-B; 15 by default.
     radial_sizes : (float, float), optional
-        Quadrangles only: segments of the radial line M-C at the contact C and at M, in geometric progression
-        between; by default `segments` of them, graded as much as the arc [length].
+        Quadrangles only: lengths of the segments of the radial line M-C at its ends C (the contact) and M, in geometric
+        progression between. By default there are `segments` of them, and the lengths at C and M have the same ratio as
+        those of the arc [length].
 
     Returns
     -------

@@ -87,8 +87,8 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     ----------
     mesh : Mesh
         Cells of linear elements.
-    curves : iterable of Curve
-        Exact shapes of the boundary, for example `Circle`.
+    curves : iterable of Circle
+        Exact shapes of the boundary, or other objects with `group` and `project`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); 2D only.
 

@@ -78,8 +78,8 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     ----------
     mesh : Mesh
         Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
-    curves : iterable of Curve
-        Exact shapes of the boundary, for example `Circle`; see also `circles`.
+    curves : iterable of Circle
+        Exact shapes of the boundary, or other objects with `group` and `project`; see also `circles`.
 
     Returns
     -------

@@ -58,11 +58,11 @@ def sphere_on_block(
     contact_size : float, optional
         Edges at the contact, R/50 by default [length].
     contact_radius : float, optional
-        Distance from the pole up to which `contact_size` holds, R/10 by default; half as deep below the surfaces
-        [length].
+        Distance from the pole up to which `contact_size` holds, R/10 by default. Below the surfaces it holds to half of
+        this distance [length].
     growth : float
-        Increase of the edge length per distance beyond, until it reaches `size`. It limits the accuracy that a smaller
-        `contact_size` can reach.
+        Increase of the edge length per unit of distance outside this region, until it reaches `size`. It limits the
+        accuracy that a smaller `contact_size` can reach.
 
     Returns
     -------

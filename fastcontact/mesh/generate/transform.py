@@ -120,9 +120,10 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 
     Examples
     --------
-    >>> import math
     >>> from fastcontact import generate
-    >>> turned = generate.transformed(generate.block(), translate=(1.0, 0.0), rotate=math.pi / 2)
+    >>> turned = generate.transformed(generate.block(), translate=(1.0, 0.0), rotate=90.0)
+    >>> turned.points.min(axis=0).round(9).tolist()
+    [0.0, 0.0]
     """
     if not number("scale", scale) > 0.0:
         raise MeshError(f"scale = {scale:g} is out of range: it must be greater than 0 (reflect with mirrored)")
