@@ -102,9 +102,9 @@ class Deck:
             yield self.finished(step)
 
     def points_of(self, name: str) -> Numbers:
-        """Return the sorted point numbers (n,) of a node set, in upper or lower case; for sets of parts ``Instance.set``.
+        """Return the sorted point numbers (n,) of a node set. The case of `name` is ignored.
 
-        MeshError if there is no such set.
+        A set of a part is called ``Instance.set``. MeshError if there is no such set.
         """
         wanted = name.replace('"', "").strip().upper()
         for group in self.model.mesh.point_groups:
@@ -113,9 +113,10 @@ class Deck:
         return self.model.mesh.points_of(name)
 
     def point(self, number: int | str) -> int:
-        """Return the point number of a node: its number in the deck, or ``"Instance".number``.
+        """Return the point number of a node of the deck.
 
-        MeshError if there is no such node.
+        `number` is its number in the deck, in an instance of a part ``"Instance".number``. MeshError if there is no such
+        node.
         """
         assembly = self.building.assembly
         scope, rest = assembly.place_of(str(number))
