@@ -1,6 +1,7 @@
-"""Closest facets of a wavy surface or line, in units of as many nearest-point queries of SciPy's cKDTree, in random order.
+"""Search of the closest facets of a wavy surface or line for points in random order.
 
-The search includes the construction of its tree, the queries do not: the construction of the cKDTree is reported separately.
+The reference is the same number of nearest-point queries of SciPy's cKDTree. The search includes the construction of its
+tree, the reference does not: the construction of the cKDTree is reported separately.
 """
 
 import numpy as np
