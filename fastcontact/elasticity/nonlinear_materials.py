@@ -244,6 +244,8 @@ class Polynomial(OwnConstants):
 class MooneyRivlin(Polynomial):
     """Mooney-Rivlin hyperelasticity (Mooney, 1940; Rivlin, 1948): C10 (I1 - 3) + C01 (I2 - 3) + K (J - 1)^2 / 2.
 
+    I1 and I2 are the invariants of the isochoric stretches, J is the volume ratio.
+
     Parameters
     ----------
     C10, C01 : float
@@ -274,6 +276,8 @@ class MooneyRivlin(Polynomial):
 class Yeoh(Polynomial):
     """Yeoh hyperelasticity (Yeoh, 1993): C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + K (J - 1)^2 / 2.
 
+    I1 is the first invariant of the isochoric stretches, J is the volume ratio.
+
     Parameters
     ----------
     C10, C20, C30 : float
@@ -303,7 +307,9 @@ class Yeoh(Polynomial):
 @typed(ModelError)
 @dataclass(frozen=True)
 class Ogden(OwnConstants):
-    """Ogden hyperelasticity (Ogden, 1972): the sum of ``2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3)``, l isochoric.
+    """Ogden hyperelasticity (Ogden, 1972): the sum of ``2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3)``.
+
+    l1, l2 and l3 are the isochoric stretches. The volumetric energy is ``K (J - 1)^2 / 2`` with the volume ratio J.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class Limit:
 
 
 def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
-    """Fit limit and order of convergence, by the model in the header of the module.
+    """Fit limit and order of convergence, as described in docs/theory/convergence.md.
 
     Parameters
     ----------
