@@ -165,10 +165,9 @@ class WeightedMortar(Formulation):
     ) -> WeightedForces:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
-        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close
-        (m,). Where the points of the segments are not known, Gauss points of whole facets replace them: the integrand
-        is
-        continuous across the cuts.
+        `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,). Where
+        the points of the segments are not known, Gauss points of whole facets replace them: the integrand is continuous
+        across the cuts.
         """
         deformed, acts = self.points + at.displacement, multiplier != 0.0
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
