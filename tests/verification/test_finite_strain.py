@@ -7,6 +7,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 
 import fastcontact as fc
+from fastcontact.elasticity.nonlinear_bodies import NonlinearBodies
 from tests.verification.test_plasticity import bar
 
 pytestmark = pytest.mark.each_value
@@ -86,6 +87,56 @@ def test_a_bar(kinematics: str, element: str, law: str) -> None:
     moved = steps[-1].displacement[mesh.points_of("XMAX" if kinematics == "3d" else "RIGHT"), 0]
     if kinematics != "plane_stress":
         assert steps[-1].stress[:, axis] == pytest.approx(exact[-1] / (1.0 + moved.mean()) ** 2, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [("plane_stress", "quad4"), ("plane_stress", "tri6"), ("axisymmetric", "quad8"), ("3d", "hex8"), ("3d", "tet10")],
+)
+def test_a_bar_yields_to_twice_its_length(kinematics: str, element: str) -> None:
+    """Kirchhoff stress Y + H p, p = e - ln(J) / 3 - (Y + H p) / (3 G), J K (J - 1) = (Y + H p) / 3; work Y p + H p^2 / 2."""
+    law = fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (2.0, 21.0)])
+    ramp = [(0.0, 0.0), (1.0, 0.3), (2.0, 0.6), (3.0, 1.0)]
+    steps, nominal, _ = bar(kinematics, element, law, ramp, "finite")
+
+    def at(p: float) -> tuple[float, float]:
+        stress = 1.0 + 10.0 * p
+        return stress, 0.5 + np.sqrt(0.25 + stress / (3.0 * law.bulk_modulus))
+
+    def lacking(p: float, stretch: float) -> float:
+        stress, J = at(p)
+        return np.log(stretch) - np.log(J) / 3.0 - stress / (3.0 * law.shear_modulus) - p
+
+    # Iterations end at 1e-10 of the displacement; elastic stresses magnify that by E over the stress.
+    for (_, moved), step, found in zip(ramp[1:], steps, nominal, strict=True):
+        p = brentq(lacking, 0.0, 1.0, args=(1.0 + moved,), xtol=1e-15)
+        assert found == pytest.approx(at(p)[0] / (1.0 + moved), rel=1e-8)
+        assert step.cell_fields["plastic_strain"] == pytest.approx(p, rel=1e-8)
+        assert step.cell_fields["J"] == pytest.approx(at(p)[1], rel=1e-8)
+        assert step.cell_fields["yield_ratio"] == pytest.approx(1.0, rel=1e-8)
+        work = (p + 5.0 * p**2) * (np.pi if kinematics == "axisymmetric" else 1.0)
+        assert step.work["plastic_work"] == pytest.approx(work, rel=1e-8)
+
+
+def test_plastic_history_turns_with_the_body() -> None:
+    """A block that yields, turns and is deformed further has the stress of one that does not turn, turned."""
+    law = fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (2.0, 21.0)])
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (1, 1, 1), element="hex20")
+    model = fc.Model(mesh, "3d", strain="finite")
+    model.add_material(law)
+    bodies = NonlinearBodies(mesh, "3d", "finite", model.material_field())
+    rng = np.random.default_rng(0)
+    first, second = (np.eye(3) + 0.2 * rng.normal(size=(3, 3)) for _ in range(2))
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    yielded = bodies.at(mesh.points @ (first - np.eye(3)).T, bodies.beginning).history
+    further = second @ first
+    one, other = (bodies.at(mesh.points @ (F - np.eye(3)).T, yielded) for F in (further, turn @ further))
+    assert one.history["hex20"][..., 6].min() > yielded["hex20"][..., 6].max() > 0.1
+    np.testing.assert_allclose(other.history["hex20"], one.history["hex20"], rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(other.force, one.force @ turn.T, rtol=1e-9, atol=1e-10)
+    only_turned = bodies.at(mesh.points @ (turn @ first - np.eye(3)).T, yielded)
+    np.testing.assert_allclose(only_turned.history["hex20"], yielded["hex20"], rtol=1e-10, atol=1e-12)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -183,6 +234,7 @@ def test_rigid_rotation_by_90_degrees_leaves_no_stress() -> None:
 
 YIELDING = {
     "isotropic": fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.01, hardening=[(0.0, 0.01), (1.0, 0.05)]),
+    "isotropic, finite": fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.01, hardening=[(0.0, 0.01), (1.0, 0.05)]),
     "kinematic": fc.ElasticPlastic(E=1.0, nu=0.3, yield_stress=0.01, kinematic=0.05),
 }
 
@@ -194,13 +246,14 @@ def changes_of(step) -> list[float]:
 
 @pytest.mark.parametrize("law", [*LAWS, *YIELDING])
 def test_iterations_converge_quadratically(law: str) -> None:
-    finite = law in LAWS
+    finite = law in LAWS or "finite" in law
     model = fc.Model(
         fc.generate.block((1.0, 1.0), (4, 4), element="quad8"), "plane_strain", strain="finite" if finite else "small"
     )
-    model.add_material(LAWS[law][0] if finite else YIELDING[law])
+    model.add_material(LAWS[law][0] if law in LAWS else YIELDING[law])
     model.fix("BOTTOM", "xy")
-    scale = (0.3 if law == "Saint Venant-Kirchhoff" else 1.0) if finite else 0.1
+    scale = 1.0 if law in LAWS else 0.1
+    scale *= 0.3 if law == "Saint Venant-Kirchhoff" else 1.0
     model.prescribe("TOP", x=0.3 * scale, y=-0.2 * scale)
     changes = changes_of(fc.solve(model, 1)[-1])
     for before, after in zip(changes[-3:-1], changes[-2:], strict=True):
@@ -212,7 +265,7 @@ def test_iterations_converge_quadratically(law: str) -> None:
 @pytest.mark.parametrize("law", ["neo-Hookean", "Ogden", "isotropic"])
 def test_iterations_with_contact_converge_as_far_as_its_geometry_is_settled(law: str, friction: float | None) -> None:
     """Quadratically, but for the hundredth of the last change that contact geometry is left off by."""
-    finite = law in LAWS
+    finite = law in LAWS or "finite" in law
     mesh = fc.generate.block((4.0, 1.0), (24, 6), element="quad4", origin=(-2.0, 0.0))
     model = fc.Model(mesh, "plane_strain", strain="finite" if finite else "small")
     model.add_material(LAWS[law][0] if finite else YIELDING[law])

@@ -216,7 +216,7 @@ def read_deck(path: PathLike) -> Deck:
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM, but small strains are used, as with plasticity or couplings.
+        If a step has NLGEOM, but small strains are used, as with couplings.
 
     Examples
     --------

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import ldl
-from scipy.sparse import block_diag, bsr_array, csc_array
+from scipy.sparse import block_diag, bsr_array, csc_array, csr_array, diags_array, eye_array, kron
 
 from fastcontact.errors import ModelError
 from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation, triangular_kernels
@@ -136,6 +136,37 @@ def test_factors_are_those_of_the_matrix(A, m):
     np.testing.assert_allclose(A @ made.solve(np.ones(n)), np.ones(n), atol=1e-12)
     inverse = np.linalg.inv(A.toarray())[np.ix_(last, last)]
     np.testing.assert_allclose(made.last_inverse(), inverse, atol=1e-13)
+
+
+@pytest.mark.parametrize("m", [0, 30])
+def test_factors_reuse_what_has_not_changed(m):
+    """Matrices of a grid that change in places that grow, shrink and move have the factors of a new factorisation."""
+    n, rng = 24, np.random.default_rng(0)
+    line = diags_array([2.1, -1.0, -1.0], offsets=[0, 1, -1], shape=(n, n))
+    K = csr_array(kron(line, eye_array(n)) + kron(eye_array(n), line))
+    last = np.arange(m)
+    reusing = factorisation.SymbolicFactors(bsr_array(K, blocksize=(2, 2)), last)
+    reused = []
+    corners = [
+        slice(0, 0),
+        slice(0, 40),
+        slice(0, 40),
+        slice(0, 80),
+        slice(0, 60),
+        slice(300, 320),
+        slice(300, 320),
+        slice(0, 0),
+    ]
+    for corner in corners:
+        there = np.zeros(n * n)
+        there[corner] = rng.random(corner.stop - corner.start)
+        changed = bsr_array(csr_array(K + diags_array(there)), blocksize=(2, 2))
+        found = reusing.factors(changed)
+        reused.append(float(np.mean(reusing._kept.offsets >= 0)) if reusing._kept.entries.size else 0.0)
+        fresh = factorisation.SymbolicFactors(changed, last).factors(changed)
+        for a, b in zip((*found._L, found._d), (*fresh._L, fresh._d), strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert min(reused[2:]) > 0.0
 
 
 def test_factors_have_the_same_bits_again():

@@ -88,10 +88,10 @@ def test_nlgeom_is_finite_strain(tmp_path):
     assert 0.5 * ((1.0 + top) ** 2 - 1.0) * (1.0 + top) == pytest.approx(-0.1, rel=1e-6)
 
 
-def test_nlgeom_with_plasticity_warns_and_tells_the_strain_found(tmp_path):
-    plastic = WHOLE.replace("200000., 0.\n", "200000., 0.\n*Plastic\n5000., 0.\n")
+def test_nlgeom_with_kinematic_hardening_warns_and_tells_the_strain_found(tmp_path):
+    plastic = WHOLE.replace("200000., 0.\n", "200000., 0.\n*Plastic, hardening=kinematic\n5000., 0.\n6000., 1.\n")
     text = plastic.replace("*Step\n", "*Step, nlgeom=YES\n").replace("P, 100.", "P, 2000.")
-    with pytest.warns(fc.FastcontactWarning, match=r"deck\.inp, line 52, \*STEP: NLGEOM: with plasticity"):
+    with pytest.warns(fc.FastcontactWarning, match=r"deck\.inp, line 53, \*STEP: NLGEOM: with kinematic hardening"):
         deck = deck_of(tmp_path, text)
     with pytest.warns(fc.FastcontactWarning, match=r"equivalent strain up to 0\.00667"):  # 2/3 of 0.01 at nu = 0
         deck.solve()
