@@ -7,7 +7,8 @@ method accounts for the variation of the geometry: of the change v of the displa
 
 the last term is the response of the solution, with fixed active set, to the variation of forces and gaps with the geometry
 along v, see `contact.linearised_geometry`. It is a third of v or less, so that a few iterations of GMRES solve for v, each at
-the cost of a back substitution. Derivatives of frictional slips with respect to the geometry are not available.
+the cost of a back substitution. Slips and integrals over facets are linearised at the displacements S(u), the others at u;
+both differ by terms of second order.
 """
 
 from __future__ import annotations
@@ -45,7 +46,8 @@ def newton_step(
     accuracy : float
         Relative accuracy of the change that suffices.
     """
-    if solution.response is None or not (parts := _linearised(constraints, solution)):
+    displacement = step.problem.displacement(step.dofs.put(step.state.u.copy(), image))
+    if solution.response is None or not (parts := _linearised(constraints, solution, displacement)):
         return None
     try:
         respond = solution.response()
@@ -79,7 +81,9 @@ def newton_step(
     return mixed, responding / (size * largest(v) or 1.0)
 
 
-def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tuple[slice, Linearised]]:
+def _linearised(
+    constraints: StackedConstraints, solution: Solution, displacement: Array
+) -> list[tuple[slice, Linearised]]:
     """Return the linearised geometry of pairs in contact with the rows of each; empty if a pair has none."""
     parts = []
     for name, rows in constraints.rows().items():
@@ -91,5 +95,5 @@ def _linearised(constraints: StackedConstraints, solution: Solution) -> list[tup
             continue
         if part.geometry is None:
             return []
-        parts.append((rows, part.geometry(multiplier, tangential)))
+        parts.append((rows, part.geometry(multiplier, tangential, displacement)))
     return parts

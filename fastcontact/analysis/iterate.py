@@ -67,7 +67,7 @@ class Iterate:
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
     """Pair both sides of every contact pair on the deformed configuration, with `keep_pairing` on the undeformed one."""
-    displacement, u = problem.displacement(iterate.u), iterate.u
+    displacement, u = problem.displacement(iterate.u).copy(), iterate.u  # which later iterations overwrite
     if len(problem.force_driven):
         u = np.where(problem.system.fixed, load.lift, u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement

@@ -43,15 +43,16 @@ from fastcontact.round_off import DIFFERENCES, TINY
 
 
 class Linearised(Protocol):
-    """Contact forces, gaps and slips of one pair, linearised at its pairing and multipliers."""
+    """Contact forces, gaps and slips of one pair, linearised at its pairing, and at multipliers and displacements."""
 
     def along(self, du: Array) -> tuple[Array, Array]:
         """Return how nodal forces (n_points, dim) [force], gaps and slips (1 + k, m) [length] vary with displacements du."""
         ...
 
 
-# A function of the multipliers (m,) and the tangential forces (m, k) [force].
-Geometry = Callable[[Array, Array], Linearised]
+# A function of the multipliers (m,) and the tangential forces (m, k) [force], and of the displacements (n_points, dim) of
+# the solution [length].
+Geometry = Callable[[Array, Array, Array], Linearised]
 
 
 class NodalNormals:

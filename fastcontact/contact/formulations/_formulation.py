@@ -320,13 +320,14 @@ class Formulation(ABC):
             return None
         coordinates = self.points + at.displacement
 
-        def linearised(multiplier: Array, tangential: Array) -> PointForces:
+        def linearised(multiplier: Array, tangential: Array, displacement: Array) -> PointForces:
             rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
             forces = PointForces(points, rows, len(multiplier), multiplier[rows])
             if not directions:
                 return forces
-            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], at)
+            moved = replace(at, displacement=displacement)
+            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
             if not isinstance(self.primary, Surface) or self.slip != "symmetric":
                 return replace(forces, slips=slips)
             averaged, smooth = points.averaged, None

@@ -161,7 +161,7 @@ class WeightedMortar(Formulation):
 
     def _linearised(
         self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
-        multiplier: Array, tangential: Array, slipping: tuple[Array, csr_array, Array] | None = None,
+        multiplier: Array, tangential: Array, displacement: Array, slipping: tuple[Array, csr_array, Array] | None = None,
     ) -> WeightedForces:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
@@ -169,7 +169,8 @@ class WeightedMortar(Formulation):
         the points of the segments are not known, Gauss points of whole facets replace them: the integrand is continuous
         across the cuts.
         """
-        deformed, acts = self.points + at.displacement, multiplier != 0.0
+        at, acts = replace(at, displacement=displacement), multiplier != 0.0
+        deformed = self.points + displacement
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
             inside = self._whole_facets(block) if overlap.points is None else overlap.points[number]
