@@ -29,7 +29,7 @@ def free_body(law, kinematics, element):
     else:
         origin = (1.0, 0.0) if kinematics == "axisymmetric" else (0.0, 0.0)
         mesh, faces = fc.generate.block((1.0, 1.0), (2, 2), element, origin), {"LEFT": "x", "BOTTOM": "y"}
-    model = fc.Model(mesh, kinematics, strain=law.strain if isinstance(law, fc.ElasticPlastic) else "finite")
+    model = fc.Model(mesh, kinematics, strain="small" if isinstance(law, fc.ElasticPlastic) else "finite")
     model.add_material(law)
     for face, axis in list(faces.items())[kinematics == "axisymmetric" :]:
         model.fix(face, axis)

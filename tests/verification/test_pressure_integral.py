@@ -9,7 +9,7 @@ from pairwise import first_of
 from two_bodies import blocks, boxes, held, touching
 
 import fastcontact as fc
-from fastcontact.analysis import step_result
+from fastcontact.analysis import contact_result
 from fastcontact.contact.integration import nodal_areas
 from fastcontact.mesh.generate import box, half_spheres, renamed, union
 
@@ -32,14 +32,14 @@ RULES = 5e-5
 @pytest.fixture
 def carried(monkeypatch):
     """What is known beside the result: by pair, normal forces of the constraints [force] and nodal areas [area]."""
-    found, result = {}, step_result.contact_result
+    found, result = {}, contact_result.contact_result
 
     def watched(name, pair, part, solution, rows, *more):
         forces = part.normal_forces(solution.multiplier[rows])
         found[name] = forces, nodal_areas(pair.secondary, pair.points, pair.axisymmetric), pair.points
         return result(name, pair, part, solution, rows, *more)
 
-    monkeypatch.setattr(step_result, "contact_result", watched)
+    monkeypatch.setattr(contact_result, "contact_result", watched)
     return found
 
 
