@@ -42,7 +42,7 @@ def _remembered(name: str) -> Callable[..., None]:
 
 
 for _name in dir(fc.Model):
-    if _name in ("fix", "prescribe", "couple") or _name.startswith(("add_", "relate")) and _name != "related_points":
+    if _name in ("fix", "prescribe", "couple") or (_name.startswith(("add_", "relate")) and _name != "related_points"):
         setattr(SpokenModel, _name, _remembered(_name))
 
 
