@@ -31,9 +31,8 @@ def law(random: Random, kinds: range = range(6)) -> tuple[fc.ElasticPlastic | fc
     if kind == 0:
         hardening = [(0.0, 0.02 * mu), (0.05, 0.03 * mu)] if random.random() < 0.5 else []
         kinematic = 0.0 if hardening and random.random() < 0.5 else random.uniform(0.02, 0.2) * mu
-        return fc.ElasticPlastic(
-            3.0 * mu, 0.3, yield_stress=0.02 * mu, hardening=hardening, kinematic=kinematic
-        ), "small"
+        plastic = fc.ElasticPlastic(3.0 * mu, 0.3, yield_stress=0.02 * mu, hardening=hardening, kinematic=kinematic)
+        return plastic, "small" if kinematic else "finite"
     laws = [
         fc.NeoHookean(E=3.0 * mu, nu=float(random.choice([0.3, 0.45, 0.499]))),
         fc.MooneyRivlin(0.35 * mu, 0.15 * mu, bulk=bulk),
@@ -148,7 +147,8 @@ def figures(model: fc.Model, step: fc.StepResult) -> dict[str, float]:
     off = np.abs(of_bodies[:, 1:] if model.kinematics == "axisymmetric" else of_bodies).max()
     arms = model.mesh.points + (step.displacement if model.strain == "finite" else 0.0)
     moments = [np.abs(moment(arms[points], outer[points])).max() for points in bodies]
-    if model.strain == "finite":  # nodes, too; forces of plastic bodies depend on their history
+    if not any(isinstance(law, fc.ElasticPlastic) for law, _ in model.materials) and model.strain == "finite":
+        # Nodes, too: internal forces depend on the displacements alone.
         off = max(off, np.abs(model.internal_forces(step.displacement) - outer).max())
     turning = 0.0 if model.kinematics == "axisymmetric" else max(moments)
     work = step.work
