@@ -88,8 +88,8 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     ----------
     mesh : Mesh
         Mesh with cells of linear elements.
-    curves : iterable of Curve
-        Exact shapes of the boundary, for example `Circle`.
+    curves : iterable of Circle
+        Exact shapes of the boundary, or other objects with the attribute `group` and the method `project` of `Circle`.
     centre_nodes : bool
         Whether quadrangles get a centre node (quad9); only for 2D meshes.
 

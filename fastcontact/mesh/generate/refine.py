@@ -80,8 +80,9 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     ----------
     mesh : Mesh
         Two-dimensional mesh with cells of the types tri3, tri6, quad4, quad8, quad9, line2 and line3.
-    curves : iterable of Curve
-        Exact shapes of the boundary, for example `Circle`; see also `circles`.
+    curves : iterable of Circle
+        Exact shapes of the boundary, or other objects with the attribute `group` and the method `project` of `Circle`; see
+        also `circles`.
 
     Returns
     -------
