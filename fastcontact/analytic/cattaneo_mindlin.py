@@ -1,4 +1,4 @@
-"""Partial slip of Hertz contacts under a tangential force, and the block that slides as a whole."""
+"""Partial slip of Hertzian contacts under a tangential force, and full sliding of a block."""
 
 from __future__ import annotations
 
@@ -19,11 +19,12 @@ from fastcontact.errors import ModelError, warn
 
 @dataclass(frozen=True)
 class _PartialSlip:
-    """Common part of line and sphere: a tangential load up to a peak, possibly followed by unloading.
+    """Base class for line and point contact: a tangential load up to a peak, possibly followed by unloading.
 
-    After Mindlin and Deresiewicz (1953). The traction of a first load T is f times the pressure minus that of a smaller
-    contact, the stick zone, of the size a (1 - T/(f F))^p with p = `_POWER`. Unloading from a peak T* to T subtracts twice
-    the traction of a first load (T* - T)/2.
+    The theory is that of Mindlin and Deresiewicz (1953). Let F be the normal force, f the coefficient of friction and a the
+    contact radius. Under a first tangential load T the shear traction is f times the difference between the contact
+    pressure and the pressure of a smaller contact, the stick zone, whose radius is a (1 - T/(f F))^p with p = `_POWER`.
+    Unloading from a peak T* to T subtracts twice the traction of a first load (T* - T)/2.
     """
 
     friction: float
@@ -35,11 +36,14 @@ class _PartialSlip:
 
     @property
     def stick_radius(self) -> float:
-        """Radius or half-width of the zone that sticks (Cattaneo 1938; Mindlin 1949) [length]."""
+        """Radius, in line contact half-width, of the stick zone (Cattaneo 1938; Mindlin 1949) [length]."""
         return self._zone(self._reversal if self._reversal > 0.0 else self.tangential_force)
 
     def unloaded_to(self, tangential_force: float) -> Self:
-        """Return the contact after the tangential force went down to a value not below the opposite peak, or ModelError."""
+        """Return the contact after the tangential force has been reduced from its peak to `tangential_force`.
+
+        ModelError if the force is larger than the current force, or smaller than the negative peak.
+        """
         force = number("tangential_force", tangential_force)
         if not -self.tangential_force_peak <= force <= self.tangential_force:
             raise ModelError(
@@ -50,24 +54,28 @@ class _PartialSlip:
 
     @property
     def _reversal(self) -> float:
-        """First load (T* - T)/2, which counts twice on the way from the peak to the present force."""
+        """First load (T* - T)/2 whose traction is subtracted twice on unloading from the peak T* to the current force T."""
         return 0.5 * (self.tangential_force_peak - self.tangential_force)
 
     @property
     def _limit(self) -> float:
-        """Force at which the bodies slide."""
+        """Tangential force f F at which the bodies slide."""
         return self.friction * self.normal.force
 
     def _zone(self, load: float) -> float:
-        """Return the size of the stick zone for a first load."""
+        """Return the radius or half-width of the stick zone under a first load."""
         return self.normal.radius * max(1.0 - load / self._limit, 0.0) ** self._POWER
 
     def _present(self, of_first_load: Callable[[float], Any]) -> Any:
-        """Return a quantity at the present force from its function of a first load."""
+        """Return a quantity at the current force, given as a function of a first load."""
         return of_first_load(self.tangential_force_peak) - 2.0 * of_first_load(self._reversal)
 
     def _traction(self, name: str, position: ArrayLike) -> Array:
-        """Return f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] of the present force, each root where it is real."""
+        """Return the shear traction at the current force.
+
+        Under a first load it is f p0 [sqrt(1 - x^2/a^2) - (c/a) sqrt(1 - x^2/c^2)] with the stick radius c, where a root of
+        a negative number is replaced by zero.
+        """
         x2, a = array(name, position) ** 2, self.normal.radius
 
         def of_first_load(load: float) -> Array:
@@ -81,9 +89,9 @@ class _PartialSlip:
 class CattaneoMindlinLine(_PartialSlip):
     """Two cylinders under a normal and a tangential force per unit length (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(a). Fields are the coefficient of friction `friction`, the current
-    `tangential_force` and the largest one so far, `tangential_force_peak`, which are equal during loading
-    [force/length], and the normal contact `normal`, a `HertzLine`.
+    The formulas are those of Johnson (1985), section 7.2(a). The attribute `normal` is the normal contact, a `HertzLine`,
+    and `friction` the coefficient of friction. `tangential_force` is the current tangential force and
+    `tangential_force_peak` its largest value so far; they are equal during loading [force/length].
     """
 
     normal: HertzLine
@@ -95,20 +103,21 @@ class CattaneoMindlinLine(_PartialSlip):
         return self._traction("x", x)
 
     def slip(self, x: ArrayLike) -> Array:
-        """Return the slip (...) [length] of the surfaces on each other at `x` (...) [length], in the direction of the force.
+        """Return the relative tangential displacement (...) [length] of the surfaces at `x` (...) [length].
 
-        The integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone outward, for ``c <= |x| <= a``; zero
-        within the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2a).
+        For ``c <= |x| <= a`` it is the integral of f p0/a (2/E*) sqrt(x^2 - c^2) from the edge c of the stick zone to
+        ``|x|``; it is zero in the stick zone and outside the contact (from Johnson 1985, eq. 2.25 and section 7.2(a)).
         """
         return np.asarray(self._present(lambda load: self._slip(self._zone(load), x)))
 
     @property
     def slip_displacement(self) -> float:
-        """Tangential displacement of distant points beyond that of a contact that sticks throughout [length].
+        """Part of the tangential displacement of distant points that is due to slip [length].
 
-        While loading, f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F): the compliance of a strip that sticks over
-        ``|x| < c`` is -2/(pi E*) ln c and a constant of the far bodies (from Johnson 1985, eq. 2.25), integrated over the
-        force with c = a sqrt(1 - t). The elastic part, proportional to the force, depends on the supports of the far bodies.
+        During loading it is f F/(pi E*) [(1 - t) ln(1 - t) + t] with t = T/(f F). This is the integral over the tangential
+        force of the compliance of a strip that sticks for ``|x| < c = a sqrt(1 - t)``, which is -2/(pi E*) ln c up to a
+        constant (from Johnson 1985, eq. 2.25). The elastic part of the displacement is proportional to the force and depends
+        on the distant supports of the bodies; it is not included.
         """
         return float(self._present(self._beyond))
 
@@ -131,9 +140,10 @@ class CattaneoMindlinLine(_PartialSlip):
 class CattaneoMindlinSphere(_PartialSlip):
     """Two spheres under a normal and a tangential force (Cattaneo 1938; Mindlin 1949).
 
-    Formulas as in Johnson (1985), section 7.2(b) and 7.4(b). The direction of slip is taken along the force, which is exact
-    for nu = 0 and leaves an error of the order nu/(4 - 2 nu) otherwise. Fields as for `CattaneoMindlinLine`, but forces are
-    not per unit length [force], and `normal` is a `HertzPoint`.
+    The formulas are those of Johnson (1985), sections 7.2(b) and 7.4(b). They assume that the slip is parallel to the
+    force, which is exact for nu = 0 and otherwise causes a relative error of the order nu/(4 - 2 nu). The attribute
+    `normal` is the normal contact, a `HertzPoint`, and `friction` the coefficient of friction. `tangential_force` is the
+    current tangential force and `tangential_force_peak` its largest value so far [force].
     """
 
     normal: HertzPoint
@@ -147,16 +157,16 @@ class CattaneoMindlinSphere(_PartialSlip):
 
     @property
     def tangential_displacement(self) -> float:
-        """Tangential displacement of distant points (Mindlin 1949; Johnson 1985, section 7.2b) [length].
+        """Relative tangential displacement of distant points (Mindlin 1949; Johnson 1985, section 7.2(b)) [length].
 
-        While loading, 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
+        During loading it is 3 f F/(16 a G*) [1 - (1 - T/(f F))^(2/3)].
         """
         factor, a = 3.0 * self._limit / (16.0 * self.normal.radius * self.G_star), self.normal.radius
         return float(self._present(lambda load: factor * (1.0 - (self._zone(load) / a) ** 2)))
 
     @property
     def dissipation_per_cycle(self) -> float:
-        """Work lost in a cycle between +peak and -peak (Mindlin and Deresiewicz 1953) [force length]."""
+        """Frictional work of a cycle between the peak and the negative peak (Mindlin and Deresiewicz 1953) [force length]."""
         load = self.tangential_force_peak / self._limit
         rest = max(1.0 - load, 0.0)
         bracket = 1.0 - rest ** (5.0 / 3.0) - 5.0 * load / 6.0 * (1.0 + rest ** (2.0 / 3.0))
@@ -168,7 +178,10 @@ class CattaneoMindlinSphere(_PartialSlip):
 
 
 def _checked(normal: HertzLine | HertzPoint, friction: float, tangential_force: float) -> tuple[float, float]:
-    """Return coefficient and tangential force; warn if unlike materials couple it with the normal force."""
+    """Return the checked coefficient of friction and tangential force.
+
+    Warn if the bodies have different materials, which couple the normal and the tangential contact.
+    """
     f = positive("friction", friction)
     T = not_negative("tangential_force", tangential_force)
     limit = f * normal.force
@@ -196,21 +209,30 @@ def cattaneo_mindlin_line(
 ) -> CattaneoMindlinLine:
     """Return the partial slip of two parallel cylinders in plane strain (Cattaneo 1938; Mindlin 1949).
 
-    The normal force stays constant; the tangential force grows from zero. Different materials, for which the theory is
-    approximate, give a FastcontactWarning.
+    The normal force is constant, and the tangential force increases from zero.
 
     Parameters
     ----------
     E1, nu1, R1, E2, nu2, R2, force, radius, pressure_max : float
-        The normal contact, as for `hertz_line`.
+        Parameters of the normal contact, described for `hertz_line`.
     friction : float
-        Coulomb's coefficient f > 0.
+        Coulomb's coefficient of friction f > 0 [-].
     tangential_force : float
-        Per unit length, between 0 and f times the normal force, beyond which the bodies slide [force/length].
+        Tangential force per unit length, between 0 and f times the normal force, at which the bodies slide [force/length].
 
     Returns
     -------
     CattaneoMindlinLine
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the bodies have different materials, for which the theory is an approximation.
 
     Examples
     --------
@@ -243,20 +265,32 @@ def cattaneo_mindlin_sphere(
     radius: float | None = None,
     pressure_max: float | None = None,
 ) -> CattaneoMindlinSphere:
-    """Return the partial slip of two spheres (Cattaneo 1938; Mindlin 1949), as `cattaneo_mindlin_line`.
+    """Return the partial slip of two spheres (Cattaneo 1938; Mindlin 1949).
+
+    The normal force is constant, and the tangential force increases from zero.
 
     Parameters
     ----------
     E1, nu1, R1, E2, nu2, R2, force, approach, radius, pressure_max : float
-        The normal contact, as for `hertz_point`.
+        Parameters of the normal contact, described for `hertz_point`.
     friction : float
-        Coulomb's coefficient f > 0.
+        Coulomb's coefficient of friction f > 0 [-].
     tangential_force : float
-        Between 0 and f times the normal force, beyond which the bodies slide [force].
+        Tangential force, between 0 and f times the normal force, at which the bodies slide [force].
 
     Returns
     -------
     CattaneoMindlinSphere
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the bodies have different materials, for which the theory is an approximation.
 
     Examples
     --------
@@ -277,18 +311,21 @@ def cattaneo_mindlin_sphere(
 
 @dataclass(frozen=True)
 class BlockSliding:
-    """A block pressed on a plane by a uniform pressure while its top is moved sideways: stick, then slide.
+    """A block that is pressed on a plane by a uniform pressure and whose top is displaced tangentially.
 
-    The shear is uniform; the traction is the smaller of G gamma and f p (Coulomb's law).
+    The shear strain gamma is uniform. The shear traction is the smaller of G gamma, with the shear modulus G, and f p, with
+    the coefficient of friction f and the pressure p.
 
     Attributes
     ----------
-    shear_traction, slip : float
-        Traction on the interface [pressure], and sliding distance of the block on the plane [length].
+    shear_traction : float
+        Shear traction on the interface [pressure].
+    slip : float
+        Sliding distance of the block on the plane [length].
     sliding : bool
-        The friction limit is reached.
+        Whether the shear traction has reached f p.
     dissipation : float
-        Work of friction per area [force/length].
+        Frictional work per unit area [force/length].
     """
 
     shear_traction: float
@@ -300,14 +337,20 @@ class BlockSliding:
 def block_sliding(
     *, E: float, nu: float, height: float, pressure: float, friction: float, displacement: float
 ) -> BlockSliding:
-    """Return the state of a block in uniform pressure and shear whose top is moved sideways (Coulomb's law).
+    """Return the state of a block under uniform pressure whose top is displaced tangentially (Coulomb's law).
 
     Parameters
     ----------
-    E, nu, friction : float
-        Young's modulus [pressure] and Poisson's ratio [-], Coulomb's coefficient f >= 0 [-].
-    height, pressure, displacement : float
-        Height [length], uniform contact pressure [pressure] and sideways displacement of the top, >= 0 [length].
+    E, nu : float
+        Young's modulus [pressure] and Poisson's ratio [-] of the block.
+    height : float
+        Height of the block [length].
+    pressure : float
+        Uniform contact pressure [pressure].
+    friction : float
+        Coulomb's coefficient of friction, at least 0 [-].
+    displacement : float
+        Tangential displacement of the top, at least 0 [length].
 
     Returns
     -------
@@ -317,6 +360,8 @@ def block_sliding(
     --------
     >>> from fastcontact import analytic
     >>> block = analytic.block_sliding(E=1000.0, nu=0.0, height=1.0, pressure=2.0, friction=0.5, displacement=0.01)
+    >>> block.sliding, round(block.shear_traction, 9), round(block.slip, 9)
+    (True, 1.0, 0.008)
     """
     G = positive("E", E) / (2.0 * (1.0 + poisson("nu", nu)))
     H, shift = positive("height", height), not_negative("displacement", displacement)

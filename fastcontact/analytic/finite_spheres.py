@@ -1,7 +1,7 @@
-"""Two equal elastic half-spheres pressed together as finite bodies: mesh-converged reference values.
+"""Mesh-converged reference values for two equal elastic half-spheres that are pressed together.
 
-Hertz's theory takes each body for a half-space with a parabolic surface. Real half spheres differ from that
-by terms of the order a/R: at an approach of 8 % of the radius the force is 12.6 % above Hertz's.
+Hertz's theory regards each body as a half-space with a parabolic surface. For half-spheres of radius R the relative error of
+the theory is of the order a/R with the contact radius a: at an approach of 8 % of R the force is 12.6 % larger.
 """
 
 from __future__ import annotations
@@ -17,21 +17,27 @@ from fastcontact.analytic.hertz_point import HertzPoint, hertz_point
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-NU = 0.3  # the table was computed for this Poisson ratio only
+NU = 0.3  # Poisson's ratio for which the table was computed
 
 
 @dataclass(frozen=True)
 class FiniteHalfSpheres:
-    """Frictionless contact of two equal half spheres whose flat faces approach each other.
+    """Frictionless contact of two equal half-spheres whose flat faces approach each other.
 
     Attributes
     ----------
-    E, R : float
-        Young's modulus [pressure] and radius [length] of both; nu is 0.3.
-    approach, force : float
-        Approach of the two flat faces, which are free to move sideways [length]; force over the full circle [force].
-    pressure_max, radius : float
-        Pressure at the centre per reference area [pressure], contact radius on the reference geometry [length].
+    E : float
+        Young's modulus of both half-spheres; their Poisson's ratio is 0.3 [pressure].
+    R : float
+        Radius of both half-spheres [length].
+    approach : float
+        Approach of the two flat faces, on which radial displacements are free [length].
+    force : float
+        Normal force, integrated over the full circle [force].
+    pressure_max : float
+        Pressure at the centre per unit reference area [pressure].
+    radius : float
+        Contact radius in the reference configuration [length].
     """
 
     E: float
@@ -43,11 +49,11 @@ class FiniteHalfSpheres:
 
     @property
     def hertz(self) -> HertzPoint:
-        """Hertz's contact of the same spheres at the same approach; see also its `at_force`."""
+        """Hertzian contact of spheres of the same radius and material at the same approach."""
         return _hertz(self.E, self.R, self.approach)
 
     def at_approach(self, approach: float) -> FiniteHalfSpheres:
-        """Return the same spheres at another approach [length]."""
+        """Return the contact of the same half-spheres at another approach [length]."""
         return finite_half_spheres(approach, R=self.R, E=self.E)
 
 
@@ -56,7 +62,10 @@ def _hertz(E: float, R: float, approach: float) -> HertzPoint:
 
 
 def _table() -> Array:
-    """Return approach/R, force/(E R^2), pressure/E and radius/R, one row per approach; NaN where unknown."""
+    """Return the table with a row for each approach and the columns approach/R, force/(E R^2), pressure/E and radius/R.
+
+    Unknown values are NaN.
+    """
     text = resources.files("fastcontact.analytic").joinpath("finite_spheres.json").read_text(encoding="utf-8")
     data = json.loads(text)
     R, E = data["R"], data["E"]
@@ -64,11 +73,12 @@ def _table() -> Array:
 
 
 def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
-    """Return force, pressure and radius at approach/R = x, for E = R = 1.
+    """Return force, pressure and radius at approach/R = x for E = R = 1.
 
-    The interpolated quantities are smooth down to small loads: with s = sqrt(x), the ratios to Hertz at equal
-    approach behave as 1 + s (A + B ln s), so (ratio - 1)/s is taken against ln s; the radius over Hertz's at
-    equal force tends to 1, which gives one more point.
+    The interpolated quantities are smooth down to small loads. With s = sqrt(x), the ratios of force and pressure to those
+    of Hertz's theory at equal approach behave like 1 + s (A + B ln s); hence (ratio - 1)/s is interpolated as a function of
+    ln s. The ratio of the radius to that of Hertz's theory at equal force tends to 1 for small loads, which adds a point
+    to its table.
     """
     from scipy.interpolate import CubicSpline
 
@@ -87,24 +97,33 @@ def _interpolated(table: Array, x: float) -> tuple[float, float, float]:
 
 
 def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0, nu: float = NU) -> FiniteHalfSpheres:
-    """Return the contact of two equal half spheres as finite bodies.
+    """Return the contact of two equal half-spheres, which are modelled as finite bodies.
 
-    Interpolates the mesh-converged axisymmetric solution of a half sphere on a frictionless plane (linear elasticity on the
-    reference geometry, gap measured along the axis), computed independently twice with elements of degree 8 to 10 at three
-    approaches, and with degree 4 at 21 others. Leaving out any one row of the table and interpolating it from the others
-    changes force and pressure by less than 2e-5 and the radius by less than 4e-5, relatively; at approaches from 0.8 % to
-    8 % of the radius by less than 4e-6 and 1e-5. The rows themselves are good to about 3e-6.
+    The function interpolates in a table of mesh-converged axisymmetric solutions for a half-sphere on a frictionless plane,
+    with linear elasticity and gaps in the reference configuration, measured along the axis. Three rows of the table were
+    computed twice, independently, with elements of degree 8 to 10, and 21 rows with elements of degree 4. The relative
+    error of the rows is about 3e-6. If a row is interpolated from the others, force and pressure change by less than 2e-5
+    and the radius by less than 4e-5; at approaches from 0.8 % to 8 % of the radius, by less than 4e-6 and 1e-5.
 
     Parameters
     ----------
     approach : float
-        Of the two flat faces, between 4e-5 R and 0.08 R [length].
-    R, E, nu : float
-        Radius [length] and Young's modulus [pressure], by default those of FORMA04 in mm and MPa; nu is 0.3 [-].
+        Approach of the two flat faces, between 4e-5 R and 0.08 R [length].
+    R : float
+        Radius of both half-spheres [length].
+    E : float
+        Young's modulus of both half-spheres [pressure]. The default values of R and E are those of FORMA04 in mm and MPa.
+    nu : float
+        Poisson's ratio of both half-spheres, for which only 0.3 is available [-].
 
     Returns
     -------
     FiniteHalfSpheres
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Hertz contact of two bodies with different curvatures in two directions: an elliptical contact area."""
+"""Hertzian contact of two bodies with different curvatures in two directions, which has an elliptical contact area."""
 
 from __future__ import annotations
 
@@ -18,18 +18,24 @@ _FLATTEST = 1e-6  # ratio of the axes b/a below which the contact is regarded as
 
 @dataclass(frozen=True)
 class HertzElliptical:
-    """Frictionless contact with an elliptical area after Hertz (1881), see Johnson (1985), section 4.2(b).
+    """Frictionless contact with an elliptical contact area (Hertz 1881; Johnson 1985, section 4.2(b)).
 
     Attributes
     ----------
     bodies : Bodies
-        Elastic constants.
-    E_star, R_x, R_y : float
-        Contact modulus [pressure] and relative principal radii, 1/R_x = 1/R1x + 1/R2x [length].
-    radius_x, radius_y, approach : float
-        Semi-axes of the contact area along x and y, and approach of distant points of the two bodies [length].
-    force, pressure_max : float
-        Force [force] and pressure p0 at the centre [pressure].
+        Elastic constants of the two bodies.
+    E_star : float
+        Contact modulus [pressure].
+    R_x, R_y : float
+        Relative principal radii of curvature, with 1/R_x = 1/R1x + 1/R2x and 1/R_y = 1/R1y + 1/R2y [length].
+    radius_x, radius_y : float
+        Semi-axes of the contact area along x and y [length].
+    approach : float
+        Approach of distant points of the two bodies [length].
+    force : float
+        Normal force [force].
+    pressure_max : float
+        Pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies
@@ -44,7 +50,7 @@ class HertzElliptical:
 
     @property
     def radius(self) -> float:
-        """Radius of the circle with the area of the contact, sqrt(radius_x radius_y) [length]."""
+        """Radius sqrt(radius_x radius_y) of the circle whose area is equal to the contact area [length]."""
         return math.sqrt(self.radius_x * self.radius_y)
 
     def at_force(self, force: float) -> HertzElliptical:
@@ -56,7 +62,7 @@ class HertzElliptical:
         return _solve(self.bodies, self.R_x, self.R_y, *exactly_one(approach=approach))
 
     def pressure(self, x: ArrayLike, y: ArrayLike = 0.0) -> Array:
-        """Return the contact pressure (...) [pressure] at `x` (...) [length], `y` (...) [length], zero outside.
+        """Return the contact pressure (...) [pressure] at positions `x` (...) [length], `y` (...) [length], zero outside.
 
         Johnson (1985), eq. 3.58.
         """
@@ -65,9 +71,10 @@ class HertzElliptical:
 
 
 def _ratio_of_radii(ratio: float) -> float:
-    """Return R'/R'' >= 1 of an ellipse with ratio of axes b/a <= 1 (Johnson 1985, eq. 4.28).
+    """Return the ratio R'/R'' >= 1 of the relative radii for an ellipse with semi-axes b <= a (Johnson 1985, eq. 4.28).
 
-    Carlson's integral R_D replaces [(a/b)^2 E - K]/[K - E] of the textbooks, where both differences vanish near the circle.
+    `ratio` is b/a. Textbooks use [(a/b)^2 E - K]/[K - E] with complete elliptic integrals K and E, where both differences
+    cancel for nearly circular ellipses; Carlson's integral R_D avoids this cancellation.
     """
     from scipy.special import elliprd
 
@@ -75,7 +82,7 @@ def _ratio_of_radii(ratio: float) -> float:
 
 
 def _ratio_of_axes(ratio_of_radii: float) -> float:
-    """Return b/a <= 1 of the contact ellipse for R'/R'' >= 1."""
+    """Return the ratio b/a <= 1 of the semi-axes of the contact ellipse for a ratio R'/R'' >= 1 of the relative radii."""
     from scipy.optimize import brentq
 
     if ratio_of_radii == 1.0:
@@ -119,26 +126,30 @@ def hertz_elliptical(
     approach: float | None = None,
     pressure_max: float | None = None,
 ) -> HertzElliptical:
-    """Return the Hertz contact of two bodies with parallel principal curvatures (Johnson 1985, 4.24-4.31).
-
-    ModelError also if the bodies are straight in one direction: a line contact.
+    """Return the Hertzian contact of two bodies with parallel principal curvatures (Johnson 1985, eqs 4.24 to 4.31).
 
     Parameters
     ----------
     E1, nu1, E2, nu2
-        As for `hertz_point`.
+        Described for `hertz_point`.
     R1x, R1y, R2x, R2y : float
-        Principal radii of bodies 1 and 2 in the planes through x and y; infinity is straight [length].
+        Principal radii of curvature of bodies 1 and 2 in the planes through the normal and x or y [length]; infinity for a
+        straight section.
     force, approach, pressure_max : float
-        Exactly one of them: force [force], approach [length] or largest pressure [pressure].
+        Normal force [force], approach [length] or largest pressure [pressure]; give exactly one of them.
 
     Returns
     -------
     HertzElliptical
 
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or both bodies are straight in one direction, which is a line contact.
+
     Examples
     --------
-    Crossed cylinders of one radius touch as a sphere of that radius touches a plane:
+    Two crossed cylinders of equal radius have a circular contact area, like a sphere of this radius on a plane:
 
     >>> hertz = hertz_elliptical(E1=1e5, nu1=0.3, R1x=10.0, R1y=float("inf"), R2y=10.0, force=1e3)
     >>> hertz.radius_x == hertz.radius_y

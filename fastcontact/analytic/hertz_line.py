@@ -1,4 +1,4 @@
-"""Hertz contact of two parallel cylinders, or of a cylinder and a plane, per unit length."""
+"""Hertzian contact of two parallel cylinders, or of a cylinder and a plane, per unit length."""
 
 from __future__ import annotations
 
@@ -17,22 +17,29 @@ from fastcontact.arrays import Array
 
 @dataclass(frozen=True)
 class HertzLine:
-    """Frictionless contact of two parallel cylinders, formulas as in Johnson (1985), section 4.2(c).
+    """Frictionless contact of two parallel cylinders (Johnson 1985, section 4.2(c)).
 
-    Positions are x across the contact and y along the outward normal of the body: each body is the half-plane y <= 0,
-    and a point above it raises ModelError. Stress components are xx, yy, zz, xy, positive in tension; zz depends on
-    Poisson's ratio, which is that of the first body unless `nu` is given. There is no `approach`: in the plane it
-    depends on the shape and the supports of the bodies far from the contact.
+    Each body is regarded as the half-plane y <= 0, where x is tangential to the surface and y is the outward normal of the
+    body; ModelError if y > 0. Stress components are xx, yy, zz, xy, positive in tension. The component zz depends on
+    Poisson's ratio; the parameter `nu` of several methods is by default the Poisson's ratio of the first body. The solution
+    does not include the approach of the bodies, which in 2D depends on their shapes and supports far from the contact.
 
     Attributes
     ----------
     bodies : Bodies
-        Elastic constants.
+        Elastic constants of the two bodies.
     kinematics : {"plane_strain", "plane_stress"}
-    E_star, R_effective : float
-        Contact modulus [pressure] and relative radius, 1/R = 1/R1 + 1/R2 [length].
-    radius, force, pressure_max : float
-        Half-width b [length], force per unit length [force/length] and pressure p0 at the centre [pressure].
+        Kinematics of the two bodies.
+    E_star : float
+        Contact modulus [pressure].
+    R_effective : float
+        Relative radius of curvature R, with 1/R = 1/R1 + 1/R2 [length].
+    radius : float
+        Half-width b of the contact [length].
+    force : float
+        Normal force per unit length [force/length].
+    pressure_max : float
+        Pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies
@@ -53,7 +60,7 @@ class HertzLine:
         return _solve(self.bodies, self.kinematics, self.R_effective, *exactly_one(force=force))
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the contact pressure (...) [pressure] at `x` (...) [length], zero outside (Johnson 1985, eq. 4.44)."""
+        """Return the contact pressure (...) [pressure] at positions `x` (...) [length], zero outside (Johnson, eq. 4.44)."""
         inside = 1.0 - (array("x", x) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 
@@ -66,7 +73,7 @@ class HertzLine:
         return self.stress(np.zeros_like(places := array("depth", depth)), -places, nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
-        """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length]: xx = yy = -pressure."""
+        """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length], where xx = yy = -pressure."""
         return self.stress(x, np.zeros_like(array("x", x)), nu)
 
     def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
@@ -76,21 +83,22 @@ class HertzLine:
     def displacement(self, x: ArrayLike, y: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of body 1 or 2 at points `x` (...) [length], `y` (...) [length].
 
-        They are relative to the point (0, 0), since the displacement of a half-plane is unbounded at infinity, and
-        follow from the stresses of McEwen (1949) by integration. A rigid body raises ModelError.
+        They are relative to the displacement of the point (0, 0), because the displacement of a half-plane is unbounded at
+        infinity, and follow by integration from the stresses of McEwen (1949). ModelError for a rigid body.
         """
         E, nu = self.bodies.constants(body)
         return _half_plane.displacement(x, y, self.radius, self.pressure_max, E, nu, self.kinematics)
 
     def surface_displacement(self, x: ArrayLike, *, body: int = 1) -> Array:
-        """Return the displacements (..., 2) [length] of the surface at `x` (...) [length], measured from the point (0, 0)."""
+        """Return the displacements (..., 2) [length] of the surface at `x` (...) [length], relative to the point (0, 0)."""
         return self.displacement(x, np.zeros_like(array("x", x)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
-        """Return the largest equivalent stress on the axis and its depth.
+        """Return the largest equivalent stress on the axis x = 0 and its depth.
 
-        On the axis at depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), Johnson, eqs 4.46 give
-        von Mises = p0 (w - s) sqrt(3 s^2/w^2 + e^2): either at the surface, or where 3 s = 3 s^2 w + e^2 w^3.
+        At the depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), the von Mises stress is
+        p0 (w - s) sqrt(3 s^2/w^2 + e^2) by eqs 4.46 of Johnson (1985). Its maximum lies at the surface, or where
+        3 s = 3 s^2 w + e^2 w^3.
         """
         from scipy.optimize import brentq
 
@@ -131,20 +139,26 @@ def hertz_line(
     pressure_max: float | None = None,
     kinematics: str = "plane_strain",
 ) -> HertzLine:
-    """Return the Hertz contact of two parallel cylinders (Johnson 1985, eqs 4.43 to 4.45).
+    """Return the Hertzian contact of two parallel cylinders (Johnson 1985, eqs 4.43 to 4.45).
 
     Parameters
     ----------
     E1, nu1, R1, E2, nu2, R2 : float
-        As for `hertz_point`.
+        Described for `hertz_point`.
     force, radius, pressure_max : float
-        Exactly one of them: force per unit length [force/length], half-width [length] or largest pressure [pressure].
+        Normal force per unit length [force/length], half-width of the contact [length] or largest pressure [pressure]; give
+        exactly one of them.
     kinematics : {"plane_strain", "plane_stress"}
-        Plane stress is for thin discs.
+        Plane strain is for long cylinders, plane stress for thin discs.
 
     Returns
     -------
     HertzLine
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or not exactly one of `force`, `radius` and `pressure_max` is given.
 
     Examples
     --------

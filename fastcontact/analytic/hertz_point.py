@@ -1,4 +1,4 @@
-"""Hertz contact of two spheres, or of a sphere and a plane."""
+"""Hertzian contact of two spheres, or of a sphere and a plane."""
 
 from __future__ import annotations
 
@@ -17,22 +17,28 @@ from fastcontact.arrays import Array
 
 @dataclass(frozen=True)
 class HertzPoint:
-    """Frictionless contact of two spheres after Hertz (1881), see Johnson (1985), sections 3.4 and 4.2.
+    """Frictionless contact of two spheres (Hertz 1881; Johnson 1985, sections 3.4 and 4.2).
 
-    Positions are the distance r from the axis and the height z along the outward normal of the body: each body is the
-    half-space z <= 0, and a point above it raises ModelError. Stress components are rr, zz, hoop, rz, positive in
-    tension, with Poisson's ratio of the first body unless `nu` is given.
+    Each body is regarded as the half-space z <= 0, where r is the distance from the axis and z the coordinate along the
+    outward normal of the body; ModelError if z > 0. Stress components are rr, zz, hoop, rz, positive in tension. The
+    parameter `nu` of several methods is by default the Poisson's ratio of the first body.
 
     Attributes
     ----------
     bodies : Bodies
-        Elastic constants.
-    E_star, R_effective : float
-        Contact modulus [pressure] and relative radius, 1/R = 1/R1 + 1/R2 [length].
-    radius, approach : float
-        Contact radius a, and approach of distant points of the two bodies [length].
-    force, pressure_max : float
-        Force [force] and pressure p0 at the centre [pressure].
+        Elastic constants of the two bodies.
+    E_star : float
+        Contact modulus [pressure].
+    R_effective : float
+        Relative radius of curvature R, with 1/R = 1/R1 + 1/R2 [length].
+    radius : float
+        Contact radius a [length].
+    approach : float
+        Approach of distant points of the two bodies [length].
+    force : float
+        Normal force [force].
+    pressure_max : float
+        Pressure p0 at the centre [pressure].
     """
 
     bodies: Bodies
@@ -52,7 +58,7 @@ class HertzPoint:
         return _solve(self.bodies, self.R_effective, *exactly_one(approach=approach))
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return the contact pressure (...) [pressure] at `r` (...) [length], zero outside (Johnson 1985, eq. 3.39)."""
+        """Return the contact pressure (...) [pressure] at radii `r` (...) [length], zero outside (Johnson, eq. 3.39)."""
         inside = 1.0 - (array("r", r) / self.radius) ** 2
         return self.pressure_max * np.sqrt(np.maximum(inside, 0.0))
 
@@ -73,10 +79,10 @@ class HertzPoint:
         return von_mises(self.stress(r, z, nu))
 
     def displacement(self, r: ArrayLike, z: ArrayLike, *, body: int = 1) -> Array:
-        """Return the displacements (..., 2) [length] of body 1 or 2, radial and along z, zero at infinity.
+        """Return the displacements (..., 2) [length] of body 1 or 2 along r and z, which vanish at infinity.
 
-        At points `r` (...) [length], `z` (...) [length], from Boussinesq's potentials of the pressure (Johnson 1985, eqs 3.2
-        to 3.6). A rigid body raises ModelError.
+        They are evaluated at points `r` (...) [length], `z` (...) [length] from Boussinesq's potentials of the pressure
+        (Johnson 1985, eqs 3.2 to 3.6). ModelError for a rigid body.
         """
         return _half_space.displacement(r, z, self.radius, self.pressure_max, *self.bodies.constants(body))
 
@@ -87,8 +93,8 @@ class HertzPoint:
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
         """Return the largest equivalent stress on the axis and its depth.
 
-        The stationary point of ``|rr - zz|`` of Johnson (1985), eq. 3.45, to round-off. For nu >= -0.3 it is the
-        maximum in the whole body; for a smaller Poisson's ratio the stress at the edge of the contact is larger.
+        It is the stationary value of ``|rr - zz|`` in eq. 3.45 of Johnson (1985), computed to round-off. For nu >= -0.3 it
+        is the maximum in the entire body; for a smaller Poisson's ratio the stress at the edge of the contact is larger.
         """
         from scipy.optimize import brentq
 
@@ -129,22 +135,30 @@ def hertz_point(
     radius: float | None = None,
     pressure_max: float | None = None,
 ) -> HertzPoint:
-    """Return the Hertz contact of two spheres at a given load (Hertz 1881; Johnson 1985, eqs 4.22 to 4.24).
+    """Return the Hertzian contact of two spheres (Hertz 1881; Johnson 1985, eqs 4.22 to 4.24).
 
     Parameters
     ----------
-    E1, E2 : float
-        Young's moduli; `E2` None makes the second body rigid [pressure].
-    nu1, nu2 : float
-        Poisson ratios in (-1, 0.5].
-    R1, R2 : float
-        Radii, not both infinite; infinity is a plane [length].
+    E1, nu1 : float
+        Young's modulus [pressure] and Poisson's ratio, -1 < nu1 <= 0.5 [-], of body 1.
+    R1 : float
+        Radius of body 1 [length]; infinity for a plane. At most one of the two radii may be infinite.
+    E2, nu2 : float, optional
+        Young's modulus [pressure] and Poisson's ratio, -1 < nu2 <= 0.5 [-], of body 2, which is rigid without `E2`.
+    R2 : float
+        Radius of body 2 [length]; by default infinity, a plane.
     force, approach, radius, pressure_max : float
-        Exactly one of them: force [force], approach [length], contact radius [length] or largest pressure [pressure].
+        Normal force [force], approach [length], contact radius [length] or largest pressure [pressure]; give exactly one of
+        them.
 
     Returns
     -------
     HertzPoint
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or not exactly one quantity of the load is given.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Thick cylinders and hollow spheres under pressure, and press fits of two of them (Lamé 1852)."""
+"""Thick-walled cylinders and spheres under pressure, and press fits of two such bodies (Lamé 1852)."""
 
 from __future__ import annotations
 
@@ -14,21 +14,23 @@ from fastcontact.errors import ModelError
 
 @dataclass(frozen=True)
 class LameShell:
-    """A thick cylinder or a hollow sphere under pressure on its bore and its rim.
+    """A thick-walled cylinder or sphere under pressure on its inner and outer surfaces.
 
-    With m = 2 (cylinder) or 3 (sphere) the stresses are C - (m - 1) D/r^m radial and C + D/r^m hoop (Lamé 1852; Timoshenko
-    and Goodier 1970, articles 28 and 136). Radii outside the body raise ModelError.
+    With m = 2 for a cylinder and m = 3 for a sphere, the radial stress is C - (m - 1) D/r^m and the hoop stress
+    C + D/r^m, where the constants C and D follow from the pressures (Lamé 1852; Timoshenko and Goodier 1970, articles 28
+    and 136). ModelError if a radius lies outside the body.
 
     Attributes
     ----------
     inner_radius, outer_radius : float
-        Radius of the bore (0 if solid) and of the rim [length].
+        Radii of the inner surface (0 for a solid body) and of the outer surface [length].
     inner_pressure, outer_pressure : float
-        Pressures on them [pressure].
+        Pressures on the inner and on the outer surface [pressure].
     E, nu : float
         Young's modulus [pressure] and Poisson's ratio [-].
     kinematics : {"plane_strain", "plane_stress", "sphere"}
-        Plane stress is also for a cylinder with free ends.
+        Kinematics of a cylinder, or ``"sphere"``. The in-plane solution in plane stress also describes a long cylinder with
+        free ends.
     """
 
     inner_radius: float
@@ -54,7 +56,7 @@ class LameShell:
             raise ModelError("inner_pressure must be 0 for a solid body (inner_radius 0): there is no bore to press on")
 
     def displacement(self, r: ArrayLike) -> Array:
-        """Return the radial displacement (...) [length] at radii `r` (...) [length]: r times the hoop strain."""
+        """Return the radial displacement (...) [length] at radii `r` (...) [length], which is r times the hoop strain."""
         radii, _, uniform, varying = self._fields(r)
         bulk = {
             "plane_strain": (1.0 + self.nu) * (1.0 - 2.0 * self.nu),
@@ -74,10 +76,7 @@ class LameShell:
         return uniform + varying
 
     def axial_stress(self, r: ArrayLike) -> Array:
-        """Return the stress (...) [pressure] along the axis of a cylinder at radii `r` (...) [length].
-
-        A sphere has no axis and raises ModelError.
-        """
+        """Return the axial stress (...) [pressure] of a cylinder at radii `r` (...) [length]; ModelError for a sphere."""
         if self.kinematics == "sphere":
             raise ModelError("a sphere has no axial stress: ask for radial_stress or hoop_stress")
         radii, _, uniform, _ = self._fields(r)
@@ -85,9 +84,9 @@ class LameShell:
         return np.full(radii.shape, strength)
 
     def _fields(self, r: ArrayLike) -> tuple[Array, int, float, Array]:
-        """Return radii, m, C and D/r^m."""
+        """Return the radii, m, C and D/r^m of the formulas in the docstring of the class."""
         radii = array("r", r)
-        slack = 1e-9 * self.outer_radius  # mesh coordinates are rounded
+        slack = 1e-9 * self.outer_radius  # the coordinates of meshes are rounded
         wrong = (radii < self.inner_radius - slack) | (radii > self.outer_radius + slack)
         if wrong.any():
             raise ModelError(
@@ -113,12 +112,14 @@ def thick_cylinder(
     outer_pressure: float = 0.0,
     kinematics: str = "plane_strain",
 ) -> LameShell:
-    """Return a thick cylinder under pressure (Lamé 1852).
+    """Return a thick-walled cylinder under pressure (Lamé 1852).
 
     Parameters
     ----------
-    E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure, kinematics
-        As the attributes of `LameShell`; "plane_strain" or "plane_stress".
+    E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure
+        Described as attributes of `LameShell`.
+    kinematics : {"plane_strain", "plane_stress"}
+        Plane stress is for thin discs and for long cylinders with free ends.
 
     Returns
     -------
@@ -144,7 +145,16 @@ def thick_sphere(
     inner_pressure: float = 0.0,
     outer_pressure: float = 0.0,
 ) -> LameShell:
-    """Return a hollow sphere under pressure (Lamé 1852); parameters as for `thick_cylinder`.
+    """Return a thick-walled sphere under pressure (Lamé 1852).
+
+    Parameters
+    ----------
+    E, nu, inner_radius, outer_radius, inner_pressure, outer_pressure
+        Described as attributes of `LameShell`.
+
+    Returns
+    -------
+    LameShell
 
     Examples
     --------
@@ -158,16 +168,18 @@ def thick_sphere(
 
 @dataclass(frozen=True)
 class PressFit:
-    """Press fit of an inner body in an outer one.
+    """Press fit of an inner body in an outer body.
 
-    Radii are nominal: the interference is assumed to be small.
+    The interference is assumed to be small compared with the radii.
 
     Attributes
     ----------
-    interference, pressure : float
-        Radius of the inner body minus that of the hole, before fitting [length]; contact pressure [pressure].
+    interference : float
+        Radius of the inner body minus the radius of the hole, before assembly [length].
+    pressure : float
+        Contact pressure [pressure].
     inner, outer : LameShell
-        The two bodies, with their displacements and stresses.
+        The two bodies, with methods for their displacements and stresses.
     """
 
     interference: float
@@ -177,7 +189,7 @@ class PressFit:
 
     @property
     def interface_radius(self) -> float:
-        """Nominal radius of the contact [length]."""
+        """Nominal radius of the interface [length]."""
         return self.inner.outer_radius
 
 
@@ -198,13 +210,15 @@ def press_fit_cylinders(
     Parameters
     ----------
     E_inner, nu_inner, E_outer, nu_outer : float
-        Young's moduli [pressure] and Poisson's ratios [-].
-    inner_radius, interface_radius, outer_radius : float
-        Radii, increasing; `inner_radius` 0 is a solid shaft [length].
+        Young's moduli [pressure] and Poisson's ratios [-] of the inner and of the outer cylinder.
+    interface_radius, outer_radius : float
+        Radii of the interface and of the outer surface of the outer cylinder [length].
     interference : float
-        Radius of the shaft minus that of the hole [length].
+        Radius of the inner cylinder minus the radius of the hole, before assembly [length].
+    inner_radius : float
+        Radius of the bore of the inner cylinder; 0 for a solid shaft [length].
     kinematics : {"plane_strain", "plane_stress"}
-        Plane stress also holds for long cylinders with free ends.
+        Plane stress is for thin discs and for long cylinders with free ends.
 
     Returns
     -------
@@ -233,7 +247,16 @@ def press_fit_spheres(
     interference: float,
     inner_radius: float = 0.0,
 ) -> PressFit:
-    """Return the press fit of two concentric hollow spheres (Lamé 1852); parameters as for `press_fit_cylinders`.
+    """Return the press fit of two concentric spheres (Lamé 1852).
+
+    Parameters
+    ----------
+    E_inner, nu_inner, E_outer, nu_outer, interface_radius, outer_radius, interference, inner_radius : float
+        The corresponding quantities of spheres, described for `press_fit_cylinders`.
+
+    Returns
+    -------
+    PressFit
 
     Examples
     --------
@@ -253,13 +276,13 @@ def _pair(
     inner: tuple[float, float], outer: tuple[float, float], radii: tuple[float, float, float], interference: float,
     kinematics: str,
 ) -> PressFit:  # fmt: skip
-    """Return the press fit of an inner and an outer body, each given by E and nu."""
+    """Return the press fit of an inner and an outer body, each with (E, nu), whose radii are `radii` in ascending order."""
     for side, (E, nu) in (("inner", inner), ("outer", outer)):
         positive(f"E_{side}", E)
         poisson(f"nu_{side}", nu)
     a, b, c = radii
     positive("interface_radius", b)
-    # First for a unit pressure on the interface.
+    # Displacements are proportional to the pressure on the interface; they are first computed for a pressure of 1.
     shaft, hub = LameShell(a, b, 0.0, 1.0, *inner, kinematics), LameShell(b, c, 1.0, 0.0, *outer, kinematics)
     d = positive("interference", interference)
     pressure = d / float(hub.displacement(b) - shaft.displacement(b))

@@ -1,8 +1,8 @@
-"""Hertz in a box: a contact problem on a finite body whose exact solution is known, for convergence studies.
+"""A contact problem on a finite box whose exact solution is the Hertzian field, for convergence studies.
 
-The boundary of the box, apart from its top, is given the displacement that Hertz's pressure causes in the
-infinite body; a rigid parabola lies on the top. The solution in the box is then Hertz's field itself, with
-the limited regularity that contact really has and without any model error.
+A rigid parabola is in contact with the top of the box. On the other sides the displacement that the Hertzian pressure
+causes in the half-plane or half-space is prescribed. The solution in the box is then the Hertzian field. It has the limited
+regularity of contact problems, and there is no model error.
 """
 
 from __future__ import annotations
@@ -26,12 +26,14 @@ KINEMATICS = ("plane_strain", "plane_stress", "axisymmetric", "3d")
 class HertzBox:
     """Exact solution of a linear contact problem on the box 0 <= x <= width, -height <= y <= 0.
 
-    The problem: u_y <= obstacle(x) at the top, without friction, on the reference geometry; `displacement` prescribed on
-    the side x = width and at the bottom; u_x = 0 on x = 0 (in the full box ``|x| <= width``: prescribed on both sides).
-    In three dimensions z replaces y, and y is a second horizontal coordinate like x. The object is also the rigid
-    obstacle on top of the box (see `distance`), for a model with ``Criteria(geometry_updates=0)``. Choose a contact
-    radius that does not coincide with a mesh node, to avoid accidental superconvergence. Points above the top raise
-    ModelError.
+    The conditions of the problem are u_y <= obstacle(x) without friction at the top in the reference configuration,
+    `displacement` prescribed on the side x = width and at the bottom, and u_x = 0 on x = 0. For the full box
+    ``|x| <= width`` the displacement is prescribed on both sides instead. In 3D z replaces y, and y is a second horizontal
+    coordinate like x.
+
+    The object is also the rigid obstacle on top of the box (see `distance`), for a model that is solved with
+    ``Criteria(geometry_updates=0)``. Choose a contact radius that does not coincide with a node of the mesh, to avoid
+    accidental superconvergence. ModelError if a point lies above the top.
 
     Attributes
     ----------

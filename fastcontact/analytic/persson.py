@@ -1,4 +1,4 @@
-"""Pin in the hole of an infinite plate of the same material: a conforming contact (Persson 1964)."""
+"""Conforming contact of a pin and the hole of an infinite plate of the same material (Persson 1964)."""
 
 from __future__ import annotations
 
@@ -19,10 +19,14 @@ class PerssonPin:
 
     Attributes
     ----------
-    R, clearance : float
-        Radius of the hole, and that less the radius of the pin [length].
-    force, contact_angle : float
-        Force per unit length [force/length], and half the angle of the contact [degrees].
+    R : float
+        Radius of the hole [length].
+    clearance : float
+        Radius of the hole minus the radius of the pin [length].
+    force : float
+        Force on the pin per unit length [force/length].
+    contact_angle : float
+        Angle between the middle and the end of the contact, half of the angle of the arc [degrees].
     """
 
     R: float
@@ -32,18 +36,18 @@ class PerssonPin:
 
     @property
     def radius(self) -> float:
-        """Half the width of the contact, the chord of its arc [length]."""
+        """Half of the chord of the contact arc [length]."""
         return self.R * math.sin(math.radians(self.contact_angle))
 
     @property
     def pressure_max(self) -> float:
-        """Pressure at the middle [pressure]."""
+        """Largest pressure, at the middle of the contact [pressure]."""
         return float(self.pressure(0.0))
 
     def pressure(self, angle: ArrayLike) -> Array:
-        """Return the contact pressure (...) [pressure] at `angle` (...) [degrees] from the middle, zero outside.
+        """Return the contact pressure (...) [pressure] at angles `angle` (...) [degrees] from the middle, zero outside.
 
-        Persson (1964); Ciavarella and Decuzzi (2001), for like materials.
+        The formula is given by Persson (1964) and by Ciavarella and Decuzzi (2001) for bodies of equal materials.
         """
         b = _half_tangent(self.contact_angle)
         y = np.tan(0.5 * np.radians(array("angle", angle)))
@@ -58,7 +62,10 @@ def _half_tangent(angle: float) -> float:
 
 
 def _clearance_ratio(angle: float) -> float:
-    """Return E dR/Q of a contact angle (Persson 1964); its periodic integrand suits the trapezium rule."""
+    """Return E dR/Q for a contact angle, with the clearance dR and the force per unit length Q (Persson 1964).
+
+    The integrand is periodic, so that the trapezoidal rule converges exponentially.
+    """
     b = _half_tangent(angle)
     theta = (np.arange(256) + 0.5) * math.pi / 256 - 0.5 * math.pi
     integrand = 2.0 * np.arctanh(b * np.cos(theta) / math.hypot(1.0, b)) / (1.0 + (b * np.sin(theta)) ** 2)
@@ -68,6 +75,11 @@ def _clearance_ratio(angle: float) -> float:
 
 def persson_limit_angle() -> float:
     """Return half the contact angle of a pin without clearance, which does not depend on the force [degrees].
+
+    Returns
+    -------
+    float
+        Angle between the middle and the end of the contact [degrees].
 
     Examples
     --------
@@ -92,21 +104,27 @@ def persson_pin(
 ) -> PerssonPin:
     """Return the contact of a pin with the hole of an infinite plate of the same material (Persson 1964).
 
-    ModelError also if `contact_angle` exceeds the limit for a pin with clearance, or is given without clearance.
-
     Parameters
     ----------
     E, nu : float
         Young's modulus [pressure] and Poisson's ratio [-] of both bodies; in plane stress `nu` has no effect.
-    R, clearance : float
-        Radius of the hole, and that less the radius of the pin, >= 0 [length].
+    R : float
+        Radius of the hole [length].
+    clearance : float
+        Radius of the hole minus the radius of the pin, at least 0 [length].
     force, contact_angle : float
-        Exactly one of them: force per unit length [force/length], or half the contact angle [degrees].
+        Force per unit length [force/length], or half the contact angle [degrees]; give exactly one of them.
     kinematics : {"plane_stress", "plane_strain"}
+        Kinematics of both bodies.
 
     Returns
     -------
     PerssonPin
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or if `contact_angle` is given without clearance or exceeds `persson_limit_angle`.
 
     Examples
     --------
@@ -132,7 +150,7 @@ def persson_pin(
     if gap == 0.0:
         return PerssonPin(R, gap, value, limit)
     goal = modulus * gap / value
-    # The angle of Hertz's line contact bounds the root from below to within a small factor.
+    # The angle of the Hertzian line contact is a lower bound of the root up to a small factor.
     start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * goal))))
     angle = brentq(lambda e: math.log(max(_clearance_ratio(e), 1e-300) / goal), start, limit - 1e-12, xtol=1e-13)
     return PerssonPin(R, gap, value, float(angle))

@@ -1,4 +1,4 @@
-"""Pressure of a theory over the distance from the middle of the contact, along its surface."""
+"""Contact pressures of theories as functions of the distance from the middle of the contact, for plots."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastcontact.analytic.persson import PerssonPin
 from fastcontact.analytic.punches import PowerLawPunch
 from fastcontact.arrays import Array
 
-# Authors after whom the theories are named.
+# Names of the theories, after their authors.
 NAMES: dict[type, str] = {
     HertzPoint: "Hertz",
     HertzLine: "Hertz",
@@ -34,18 +34,18 @@ NAMES: dict[type, str] = {
 
 @dataclass(frozen=True)
 class PressureCurve:
-    """A pressure that can be drawn over the distance from the middle of the contact.
+    """A contact pressure as a function of the distance from the middle of the contact, which can be plotted.
 
     Attributes
     ----------
     name : str
-        Author after whom the theory is named.
+        Name of the theory.
     pressure : callable
-        From distances (...) [length] to pressures (...) [pressure].
+        Function from distances (...) [length] along the surface to pressures (...) [pressure].
     pressure_max : float
-        [pressure]
+        Largest pressure [pressure].
     radius : float
-        End of the pressure along the surface [length]; infinite for a uniform pressure.
+        Distance along the surface beyond which the pressure is zero [length]; infinite for a uniform pressure.
     """
 
     name: str
@@ -55,7 +55,7 @@ class PressureCurve:
 
 
 def pressure_curve(theory: Any) -> PressureCurve | None:
-    """Return the pressure of a theory as a curve; None where it has none, or it is infinite somewhere.
+    """Return the contact pressure of a theory as a curve; None if it has no pressure or the pressure is not bounded.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Rigid punches: on an elastic half-space flat, cone, paraboloid, any power; flat on a half-plane, and how far it sticks."""
+"""Contact of rigid punches: with flat or power-law profiles on a half-space, and flat on a half-plane, also with friction."""
 
 from __future__ import annotations
 
@@ -20,12 +20,16 @@ class FlatPunch:
 
     Attributes
     ----------
-    E_star, radius : float
-        E/(1 - nu^2) of the half-space [pressure], and radius of the punch [length].
-    approach, force : float
-        Indentation [length] and force [force].
+    E_star : float
+        Plane-strain modulus E/(1 - nu^2) of the half-space [pressure].
+    radius : float
+        Radius a of the punch [length].
+    approach : float
+        Indentation [length].
+    force : float
+        Normal force F [force].
     bonded : bool
-        The punch sticks to the half-space.
+        Whether the punch adheres to the half-space instead of being frictionless.
     """
 
     E_star: float
@@ -36,13 +40,14 @@ class FlatPunch:
 
     @property
     def stiffness(self) -> float:
-        """Force over indentation, a constant [force/length]."""
+        """Normal force divided by the indentation, which does not depend on the force [force/length]."""
         return self.force / self.approach
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return the pressure (...) [pressure] at `r` (...) [length], infinite at the edge, zero outside.
+        """Return the contact pressure (...) [pressure] at distances `r` (...) [length] from the axis.
 
-        F/(2 pi a sqrt(a^2 - r^2)) (Johnson 1985, eq. 3.34); a bonded punch has no such form and raises ModelError.
+        It is F/(2 pi a sqrt(a^2 - r^2)) under the punch, infinite at its edge and zero outside (Johnson 1985, eq. 3.34).
+        ModelError for a bonded punch, to which this formula does not apply.
         """
         self._frictionless("pressure")
         inside = self.radius**2 - array("r", r) ** 2
@@ -51,9 +56,9 @@ class FlatPunch:
         return np.where(inside < 0.0, 0.0, value)
 
     def normal_displacement(self, r: ArrayLike) -> Array:
-        """Return the displacement (...) [length] of the surface along its normal at `r` (...) [length], <= 0.
+        """Return the displacement (...) [length] of the surface along its outward normal at `r` (...) [length], at most 0.
 
-        Johnson (1985), eq. 3.38; a bonded punch has no such form and raises ModelError.
+        Johnson (1985), eq. 3.38. ModelError for a bonded punch, to which this formula does not apply.
         """
         self._frictionless("normal displacement")
         ratio = self.radius / np.maximum(np.abs(array("r", r)), self.radius)
@@ -66,16 +71,24 @@ class FlatPunch:
 
 @dataclass(frozen=True)
 class PowerLawPunch:
-    """Rigid punch of the profile A r^n on a half-space (Galin 1946; Sneddon 1965).
+    """Frictionless rigid punch with the profile A r^n on a half-space (Galin 1946; Sneddon 1965).
 
-    n = 1 is a cone, n = 2 a paraboloid; the flat punch is the limit of large n.
+    The punch is a cone for n = 1 and a paraboloid for n = 2; the flat punch is the limit for large n.
 
     Attributes
     ----------
-    E_star, coefficient, exponent : float
-        E/(1 - nu^2) of the half-space [pressure]; A [length^(1 - n)] and n of the profile.
-    radius, approach, force : float
-        Contact radius a [length], indentation of the tip [length] and force [force].
+    E_star : float
+        Plane-strain modulus E/(1 - nu^2) of the half-space [pressure].
+    coefficient : float
+        Coefficient A of the profile [length^(1 - n)].
+    exponent : float
+        Exponent n of the profile [-].
+    radius : float
+        Contact radius a [length].
+    approach : float
+        Indentation delta of the tip [length].
+    force : float
+        Normal force [force].
     """
 
     E_star: float
@@ -87,7 +100,7 @@ class PowerLawPunch:
 
     @property
     def pressure_max(self) -> float:
-        """Pressure at the tip; infinite for a cone [pressure]."""
+        """Largest contact pressure [pressure], infinite for a cone."""
         return float(self.pressure(0.0)) if self.exponent > 1.0 else math.inf
 
     def at_force(self, force: float) -> PowerLawPunch:
@@ -99,10 +112,11 @@ class PowerLawPunch:
         return _solve(self.E_star, self.coefficient, self.exponent, *exactly_one(approach=approach))
 
     def pressure(self, r: ArrayLike) -> Array:
-        """Return the contact pressure (...) [pressure] at distances `r` (...) [length], zero outside.
+        """Return the contact pressure (...) [pressure] at distances `r` (...) [length] from the axis, zero outside.
 
-        With k = delta/(A a^n), the integral E*/pi int_r^a k n A x^(n-1)/sqrt(x^2 - r^2) dx (Sneddon 1965, eq.
-        4.8) is E* k n A a^(n-2) sqrt(a^2 - r^2)/pi 2F1(1 - n/2, 1; 3/2; 1 - r^2/a^2).
+        With k = delta/(A a^n) it is the integral E*/pi int_r^a k n A x^(n-1)/sqrt(x^2 - r^2) dx (Sneddon 1965, eq. 4.8),
+        which is equal to E* k n A a^(n-2) sqrt(a^2 - r^2)/pi 2F1(1 - n/2, 1; 3/2; 1 - r^2/a^2) with the hypergeometric
+        function 2F1.
         """
         from scipy.special import hyp2f1
 
@@ -113,7 +127,10 @@ class PowerLawPunch:
         return scale * np.where((inside == 1.0) & (n <= 1.0), math.inf, shape)
 
     def normal_displacement(self, r: ArrayLike) -> Array:
-        """Return the displacement (...) [length] of the surface along its normal at `r` (...) [length], <= 0 (Sneddon)."""
+        """Return the displacement (...) [length] of the surface along its outward normal at `r` (...) [length], at most 0.
+
+        Sneddon (1965).
+        """
         from scipy.special import hyp2f1
 
         n, a = self.exponent, self.radius
@@ -142,14 +159,19 @@ def _modulus(E: float, nu: float) -> float:
 
 
 def bonded_stiffness_ratio(nu: float) -> float:
-    """Return the stiffness of a bonded flat punch relative to a frictionless one, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
+    """Return the ratio of the stiffnesses of a bonded and a frictionless flat punch, (1 - nu) ln(3 - 4 nu)/(1 - 2 nu).
 
-    Mossakovskii (1954); Spence (1968). The ratio is 1 for nu = 0.5.
+    The formula is due to Mossakovskii (1954) and Spence (1968). The ratio is 1 for nu = 0.5.
+
+    Parameters
+    ----------
+    nu : float
+        Poisson's ratio of the half-space [-].
 
     Examples
     --------
     >>> from fastcontact import analytic
-    >>> round(analytic.bonded_stiffness_ratio(0.5), 9)  # incompressible: no difference
+    >>> round(analytic.bonded_stiffness_ratio(0.5), 9)  # friction has no effect on an incompressible half-space
     1.0
     """
     compressibility = 1.0 - 2.0 * poisson("nu", nu)
@@ -171,16 +193,23 @@ def flat_punch(
 
     Parameters
     ----------
-    E, nu, radius : float
-        Young's modulus [pressure] and Poisson's ratio [-] of the half-space, radius of the punch [length].
+    E, nu : float
+        Young's modulus [pressure] and Poisson's ratio [-] of the half-space.
+    radius : float
+        Radius a of the punch [length].
     force, approach : float
-        Exactly one of them: force [force] or indentation [length].
+        Normal force F [force] or indentation delta [length]; give exactly one of them.
     bonded : bool
-        The punch sticks; the force is larger by `bonded_stiffness_ratio`.
+        Whether the punch adheres to the half-space, which increases the stiffness by the factor `bonded_stiffness_ratio`.
 
     Returns
     -------
     FlatPunch
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or not exactly one of `force` and `approach` is given.
 
     Examples
     --------
@@ -207,20 +236,27 @@ def power_law_punch(
     approach: float | None = None,
     radius: float | None = None,
 ) -> PowerLawPunch:
-    """Return the contact of a rigid punch A r^n with a half-space (Galin 1946; Sneddon 1965).
+    """Return the frictionless contact of a rigid punch of profile A r^n with a half-space (Galin 1946; Sneddon 1965).
 
     Parameters
     ----------
     E, nu : float
         Young's modulus [pressure] and Poisson's ratio [-] of the half-space.
-    coefficient, exponent : float
-        A > 0 [length^(1 - n)] and n > 0.
+    coefficient : float
+        Coefficient A > 0 of the profile [length^(1 - n)].
+    exponent : float
+        Exponent n > 0 of the profile [-].
     force, approach, radius : float
-        Exactly one of them: force [force], indentation [length] or contact radius [length].
+        Normal force [force], indentation [length] or contact radius [length]; give exactly one of them.
 
     Returns
     -------
     PowerLawPunch
+
+    Raises
+    ------
+    ModelError
+        If a number is out of range, or not exactly one of `force`, `approach` and `radius` is given.
 
     Examples
     --------
@@ -246,12 +282,12 @@ def cone_punch(
     Parameters
     ----------
     E, nu, force, approach, radius : float
-        As for `power_law_punch`.
+        Described for `power_law_punch`.
     slope_angle : float, optional
-        Angle between the side of the cone and the surface, above 0 and below 90 [degrees]; the formula holds for small
-        angles.
+        Angle between the side of the cone and the surface, greater than 0 and less than 90 [degrees]. The solution is
+        valid for small angles.
     slope : float, optional
-        Tangent of this angle, instead of `slope_angle`, as in `obstacles.cone` [-].
+        Tangent of this angle, which can be given instead of `slope_angle` [-].
 
     Returns
     -------
@@ -279,14 +315,14 @@ def paraboloid_punch(
     approach: float | None = None,
     radius: float | None = None,
 ) -> PowerLawPunch:
-    """Return the contact of a rigid paraboloid r^2/(2 R) with a half-space: Hertz's (Sneddon 1965).
+    """Return the contact of a rigid paraboloid of profile r^2/(2 R) with a half-space, which is Hertz's (Sneddon 1965).
 
     Parameters
     ----------
     E, nu, force, approach, radius : float
-        As for `power_law_punch`.
+        Described for `power_law_punch`.
     R : float
-        Radius of curvature [length].
+        Radius of curvature at the tip [length].
 
     Returns
     -------
@@ -311,10 +347,14 @@ class FlatPunch2D:
 
     Attributes
     ----------
-    nu, half_width, force : float
-        Poisson ratio of the half-plane [-], half-width a of the punch [length], force per unit length [force/length].
+    nu : float
+        Poisson's ratio of the half-plane [-].
+    half_width : float
+        Half-width a of the punch [length].
+    force : float
+        Normal force per unit length [force/length].
     bonded : bool
-        The punch sticks to the half-plane.
+        Whether the punch adheres to the half-plane instead of being frictionless.
     """
 
     nu: float
@@ -328,24 +368,25 @@ class FlatPunch2D:
         return self.half_width
 
     def pressure(self, x: ArrayLike) -> Array:
-        """Return the pressure (...) [pressure] at `x` (...) [length], infinite at the edges, zero outside.
+        """Return the contact pressure (...) [pressure] at positions `x` (...) [length] from the centre of the punch.
 
-        Johnson (1985), eqs 2.64 and 2.69. Under a bonded punch it oscillates at the edge, with increasing frequency.
+        It is infinite at the edges and zero outside (Johnson 1985, eqs 2.64 and 2.69). Under a bonded punch it oscillates
+        with increasing frequency towards the edges.
         """
         amplitude, phase = self._polar(x)
         return amplitude * np.cos(phase)
 
     def shear(self, x: ArrayLike) -> Array:
-        """Return the shear traction (...) [pressure] along x on the half-plane at `x` (...) [length] (Johnson, eq. 2.69).
+        """Return the shear traction (...) [pressure] along x on the half-plane at positions `x` (...) [length].
 
-        It acts outward on the surface; it is zero unless the punch is bonded.
+        It is directed outwards, and zero unless the punch is bonded (Johnson 1985, eq. 2.69).
         """
         amplitude, phase = self._polar(x)
         inside = np.abs(array("x", x)) < self.half_width
         return np.where(inside, np.where(inside, amplitude, 0.0) * np.sin(phase), 0.0)
 
     def _polar(self, x: ArrayLike) -> tuple[Array, Array]:
-        """Return amplitude and phase of pressure + i shear."""
+        """Return the amplitude (...) [pressure] and the phase (...) [radian] of the complex traction, pressure + i shear."""
         position = array("x", x) / self.half_width
         inside = np.abs(position) < 1.0
         t = np.where(inside, position, 0.0)
@@ -359,12 +400,12 @@ class FlatPunch2D:
 def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = False) -> FlatPunch2D:
     """Return the tractions under a flat rigid punch on a half-plane in plane strain.
 
-    There is no indentation: in a half-plane it depends on distant supports.
+    The solution does not include the indentation, which in a half-plane depends on distant supports.
 
     Parameters
     ----------
     nu, half_width, force, bonded
-        As the attributes of `FlatPunch2D`; a punch that is not bonded is frictionless.
+        Described as attributes of `FlatPunch2D`.
 
     Returns
     -------
@@ -381,17 +422,23 @@ def flat_punch_2d(*, nu: float, half_width: float, force: float, bonded: bool = 
 
 
 def spence_stick_ratio(*, nu: float, friction: float) -> float:
-    """Return the ratio c/a of the half-widths of the stick zone and of a flat rigid punch.
+    """Return the ratio c/a of the half-width c of the stick zone under a flat rigid punch to the half-width a of the punch.
 
-    The root of K(sqrt(1 - k^2))/K(k) = beta/f with k = c/a, beta = (1 - 2 nu)/(2 (1 - nu)) and the complete elliptic
-    integral K of modulus k (Spence 1973; Johnson 1985, eq. 2.73), for a monotonic load in plane strain. The formula
-    neglects the effect of the shear on the pressure; boundary-element solutions with this coupling have a smaller
-    stick zone, by 3 % at nu = 0.3, f = 0.5, by 26 % at nu = 0, f = 0.5, and by more for less friction.
+    The load increases monotonically, in plane strain. The ratio is the root k = c/a of K(sqrt(1 - k^2))/K(k) = beta/f with
+    beta = (1 - 2 nu)/(2 (1 - nu)), the coefficient of friction f, and the complete elliptic integral K of the first kind of
+    modulus k (Spence 1973; Johnson 1985, eq. 2.73). The formula neglects the effect of the shear traction on the pressure.
+    In boundary-element solutions with this coupling the stick zone is smaller: by 3 % for nu = 0.3 and f = 0.5, by 26 % for
+    nu = 0 and f = 0.5, and by more for less friction.
 
     Parameters
     ----------
     nu, friction : float
-        Poisson ratio of the half-plane and Coulomb's coefficient f > 0 [-].
+        Poisson's ratio of the half-plane, and Coulomb's coefficient of friction f > 0 [-].
+
+    Returns
+    -------
+    float
+        Ratio c/a [-].
 
     Examples
     --------
@@ -406,7 +453,8 @@ def spence_stick_ratio(*, nu: float, friction: float) -> float:
     if goal == 0.0:
         return 1.0
 
-    # The unknown is ln(k/k'), which spreads both ends of (0, 1); the two integrals swap when its sign changes.
+    # With the unknown ln(k/k'), k' = sqrt(1 - k^2), both ends of the interval (0, 1) are resolved; a change of its sign
+    # exchanges the two integrals.
     def residual(x: float) -> float:
         m = 1.0 / (1.0 + math.exp(-2.0 * x))
         m1 = 1.0 / (1.0 + math.exp(2.0 * x))

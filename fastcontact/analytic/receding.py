@@ -12,25 +12,32 @@ from fastcontact.analytic._inputs import Bodies, array, not_negative, plane_kine
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-_TERMS = 80  # terms of the Chebyshev series: errors of half-width and pressure below 1e-6 in the range below
-_LARGEST_RATIO = 100.0  # largest ratio of the moduli: beyond it, contact is so wide that the layer acts as a beam
-_LARGEST_LOAD = 10.0  # largest half-width of the load over thickness
+_TERMS = (
+    80  # terms of the Chebyshev series, with which half-width and pressure have errors below 1e-6 in the range below
+)
+_LARGEST_RATIO = 100.0  # largest ratio of the moduli; beyond it the contact is so wide that the layer acts as a beam
+_LARGEST_LOAD = 10.0  # largest ratio of the half-width of the load to the thickness of the layer
 
 
 @dataclass(frozen=True)
 class RecedingLayer:
     """Contact of a layer under a strip load with a half-plane (Keer, Dundurs and Tsai 1972).
 
-    The contact width does not depend on the force.
+    The width of the contact does not depend on the force.
 
     Attributes
     ----------
-    thickness, load_half_width : float
-        Thickness of the layer, and half-width of the uniform load ``|x| <= load_half_width`` on its top [length].
-    force, radius : float
-        Force per unit length [force/length], and half-width c of the contact [length].
+    thickness : float
+        Thickness of the layer [length].
+    load_half_width : float
+        Half-width of the uniform load on the top of the layer, which acts on ``|x| <= load_half_width`` [length].
+    force : float
+        Force per unit length [force/length].
+    radius : float
+        Half-width c of the contact [length].
     series : tuple of float
-        Coefficients of the pressure, p(c cos theta) sin(theta) = sum of series[k] cos(2 k theta) [pressure].
+        Coefficients of the Chebyshev series p(c cos theta) sin(theta) = sum of series[k] cos(2 k theta) of the contact
+        pressure p [pressure].
     """
 
     thickness: float
@@ -53,17 +60,17 @@ class RecedingLayer:
         """Return the contact pressure (...) [pressure] at positions `x` (...) [length], zero outside."""
         position = np.abs(array("x", x)) / self.radius
         theta = np.arccos(np.minimum(position, 1.0))
-        # The coefficients sum to zero: cos(2 k theta) - 1 in place of cos(2 k theta) avoids 0/0 at the edge.
+        # The coefficients sum to zero, so that cos(2 k theta) - 1 can replace cos(2 k theta), which avoids 0/0 at the edge.
         terms = sum((b * np.sin(k * theta) ** 2 for k, b in enumerate(self.series)), np.zeros_like(theta))
         return -2.0 * terms / np.maximum(np.sin(theta), 1e-300)
 
 
 def _compliances(xi: Array) -> tuple[Array, Array]:
-    """Return A - 1 and 1 - S at wave numbers xi (thickness 1).
+    """Return A - 1 and 1 - S at wave numbers xi, for a layer of thickness 1.
 
-    A and S are the normal compliances of the layer's faces in Fourier space, relative to those of a half-plane, under
-    pressures on both faces that bend it (A) or squeeze it (S): S = (cosh xi - 1)/(sinh xi + xi) and
-    A = (cosh xi + 1)/(sinh xi - xi).
+    A and S are the normal compliances of the faces of the layer in Fourier space, relative to those of a half-plane, for
+    pressures on both faces that bend (A) or compress (S) the layer: A = (cosh xi + 1)/(sinh xi - xi) and
+    S = (cosh xi - 1)/(sinh xi + xi).
     """
     cubic = xi**3 / 6.0 * (1.0 + xi**2 / 20.0 * (1.0 + xi**2 / 42.0 * (1.0 + xi**2 / 72.0 * (1.0 + xi**2 / 110.0))))
     difference = np.where(xi < 0.6, cubic, np.sinh(xi) - xi)
@@ -71,7 +78,7 @@ def _compliances(xi: Array) -> tuple[Array, Array]:
 
 
 def _wave_numbers(panels: int) -> tuple[Array, Array]:
-    """Return points and weights on (0, 40); above 40 all compliances are those of a half-plane."""
+    """Return points and weights of a Gauss rule for wave numbers from 0 to 40, beyond which A and S are 1 to round-off."""
     points, weights = np.polynomial.legendre.leggauss(12)
     width = 40.0 / panels
     start = width * np.arange(panels)[:, None]
@@ -79,10 +86,11 @@ def _wave_numbers(panels: int) -> tuple[Array, Array]:
 
 
 def _series(c: float, ratio: float, a: float) -> Array:
-    """Return b_k of p(c cos theta) sin(theta) = sum of b_k cos(2 k theta) for a trial half-width c.
+    """Return the coefficients b_k of p(c cos theta) sin(theta) = sum of b_k cos(2 k theta) for a trial half-width c.
 
-    Thickness and force are 1. The slope of the gap vanishes at the collocation points and the pressure
-    carries the force: Gauss-Chebyshev rule of the first kind (Erdogan and Gupta 1972), folded by symmetry.
+    Thickness and force are 1, `ratio` is the ratio of the moduli and `a` the half-width of the load. The slope of the gap
+    vanishes at the collocation points, and the pressure balances the force. The integral equation is discretised by the
+    Gauss-Chebyshev rule of the first kind (Erdogan and Gupta 1972), reduced to one half by symmetry.
     """
     xi, weight = _wave_numbers(20 + int(5 * max(c, a)))
     bend, squeeze = _compliances(xi)
@@ -90,7 +98,7 @@ def _series(c: float, ratio: float, a: float) -> Array:
     theta = (np.arange(half) + 0.5) * math.pi / _TERMS
     t, x = np.cos(theta), np.cos(np.arange(1, half) * math.pi / _TERMS)
     sines = np.sin(np.outer(c * x, xi)) * weight
-    # The total force is 1: without its contribution, the kernel stays bounded at small wave numbers.
+    # Subtracting the contribution of the known total force keeps the kernel bounded at small wave numbers.
     kernel = sines @ (0.5 * (bend - squeeze) * -2.0 * np.sin(0.5 * np.outer(c * t, xi)) ** 2).T
     singular = 1.0 / (x[:, None] - t) + 1.0 / (x[:, None] + t)
     right = sines @ (squeeze + 0.5 * (bend + squeeze) * (np.sinc(xi * a / math.pi) - 1.0))
@@ -104,9 +112,9 @@ def _series(c: float, ratio: float, a: float) -> Array:
 
 
 def _edge_singularity(c: float, ratio: float, a: float) -> float:
-    """Return the strength of the pressure's singularity at the edge of the trial contact of half-width c.
+    """Return the strength of the singularity of the pressure at the edge of a trial contact with the half-width c.
 
-    Positive where the contact is too narrow, negative where it is too wide.
+    It is positive if the trial contact is too narrow, and negative if it is too wide.
     """
     return float(_series(c, ratio, a).sum())
 
@@ -122,22 +130,25 @@ def receding_layer(
     load_half_width: float = 0.0,
     kinematics: str = "plane_strain",
 ) -> RecedingLayer:
-    """Return the contact of a layer (1) with a half-plane (2) under a strip load on the layer's top.
+    """Return the contact of a layer (1) with a half-plane (2) under a strip load on the top of the layer.
 
-    The singular integral equation of Keer, Dundurs and Tsai (1972), solved by a Chebyshev series to a
-    relative 1e-6 or better.
+    The singular integral equation of Keer, Dundurs and Tsai (1972) is solved by a Chebyshev series with a relative error of
+    at most 1e-6.
 
     Parameters
     ----------
     E1, nu1 : float
         Young's modulus [pressure] and Poisson's ratio [-] of the layer.
     E2, nu2 : float, optional
-        Those of the half-plane; without `E2` it is rigid.
-    thickness, force : float
-        Thickness of the layer [length], and force per unit length [force/length].
+        Young's modulus [pressure] and Poisson's ratio [-] of the half-plane, which is rigid without `E2`.
+    thickness : float
+        Thickness of the layer [length].
+    force : float
+        Force per unit length [force/length].
     load_half_width : float
-        Half-width of the uniform load, at most ten thicknesses; 0 is a line force [length].
+        Half-width of the uniform load, at most ten times the thickness; 0 for a line force [length].
     kinematics : {"plane_strain", "plane_stress"}
+        Kinematics of both bodies.
 
     Returns
     -------
@@ -152,7 +163,7 @@ def receding_layer(
     --------
     >>> from fastcontact import analytic
     >>> layer = analytic.receding_layer(E1=1000.0, nu1=0.3, thickness=1.0, force=10.0)
-    >>> round(layer.half_width, 4)  # whatever the force
+    >>> round(layer.half_width, 4)  # does not depend on the force
     0.857
     """
     bodies = Bodies(E1, nu1, E2, nu2)
@@ -169,7 +180,7 @@ def receding_layer(
 
 
 def _modulus_ratio(bodies: Bodies, kinematics: str) -> float:
-    """Return E1'/E2' of the plane moduli, 0 for a rigid half-plane."""
+    """Return the ratio of the plane-strain or plane-stress moduli of layer and half-plane, 0 for a rigid half-plane."""
     if bodies.E2 is None:
         return 0.0
     strain = kinematics == "plane_strain"
@@ -181,7 +192,7 @@ def _half_width(ratio: float, a: float) -> float:
     """Return the half-width c, relative to the thickness, for which the pressure is not singular at the edge."""
     from scipy.optimize import brentq
 
-    high = 1.0  # the contact of a soft layer under a line force has 0.86
+    high = 1.0  # the half-width is 0.86 for a layer on a rigid half-plane under a line force
     while _edge_singularity(high, ratio, a) > 0.0:
         high *= 1.3
     return float(brentq(_edge_singularity, high / 1.3, high, args=(ratio, a), xtol=1e-13))

@@ -1,4 +1,4 @@
-"""Anisotropic linear elastic materials: orthotropic, and fully anisotropic."""
+"""Anisotropic linear elastic materials: orthotropic and general anisotropic elasticity."""
 
 from __future__ import annotations
 
@@ -20,44 +20,48 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
 
 NAMES = ("12", "13", "23")
-# Tolerance of the symmetry of the stiffness, relative to its largest entry.
+# Tolerance for the symmetry of the stiffness matrix, relative to its largest entry.
 SYMMETRIC = 1e-9
 
 
 @dataclass(frozen=True)
 class Orthotropic(Material):
-    """Orthotropic linear elasticity, for wood, rolled sheet, laminates and composites.
-
-    ModelError, with the violated condition, unless the elastic energy is positive for every strain.
+    """Orthotropic linear elasticity, for example of wood, rolled sheet, laminates and composites.
 
     Parameters
     ----------
     E : (float, float, float)
-        Young's moduli E1, E2, E3 along the material axes [pressure]. Like E of `LinearElastic`, each of these, of nu
-        and of G may be a function or an array.
+        Young's moduli E1, E2, E3 along the material axes [pressure]. Each constant in E, nu and G may be a number, a
+        function or an array, as described for E of `LinearElastic`.
     nu : (float, float, float)
-        Poisson's ratios nu12, nu13, nu23 [-]: nu12 is minus the strain along 2 divided by that along 1 under a
-        uniaxial stress along 1; nu21 = nu12 E2 / E1.
+        Poisson's ratios nu12, nu13, nu23 [-]. Under a uniaxial stress along axis 1, nu12 is minus the ratio of the strain
+        along axis 2 to the strain along axis 1; the other ratio is nu21 = nu12 E2 / E1.
     G : (float, float, float)
         Shear moduli G12, G13, G23 [pressure].
     axes : sequence or callable, optional
-        Material axes, by default those of the mesh (in axisymmetry: radius, axis, circumference): two or three
-        orthogonal vectors (x, y, z) of any length, in the plane also the first one, (x, y), alone; a function from
-        positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as `CylindricalAxes`, evaluated at the
-        quadrature points; or an array (n_cells, 3, 3) for the cells of the material or of the mesh.
+        Material axes; by default the axes of the mesh, which in axisymmetry are the radial, axial and circumferential
+        directions. They are given as two or three orthogonal vectors (x, y, z) of any length; in 2D the first vector (x, y)
+        suffices. Axes that vary are a function from positions (n, dim) [length] to unit vectors in rows (n, 3, 3), such as
+        `CylindricalAxes`, which is evaluated at the quadrature points, or an array (n_cells, 3, 3) for the cells of the
+        material or of the mesh.
     density : float, callable or ndarray (n,), optional
-        Mass per volume [mass / length^3].
+        Mass per unit volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
-        Coefficients of thermal expansion, one for all or one along each axis [1 / temperature]; numbers, functions or
-        arrays.
+        Coefficient of thermal expansion, or one coefficient along each axis [1 / temperature].
     incompatible_modes : bool
-        As of `LinearElastic`, but by default True.
+        Whether linear quadrangles and hexahedra have incompatible modes, as described for `LinearElastic`.
     conductivity : float, callable, ndarray (n,) or three of them, optional
-        Thermal conductivity, one for all or one along each axis [power / (length temperature)].
+        Thermal conductivity, or one conductivity along each axis [power / (length temperature)].
+
+    Raises
+    ------
+    ModelError
+        If the elastic energy is not positive for every strain; the message states the violated condition.
 
     Notes
     -----
-    Conditions: Lempriere, AIAA J. 6, 1968; compliance: Lekhnitskii, Theory of elasticity of an anisotropic body, 1963.
+    The conditions for a positive energy are those of Lempriere, AIAA J. 6, 1968. The compliance is that of Lekhnitskii,
+    Theory of elasticity of an anisotropic body, 1963.
 
     Examples
     --------
@@ -85,7 +89,7 @@ class Orthotropic(Material):
             _check_modulus(f"Young's modulus E{number}", value)
         for value, number in zip(self.G, NAMES, strict=True):
             _check_modulus(f"the shear modulus G{number}", value)
-        if not self.graded:  # otherwise checked once the cells are known
+        if not self.graded:  # constants that vary are checked when the cells are known
             _check_ratios(self.E, self.nu)
         _take_rest(self)
 
@@ -102,24 +106,30 @@ class Orthotropic(Material):
         density: Constant | None = None,
         expansion: Constant | Sequence[Constant] | None = None,
     ) -> Orthotropic:
-        """Return a transversely isotropic material, such as one with fibres along its first axis.
+        """Return a transversely isotropic material, for example with fibres along its first axis.
 
         Parameters
         ----------
         E_along, E_across : float
-            Young's moduli along the first axis and across it [pressure].
+            Young's moduli along the first axis and normal to it [pressure].
         nu_along : float
-            Minus the strain across divided by that along the first axis, under a uniaxial stress along it [-].
+            Poisson's ratio under a uniaxial stress along the first axis: minus the ratio of the strain normal to the axis to
+            the strain along it [-].
         nu_across : float
-            Poisson's ratio in the plane of isotropy [-]; its shear modulus is E_across / (2 (1 + nu_across)).
+            Poisson's ratio in the plane of isotropy [-]. The shear modulus in this plane is
+            E_across / (2 (1 + nu_across)).
         G_along : float
             Shear modulus in planes that contain the first axis [pressure].
         axes : sequence or callable, optional
-            As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
+            Material axes: unit vectors in rows (3, 3) [-], or a function, as described for `Orthotropic`.
         density : float, callable or ndarray (n,), optional
-            Mass per volume [mass / length^3].
+            Mass per unit volume [mass / length^3].
         expansion : float, callable, ndarray (n,) or three of them, optional
-            Coefficients of thermal expansion [1 / temperature].
+            Coefficient of thermal expansion, or one coefficient along each axis [1 / temperature].
+
+        Returns
+        -------
+        Orthotropic
         """
         check_type("nu_across of a transversely isotropic material", nu_across, float, ModelError)
         check_type("E_across of a transversely isotropic material", E_across, float | Array, ModelError)
@@ -133,11 +143,11 @@ class Orthotropic(Material):
 
     @property
     def described(self) -> str:
-        """The constants, for messages."""
+        """Text with the constants, for messages."""
         return ", ".join(f"{name} = ({', '.join(f'{v:g}' for v in getattr(self, name))})" for name in ("E", "nu", "G"))
 
     def compliances(self, constants: Any) -> Array:
-        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes for constants that may be arrays (n,)."""
         values = np.broadcast_arrays(*map(np.atleast_1d, (*constants.E, *constants.nu, *constants.G)))
         E1, E2, E3, nu12, nu13, nu23, G12, G13, G23 = values
         S = np.zeros((len(E1), 6, 6))
@@ -149,7 +159,7 @@ class Orthotropic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return where (n,) moduli are positive and Poisson's ratios make the strain energy positive definite."""
+        """Return for each set of constants (n,) whether the strain energy is positive definite."""
         E, nu, G = (
             np.broadcast_arrays(*map(np.atleast_1d, values)) for values in (constants.E, constants.nu, constants.G)
         )
@@ -162,25 +172,28 @@ class Orthotropic(Material):
 
 @dataclass(frozen=True)
 class Anisotropic(Material):
-    """Anisotropic linear elasticity.
-
-    ModelError unless the matrix is symmetric and positive definite.
+    """General anisotropic linear elasticity.
 
     Parameters
     ----------
     D : array_like (6, 6)
-        Stiffness matrix from strains 11, 22, 33, 2*12, 2*23, 2*13 to stresses 11, 22, 33, 12, 23, 13 in the material
-        axes [pressure].
+        Matrix of moduli in material axes, from strains 11, 22, 33, 2*12, 2*23, 2*13 to stresses 11, 22, 33, 12, 23, 13
+        [pressure].
     axes : sequence or callable, optional
-        As of `Orthotropic`: unit vectors in rows (3, 3) [-], or a function.
+        Material axes: unit vectors in rows (3, 3) [-], or a function, as described for `Orthotropic`.
     density : float, callable or ndarray (n,), optional
-        Mass per volume [mass / length^3].
+        Mass per unit volume [mass / length^3].
     expansion : float, callable, ndarray (n,) or three of them, optional
-        As of `Orthotropic` [1 / temperature].
+        Coefficient of thermal expansion, or one coefficient along each axis [1 / temperature].
     incompatible_modes : bool
-        As of `LinearElastic`.
+        Whether linear quadrangles and hexahedra have incompatible modes, as described for `LinearElastic`.
     conductivity : float, callable, ndarray (n,) or three of them, optional
-        As of `Orthotropic` [power / (length temperature)].
+        Thermal conductivity, or one conductivity along each axis [power / (length temperature)].
+
+    Raises
+    ------
+    ModelError
+        If the matrix is not symmetric and positive definite.
 
     Examples
     --------
@@ -225,7 +238,7 @@ class Anisotropic(Material):
 
     @property
     def described(self) -> str:
-        """The diagonal of the moduli, for messages."""
+        """Text with the diagonal of the matrix of moduli, for messages."""
         return f"D with the diagonal ({', '.join(f'{self.D[i][i]:g}' for i in range(6))})"
 
     def compliances(self, constants: Any) -> Array:
@@ -233,16 +246,16 @@ class Anisotropic(Material):
         return np.asarray(np.linalg.inv(np.array(self.D)[None]))
 
     def admissible(self, constants: Any) -> Any:
-        """Return True: the constant moduli are already checked."""
+        """Return True, because the moduli are constant and were checked when the material was created."""
         return True
 
 
 def _take_rest(material: Orthotropic | Anisotropic) -> None:
-    """Check axes, density, expansion and conductivity of a material, and normalise them."""
+    """Check and normalise the axes, density, thermal expansion and conductivity of a material."""
     object.__setattr__(material, "density", wrapped(material.density))
     for name in ("expansion", "conductivity"):
         value = getattr(material, name)
-        if isinstance(value, np.ndarray) and value.shape == (3,):  # along the axes
+        if isinstance(value, np.ndarray) and value.shape == (3,):  # one constant along each axis
             value = tuple(value.tolist())
         object.__setattr__(material, name, wrapped(value, vector=True))
     object.__setattr__(material, "axes", _axes(material.axes))
@@ -254,7 +267,7 @@ def _take_rest(material: Orthotropic | Anisotropic) -> None:
 
 
 def _axes(axes: Any) -> Any:
-    """Return the normalised axes of a material; ModelError if those of cells are not orthogonal."""
+    """Return the normalised axes of a material; ModelError if axes given for cells are not orthogonal."""
     if isinstance(axes, CellAxes):
         return axes
     if not isinstance(axes, np.ndarray) or axes.ndim != 3:
@@ -277,14 +290,17 @@ def _three(name: str, values: Any) -> tuple[Any, Any, Any]:
 
 
 def _real(value: Any) -> float:
-    """Return a real number unchanged; TypeError for anything else, such as text and complex numbers."""
+    """Return a real number unchanged; raise TypeError for other values, such as text and complex numbers."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(value)
     return float(value)
 
 
 def _determinant(nu: Sequence[Any], back: Sequence[Any]) -> Any:
-    """Return 1 - nu12 nu21 - ..., which must be positive, from nu12, nu13, nu23 and nu21, nu31, nu32 [-]."""
+    """Return the determinant of Lempriere's condition, which is positive if the strain energy is positive definite [-].
+
+    `nu` contains nu12, nu13, nu23, and `back` contains nu21, nu31, nu32.
+    """
     (nu12, nu13, nu23), (nu21, nu31, nu32) = nu, back
     return 1.0 - nu12 * nu21 - nu23 * nu32 - nu13 * nu31 - 2.0 * nu21 * nu32 * nu13
 

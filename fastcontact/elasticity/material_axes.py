@@ -1,4 +1,4 @@
-"""Axes of materials: fixed vectors, those of a cylinder, or any function of the position."""
+"""Material axes, which are fixed vectors, cylindrical axes, or any function of position."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 Axes = Sequence[Sequence[float]] | Callable[[Array], Array] | None
-# Components of stress and strain: xx, yy, zz, xy, yz, xz.
+# Indices of the components xx, yy, zz, xy, yz, xz of stress and strain.
 PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
 
 
 @dataclass(frozen=True)
 class CylindricalAxes:
-    """Material axes around a line: 1 radial, 2 tangential, 3 along the line.
+    """Cylindrical axes around a line: axis 1 is radial, axis 2 circumferential, and axis 3 parallel to the line.
 
-    In the plane, the line crosses the plane at `origin`. In axisymmetry, the line must be the axis: ``direction=(0, 1,
-    0)``.
+    In plane models the line is normal to the plane, at `origin`. In axisymmetry the line must be the axis of symmetry, with
+    ``direction=(0, 1, 0)``.
 
     Parameters
     ----------
     origin : (float, float, float)
-        A point of the line [length].
+        A point on the line [length].
     direction : (float, float, float)
-        Along the line, of any length [-].
+        Vector of any length along the line [-].
 
     Raises
     ------
@@ -39,7 +39,7 @@ class CylindricalAxes:
 
     Examples
     --------
-    Wood whose rings lie around the z axis, and a coil wound around the axis of an axisymmetric model:
+    Axes of wood whose growth rings are concentric to a line parallel to z, and of a coil in an axisymmetric model:
 
     >>> import fastcontact as fc
     >>> around_z = fc.CylindricalAxes(origin=(10.0, 0.0, 0.0))
@@ -63,11 +63,11 @@ class CylindricalAxes:
 
     @property
     def around_y(self) -> bool:
-        """Whether the line is the axis y."""
+        """Whether the line is the y axis."""
         return not any((self.origin[0], self.origin[2], self.direction[0], self.direction[2]))
 
     def __call__(self, points: Array) -> Array:
-        """Return the axes (n, 3, 3), unit vectors in rows [-], at `points` (n, dim) [length]."""
+        """Return the axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-]."""
         places = np.zeros((len(points), 3))
         places[:, : points.shape[1]] = points
         along = np.array(self.direction) / np.linalg.norm(self.direction)
@@ -85,9 +85,9 @@ class CylindricalAxes:
 
 
 def checked_axes(axes: Any) -> Axes:
-    """Return axes given by vectors as three orthonormal ones, and functions unchanged.
+    """Return three orthonormal vectors for axes that are given by vectors; return functions unchanged.
 
-    Raises ModelError unless they are one vector in the plane, or two or three orthogonal ones in 3D.
+    ModelError unless one vector in 2D, or two or three orthogonal vectors in 3D are given.
     """
     if axes is None or callable(axes):
         return axes  # type: ignore[no-any-return]
@@ -120,10 +120,10 @@ def checked_axes(axes: Any) -> Axes:
 
 
 def frames(axes: Axes, points: Array, kinematics: str) -> Array:
-    """Return checked axes at `points` (n, dim) [length] as unit vectors in rows, (n, 3, 3) [-].
+    """Return checked axes at `points` (n, dim) [length] as unit vectors in rows (n, 3, 3) [-].
 
-    Raises ModelError if a function returns another shape or no orthonormal vectors, or the line of a cylinder is not the axis
-    of symmetry.
+    ModelError if a function returns an array of another shape or vectors that are not orthonormal, or if the line of
+    cylindrical axes is not the axis of symmetry of an axisymmetric model.
     """
     if axes is None:
         return np.broadcast_to(np.eye(3), (len(points), 3, 3))
@@ -155,7 +155,7 @@ def frames(axes: Axes, points: Array, kinematics: str) -> Array:
 
 
 def rotations(frame: Array) -> Array:
-    """Return the matrices (n, 6, 6) [-] from stresses in axes `frame` (n, 3, 3) to those in the axes of the mesh."""
+    """Return the matrices (n, 6, 6) [-] that transform stresses from the axes `frame` (n, 3, 3) [-] to those of the mesh."""
     rotation = np.empty((len(frame), 6, 6))
     for row, (i, j) in enumerate(PAIRS):
         for column, (a, b) in enumerate(PAIRS):
@@ -166,10 +166,10 @@ def rotations(frame: Array) -> Array:
 
 
 def _vectors(values: Any, name: str) -> Array:
-    """Return finite numbers as an array; ModelError, with their `name`, otherwise."""
+    """Return `values` as an array; raise a ModelError that contains `name` if they are not finite numbers."""
     try:
         vectors = np.asarray(values)
-    except ValueError:  # rows of several lengths
+    except ValueError:  # the rows have different lengths
         vectors = np.empty(0, object)
     if vectors.dtype.kind not in "iuf" or not np.isfinite(vectors).all():
         raise ModelError(f"{name} = {values!r} must be finite numbers")

@@ -1,4 +1,4 @@
-"""Linear elastic material laws: base class and isotropic elasticity."""
+"""Linear elastic materials: the base class of all linear materials, and isotropic elasticity."""
 
 from __future__ import annotations
 
@@ -24,31 +24,32 @@ from fastcontact.round_off import ROUND_OFF
 AnyMaterial = TypeVar("AnyMaterial", bound="Material")
 
 KINEMATICS = ("axisymmetric", "plane_strain", "plane_stress", "3d")
-# Treatments of the dilatation.
+# Names of the treatments of the dilatation.
 VOLUMETRIC = ("auto", "plain", "mean_dilatation")
 # Poisson's ratio above which a material has a mean dilatation by default.
 NEARLY_INCOMPRESSIBLE = 0.49
-# Constants that may vary, those of the moduli first.
+# Constants that determine the moduli and may vary with position.
 MODULI = ("E", "nu", "G")
 CONSTANTS = (*MODULI, "density", "expansion", "conductivity")
 
 
 @typed(ModelError)
 class Material:
-    """A linear elastic material: moduli in material axes, density, and thermal properties.
+    """Base class of linear elastic materials, with moduli in material axes, density and thermal properties.
 
     Attributes
     ----------
     density : float, Varying or None
-        Mass per volume [mass / length^3].
+        Mass per unit volume [mass / length^3].
     expansion : float, Varying, tuple or None
-        Coefficients of thermal expansion [1 / temperature].
+        Coefficient of thermal expansion, or one coefficient along each axis [1 / temperature].
     conductivity : float, Varying, tuple or None
-        Thermal conductivity, one or three along the axes [power / (length temperature)].
+        Thermal conductivity, or one conductivity along each axis [power / (length temperature)].
     axes : sequence, callable or None
-        Unit vectors in rows (3, 3) [-], or a function, see `Orthotropic`; None: those of the mesh.
+        Material axes: unit vectors in rows (3, 3) [-], or a function of position, see `Orthotropic`; None stands for the
+        axes of the mesh.
     averaged : bool
-        Whether elements that support it have a mean dilatation, except in plane stress.
+        Whether elements that support a mean dilatation use it, except in plane stress.
     incompatible_modes : bool
         Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation, except in axisymmetry.
     """
@@ -62,56 +63,60 @@ class Material:
 
     @property
     def young(self) -> tuple[float, float]:
-        """The smallest and the largest Young's modulus along the material's axes [pressure]."""
+        """The smallest and the largest Young's modulus along the material axes [pressure]."""
         diagonal = 1.0 / np.diagonal(self._all_compliances(), axis1=1, axis2=2)[:, :3]
         return float(diagonal.min()), float(diagonal.max())
 
     @property
     def contact_modulus(self) -> float:
-        """Smallest plane-strain modulus E / (1 - nu^2) along the axes, the scale of contact stiffness [pressure]."""
+        """Smallest plane-strain modulus E / (1 - nu^2) along the axes, a measure of the contact stiffness [pressure]."""
         D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
         free = [D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))]
         return float(np.min(free))
 
     def _all_compliances(self) -> Array:
-        """Return compliances (n, 6, 6) [1 / pressure] in material axes, at all samples if constants vary."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes, at all sampling points if constants vary."""
         if not self.graded:
             return self.local_compliance[None]
         return np.concatenate([self.compliances(self.constants_at(*sample)) for sample in self._cells().samples()])
 
     @property
     def local_compliance(self) -> Array:
-        """Compliance (6, 6) [1 / pressure] in the material's axes: strains 11, 22, 33, 2*12, 2*23, 2*13 of stresses."""
+        """Compliance matrix (6, 6) [1 / pressure] in material axes, from stresses 11, 22, 33, 12, 23, 13 to strains.
+
+        The shear components of the strain are engineering shear strains, twice those of the tensor.
+        """
         return np.asarray(self.compliances(self)[0])
 
     @property
     def described(self) -> str:
-        """The material's constants, for messages."""
+        """Text with the constants of the material, for messages."""
         raise NotImplementedError
 
     @property
     def varies(self) -> bool:
-        """Whether axes, moduli or expansion depend on position."""
+        """Whether material axes, moduli or thermal expansion depend on position."""
         return callable(self.axes) or self.graded or bool(varying(self.expansion) or varying(self.axes))
 
     @property
     def graded(self) -> bool:
-        """Whether constants of the moduli depend on position."""
+        """Whether constants that determine the moduli depend on position."""
         return any(varying(getattr(self, name, None)) for name in MODULI)
 
     @property
     def varies_inside(self) -> bool:
-        """Whether axes, moduli or expansion vary inside cells: as functions, or as numbers at points.
+        """Whether material axes, moduli or thermal expansion vary within cells.
 
-        Cells with a mean dilatation use the constants at their middle.
+        They do if they are functions of position or nodal values. Cells with a mean dilatation use the constants at their
+        centres.
         """
         varying_constants = [v for name in (*MODULI, "expansion") for v in varying(getattr(self, name, None))]
         return (callable(self.axes) or any(v.inside for v in varying_constants)) and not self.averaged
 
     def check_thermal_and_density(self, most: int) -> None:
-        """Raise ModelError unless the density is at least 0, and thermal constants are one number or `most` along the axes.
+        """Raise ModelError if the density is negative, or a thermal constant is neither a number nor `most` numbers.
 
-        Varying constants are checked with their cells.
+        Constants that vary are checked when the cells of the material are known.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
@@ -120,7 +125,10 @@ class Material:
         check_conductivity(self.conductivity, most)
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
-        """Return the material with its cells, for varying constants; ModelError where these are not admissible."""
+        """Return the material together with its cells, at which varying constants can be evaluated.
+
+        ModelError if a varying constant is not admissible somewhere in these cells.
+        """
         names = [name for name in (*CONSTANTS, "axes") if varying(getattr(self, name, None))]
         if not names:
             return self
@@ -139,9 +147,11 @@ class Material:
         return bound_material
 
     def constants_at(self, name: str, rows: Indices, N: Array) -> SimpleNamespace:
-        """Return the constants in cells of an element, varying ones as arrays (n_rows * n,) [unit of the constant].
+        """Return the constants at points of some cells of an element type.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
+        Varying constants are arrays (n_rows * n,) [unit of the constant], the others numbers. `name` is the element type,
+        `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the shape functions at n points
+        of a cell.
         """
 
         def at(value: Any) -> Any:
@@ -150,15 +160,15 @@ class Material:
         return SimpleNamespace(**{key: at(getattr(self, key, None)) for key in (*CONSTANTS, "axes")})
 
     def compliances(self, constants: Any) -> Array:
-        """Return compliances (n, 6, 6) [1 / pressure] in the material's axes, of constants that may be arrays (n,)."""
+        """Return the compliances (n, 6, 6) [1 / pressure] in material axes for constants that may be arrays (n,)."""
         raise NotImplementedError
 
     def admissible(self, constants: Any) -> Any:
-        """Return for which constants (n,) the material is admissible."""
+        """Return for each set of constants (n,) whether it is admissible, that is whether the elastic energy is positive."""
         raise NotImplementedError
 
     def _cells(self) -> Cells:
-        """Return the cells of the material; ModelError if they are not known."""
+        """Return the cells of the material; ModelError if the material has not been assigned to cells."""
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
             raise ModelError(
@@ -167,7 +177,7 @@ class Material:
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
-        """Raise ModelError, with the position, where the constants `names` are not admissible."""
+        """Raise ModelError with the position if the constants called `names` are not admissible somewhere."""
         constants, count = self.constants_at(element, rows, N), len(rows) * len(N)
         wrong = np.array(np.broadcast_to(~np.asarray(self.admissible(constants), bool), count))
         if constants.density is not None:
@@ -191,8 +201,8 @@ class Material:
     def moduli(self, kinematics: str) -> Array:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
-        In axisymmetry x, y, z are the radius, the axis and the circumference. Plane stress has no stress zz. ModelError if
-        the axes depend on the position.
+        In axisymmetry x, y and z denote the radial, axial and circumferential directions. In plane stress the rows and
+        columns of zz are zero. ModelError if the material axes depend on position.
         """
         if self.varies:
             raise ModelError("the axes of the material depend on the position: ask for moduli_at(points, kinematics)")
@@ -201,7 +211,7 @@ class Material:
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] at `points` (n, dim) [length]; see `moduli`.
 
-        `constants` are those of `constants_at` there, if they vary.
+        If constants vary, `constants` contains the result of `constants_at` at these points.
         """
         compliance = self._compliance6(points, kinematics, constants)
         if kinematics == "3d":
@@ -216,16 +226,17 @@ class Material:
     def compliance_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
         """Return the compliance (n, 4, 4), in 3D (n, 6, 6) [1 / pressure] at `points` (n, dim) [length].
 
-        In the plane it includes zz, so that stress : compliance : stress is complete; stresses yz and xz are zero
-        there.
+        In 2D it includes the component zz, so that stress : compliance : stress is twice the complete energy density; the
+        stresses yz and xz are zero.
         """
         size = 6 if kinematics == "3d" else 4
         return np.asarray(self._compliance6(points, kinematics, constants)[:, :size, :size])
 
     def expansion_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
-        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per degree at `points` (n, dim) [length].
+        """Return the thermal strain (n, 4), in 3D (n, 6) [1 / temperature] per unit temperature rise.
 
-        NaN without expansion. ModelError if it has an out-of-plane shear that the kinematics exclude.
+        It is evaluated at `points` (n, dim) [length], and NaN without a coefficient of thermal expansion. ModelError if it
+        has an out-of-plane shear component, which plane kinematics exclude.
         """
         size = 6 if kinematics == "3d" else 4
         if self.expansion is None:
@@ -243,7 +254,8 @@ class Material:
     def conductivity_at(self, points: Array, kinematics: str, constants: Any) -> Array:
         """Return the conductivity (n, dim, dim) [power / (length temperature)] at `points` (n, dim) [length].
 
-        `constants` are those of `constants_at` there. ModelError if inclined axes conduct heat out of the plane.
+        `constants` contains the result of `constants_at` at these points. ModelError if inclined material axes conduct heat
+        out of the plane of the model.
         """
         conductivity, dim = constants.conductivity, points.shape[1]
         if not isinstance(conductivity, tuple):
@@ -257,24 +269,30 @@ class Material:
         return np.asarray(tensor[:, :dim, :dim])
 
     def _along_axes(self, values: Any, points: Array, kinematics: str, constants: Any) -> tuple[Array, Array]:
-        """Return constants (n, 3) along the material's axes, from one or three `values`, and the tensors (n, 3, 3)."""
+        """Return one or three constants as an array (n, 3) along the material axes, and as tensors (n, 3, 3).
+
+        Both are in the unit of `values`; the tensors refer to the axes of the mesh.
+        """
         along, axes = np.empty((len(points), 3)), self._frames(points, kinematics, constants)
         for axis in range(3):
             along[:, axis] = values[axis] if isinstance(values, tuple) else values
         return along, np.einsum("nai,na,naj->nij", axes, along, axes)
 
     def _frames(self, points: Array, kinematics: str, constants: Any) -> Array:
-        """Return the axes (n, 3, 3) at `points` (n, dim), those of cells from `constants` [-]."""
+        """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; axes given by cell are in `constants`."""
         axes = constants.axes if constants and varying(self.axes) else self.axes
         if varying(axes):
             raise ModelError("axes by cell need to know the cells: give the `constants_at` of the material of a model")
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
-        """Return the compliance (n, 6, 6) in the mesh's axes; ModelError where plane kinematics are not possible."""
+        """Return the compliance (n, 6, 6) [1 / pressure] in the axes of the mesh.
+
+        ModelError if the material couples in-plane stresses with out-of-plane shear, which plane kinematics exclude.
+        """
         check_known("kinematics", kinematics, KINEMATICS, ModelError)
         of_stress = rotations(self._frames(points, kinematics, constants))
-        # Engineering strains transform by the inverse transpose of the matrix of stresses.
+        # Engineering strains transform by the inverse transpose of the matrix that transforms stresses.
         back = np.linalg.inv(of_stress)
         local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)
         compliance = np.asarray(back.transpose(0, 2, 1) @ local @ back)
@@ -290,7 +308,7 @@ class Material:
 
 
 def _real(value: Any) -> float:
-    """Return a real number, infinite if it is too large; NaN if it is not a number."""
+    """Return `value` as a float: infinity if it is too large for a float, NaN if it is not a real number."""
     try:
         return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -298,7 +316,7 @@ def _real(value: Any) -> float:
 
 
 def check_positive(name: str, value: Any, caption: str = "a positive number") -> None:
-    """Raise ModelError if a constant of a material, `name` in the message, is not a positive number."""
+    """Raise ModelError if `value` is not a positive number; the message calls it `name`."""
     number = _real(value)
     if not 0.0 < number < math.inf:
         raise ModelError(f"{name} = {value!r} must be {caption}")
@@ -307,7 +325,7 @@ def check_positive(name: str, value: Any, caption: str = "a positive number") ->
 
 
 def check_expansion(value: Any, most: int) -> None:
-    """Raise ModelError if an expansion is given and is neither a finite number nor `most` of them along the axes."""
+    """Raise ModelError if a coefficient of expansion is given and is neither a finite number nor `most` finite numbers."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
     fit = all(isinstance(v, Varying) or math.isfinite(_real(v)) for v in numbers)
     if value is not None and not (fit and len(numbers) in (1, most)):
@@ -316,7 +334,7 @@ def check_expansion(value: Any, most: int) -> None:
 
 
 def check_conductivity(value: Any, most: int) -> None:
-    """Raise ModelError if a conductivity is given and is neither a positive number nor `most` of them along the axes."""
+    """Raise ModelError if a conductivity is given and is neither a positive number nor `most` positive numbers."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) or isinstance(value, str) else list(value)
     if len(numbers) not in (1, most):
         raise ModelError(f"the conductivity = {value} must be a number{', or three along the axes' * (most > 1)}")
@@ -340,27 +358,28 @@ class LinearElastic(Material):
     Parameters
     ----------
     E : float, callable or ndarray (n,)
-        Young's modulus [pressure], positive: a number; a function from positions (n, dim) [length] to numbers (n,),
-        such as `Tabulated`; or an array with a number for each solid cell of the groups of the material, for each
-        solid cell of the mesh, in the order of ``mesh.solids``, or for each point of the mesh. A column (n, 1) always
-        refers to cells.
+        Young's modulus, greater than 0 [pressure]: a number, a function from positions (n, dim) [length] to numbers (n,),
+        such as `Tabulated`, or an array. An array has one number for each solid cell of the groups of the material, for
+        each solid cell of the mesh in the order of ``mesh.solids``, or for each point of the mesh. An array (n, 1) always
+        belongs to cells, also if the mesh has as many points.
     nu : float, callable or ndarray (n,)
-        Poisson's ratio, -1 < nu < 0.5 [-]; like E.
-    volumetric : str
-        Treatment of the dilatation: ``"plain"`` uses the full dilatation; ``"mean_dilatation"`` projects it on its
-        mean in each quadrangle, hexahedron, wedge and pyramid (in quadratic ones on a linear function), so that they
-        do not lock if the material is nearly incompressible; ``"auto"`` selects the latter from nu = 0.49 on. It has
-        no effect on linear triangles and tetrahedra and in plane stress.
+        Poisson's ratio, -1 < nu < 0.5 [-], in one of the forms of E.
+    volumetric : {"auto", "plain", "mean_dilatation"}
+        Treatment of the dilatation. ``"plain"`` uses the dilatation of the displacements. ``"mean_dilatation"`` projects it
+        onto constants in each linear, and onto linear functions in each quadratic quadrangle, hexahedron, wedge and
+        pyramid, so that these cells do not lock if the material is nearly incompressible. ``"auto"`` selects the mean
+        dilatation for nu >= 0.49. The treatment has no effect on linear triangles and tetrahedra, and in plane stress.
     density : float, callable or ndarray (n,), optional
-        Mass per volume [mass / length^3], for gravity, centrifugal loads and modes; zero or more; like E.
+        Mass per unit volume, at least 0, in one of the forms of E [mass / length^3]. Gravity, centrifugal loads and
+        vibration modes need it.
     expansion : float, callable or ndarray (n,), optional
-        Coefficient of thermal expansion [1 / temperature]; like E.
+        Coefficient of thermal expansion, in one of the forms of E [1 / temperature].
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes, which avoid shear locking in bending and
-        volumetric locking, in place of a mean dilatation. It has no effect on other elements and in axisymmetry.
-        Assembly then costs three times and stress recovery ten times as much.
+        Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation. They avoid shear
+        locking in bending as well as volumetric locking, at about three times the cost of assembly and ten times the cost
+        of stress recovery. They have no effect on other elements and in axisymmetry.
     conductivity : float, callable or ndarray (n,), optional
-        Thermal conductivity [power / (length temperature)], positive; like E.
+        Thermal conductivity, greater than 0, in one of the forms of E [power / (length temperature)].
 
     Raises
     ------
@@ -400,17 +419,17 @@ class LinearElastic(Material):
 
     @property
     def described(self) -> str:
-        """E and nu, for messages."""
+        """Text with E and nu, for messages."""
         return f"E = {self.E:g}, nu = {self.nu:g}"
 
     @property
     def young(self) -> tuple[float, float]:
-        """Smallest and largest Young's modulus, equal unless it varies [pressure]."""
+        """Smallest and largest Young's modulus, which differ only if the modulus varies [pressure]."""
         return self.E.range if isinstance(self.E, Varying) else (self.E, self.E)
 
     @property
     def contact_modulus(self) -> float:
-        """E / (1 - nu^2) [pressure]; the smallest value if they vary."""
+        """Plane-strain modulus E / (1 - nu^2) [pressure]; its smallest value if E or nu varies."""
         if not self.graded:
             return self.E / (1 - self.nu**2)
         samples = [self.constants_at(*sample) for sample in self._cells().samples()]
@@ -418,13 +437,13 @@ class LinearElastic(Material):
 
     @property
     def largest_nu(self) -> float:
-        """Poisson's ratio [-]; if it varies, the largest, and zero before the material is assigned to cells."""
+        """Poisson's ratio [-]. If it varies, its largest value, and zero before the material is assigned to cells."""
         if not isinstance(self.nu, Varying):
             return self.nu
         return 0.0 if self.nu.cells is None else self.nu.range[1]
 
     def compliances(self, constants: Any) -> Array:
-        """Return compliances (n, 6, 6) [1 / pressure] of constants that may be arrays (n,)."""
+        """Return the compliances (n, 6, 6) [1 / pressure] for constants that may be arrays (n,)."""
         E, nu = np.broadcast_arrays(np.atleast_1d(constants.E), np.atleast_1d(constants.nu))
         S = np.zeros((len(E), 6, 6))
         S[:, range(3), range(3)] = ((1 + nu) / E)[:, None]
@@ -433,13 +452,13 @@ class LinearElastic(Material):
         return S
 
     def admissible(self, constants: Any) -> Any:
-        """Return where (n,) E is positive and nu between -1 and 0.5."""
+        """Return for each set of constants (n,) whether E is positive and nu lies between -1 and 0.5."""
         E, nu = np.asarray(constants.E), np.asarray(constants.nu)
         return (E >= 1.0 / LARGEST) & (E <= LARGEST) & (nu > -1.0) & (nu < 0.5)
 
     @property
     def averaged(self) -> bool:  # type: ignore[override]
-        """Whether elements use a mean dilatation, if they support it and kinematics are not plane stress."""
+        """Whether elements that support a mean dilatation use it, except in plane stress."""
         nearly = self.largest_nu >= NEARLY_INCOMPRESSIBLE
         return self.volumetric == "mean_dilatation" or (self.volumetric == "auto" and nearly)
 
@@ -451,7 +470,7 @@ class LinearElastic(Material):
     def moduli(self, kinematics: str) -> Array:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
-        Plane stress has no stress zz (Timoshenko and Goodier, 1970, section 16).
+        In plane stress the rows and columns of zz are zero (Timoshenko and Goodier, 1970, section 16).
         """
         if self.graded:
             raise ModelError(
@@ -469,7 +488,7 @@ class LinearElastic(Material):
 def isotropic_moduli(E: Array, nu: Array, kinematics: str) -> Array:
     """Return the moduli (n, 4, 4), in 3D (n, 6, 6) [pressure] of isotropic materials; see `LinearElastic.moduli`.
 
-    Of Young's moduli `E` (n,) [pressure] and Poisson's ratios `nu` (n,) [-].
+    The materials have the Young's moduli `E` (n,) [pressure] and Poisson's ratios `nu` (n,) [-].
     """
     check_known("kinematics", kinematics, KINEMATICS, ModelError)
     G = E / (2 * (1 + nu))

@@ -1,4 +1,4 @@
-"""Spatially varying material constants: functions of position, or values per cell or point."""
+"""Material constants that vary with position, given as functions, or as values for cells or points."""
 
 from __future__ import annotations
 
@@ -24,17 +24,21 @@ AXES = ("x", "y", "z", "radius")
 @typed(ModelError)
 @dataclass(frozen=True)
 class Tabulated:
-    """A tabulated function of one coordinate: piecewise linear, and constant beyond both ends.
+    """A tabulated function of one coordinate, which is piecewise linear and constant beyond both ends of the table.
 
-    For material constants, temperatures, pressures and other values that may be functions of position. ModelError
-    unless coordinates and values are finite and coordinates ascend.
+    It can be used for material constants, temperatures, pressures and all other values that may be functions of position.
 
     Parameters
     ----------
-    along : str
-        ``"x"``, ``"y"``, ``"z"``, or ``"radius"``, the distance from the z axis, in the plane from the origin.
+    along : {"x", "y", "z", "radius"}
+        The coordinate. ``"radius"`` is the distance from the z axis in 3D, and from the origin in 2D.
     table : sequence of (float, float)
-        Coordinate [length] and value [unit of the quantity] in each row.
+        Coordinate [length] and value [unit of the quantity] of each point of the table.
+
+    Raises
+    ------
+    ModelError
+        If a number is not finite, or the coordinates do not ascend.
 
     Examples
     --------
@@ -72,7 +76,7 @@ class Tabulated:
 
 
 def _number(value: Any) -> float:
-    """Return a number of a table; TypeError of anything else, such as text."""
+    """Return a number unchanged; raise TypeError for other values, such as text."""
     if isinstance(value, str | bytes):
         raise TypeError(value)
     return float(value)
@@ -80,7 +84,7 @@ def _number(value: Any) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Cells of a mesh, `rows` (m,) of int by solid element type."""
+    """Some solid cells of a mesh; `rows` contains the rows (m,) of int of these cells, by element type."""
 
     mesh: Mesh
     rows: Rows
@@ -91,7 +95,7 @@ class Cells:
         return sum(map(len, self.rows.values()))
 
     def samples(self) -> Iterator[tuple[str, Indices, Array]]:
-        """Yield element, cells and shape functions (n, n_nodes) [-] at their middles, then at their quadrature points."""
+        """Yield element type, cells and shape functions (n, n_nodes) [-] at the centres and at the quadrature points."""
         for name, rows in self.rows.items():
             yield name, rows, middle(name)
         for name, rows in self.rows.items():
@@ -99,22 +103,22 @@ class Cells:
 
 
 def middle(name: str) -> Array:
-    """Return the weights (1, n_nodes) [-] of the nodes in the middle of a cell."""
+    """Return the shape functions (1, n_nodes) [-] of an element type at the centre of the cell."""
     n = elements.get(name).n_nodes
     return np.full((1, n), 1.0 / n)
 
 
 class Varying:
-    """A constant of a material that varies; constants are equal if they come from the same function or array.
+    """A material constant that varies with position; two of them are equal if they have the same function or array.
 
     Parameters
     ----------
     given : callable or ndarray
-        A function from positions (n, dim) [length] to numbers (n,), or numbers for each cell or each point.
+        A function from positions (n, dim) [length] to numbers (n,), or an array with a number for each cell or point.
     cells : Cells, optional
-        Cells with the material, once they are known.
+        Cells of the material, when they are known.
     name : str
-        Name for messages.
+        Name of the constant in messages.
     """
 
     def __init__(self, given: Any, cells: Cells | None = None, name: str = "the constant") -> None:
@@ -140,7 +144,7 @@ class Varying:
         return f"{low:{spec}} to {high:{spec}}"
 
     def _place(self, values: Array, cells: Cells) -> None:
-        """Determine from its length whether an array is by cell or by point."""
+        """Determine from the length of an array whether its values belong to cells or to points."""
         mesh = cells.mesh
         total = sum(map(len, mesh.solids.values()))
         lengths = {"cells": cells.count, "solid cells of the mesh": total, "points of the mesh": mesh.n_points}
@@ -168,20 +172,21 @@ class Varying:
 
     @property
     def inside(self) -> bool:
-        """Whether it varies inside cells."""
+        """Whether the constant varies within cells."""
         return self._by_cell is None
 
     @cached_property
     def range(self) -> tuple[float, float]:
-        """The smallest and the largest value in its cells."""
+        """The smallest and the largest value in the cells of the material."""
         assert self.cells is not None
         samples = [self.at(*sample) for sample in self.cells.samples()]
         return float(min(values.min() for values in samples)), float(max(values.max() for values in samples))
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the numbers (n_rows * n,) [unit of the constant] at points of cells of an element, cell by cell.
+        """Return the values (n_rows * n,) [unit of the constant] at points of cells of one element type, cell by cell.
 
-        `rows` (n_rows,) of int are the numbers of the cells, `N` (n, n_nodes) [-] shape functions at the points.
+        `name` is the element type, `rows` (n_rows,) of int contains the numbers of the cells, and `N` (n, n_nodes) [-] the
+        shape functions at the n points of a cell.
         """
         assert self.cells is not None
         mesh = self.cells.mesh
@@ -194,13 +199,13 @@ class Varying:
 
 
 class CellAxes(Varying):
-    """Axes (n_cells, 3, 3) of a material that differ from cell to cell, unit vectors in rows [-].
+    """Material axes that differ from cell to cell, given as unit vectors in rows (n_cells, 3, 3) [-].
 
-    One for each cell of the material, or of the mesh.
+    The array contains axes for each cell of the material or for each solid cell of the mesh.
     """
 
     def _place(self, values: Array, cells: Cells) -> None:
-        """Determine from its length whether an array has axes for the cells of the material or of the mesh."""
+        """Determine from the length of the array whether it contains axes for the cells of the material or of the mesh."""
         total = sum(map(len, cells.mesh.solids.values()))
         if len(values) not in (cells.count, total):
             raise ModelError(
@@ -210,14 +215,14 @@ class CellAxes(Varying):
         self._by_cell = _by_cell(values, cells)
 
     def at(self, name: str, rows: Indices, N: Array) -> Array:
-        """Return the axes (n_rows * n, 3, 3) [-] at points of cells, see `Varying.at`."""
+        """Return the axes (n_rows * n, 3, 3) [-] at points of cells; the parameters are described for `Varying.at`."""
         if self._by_cell is None:
             raise ModelError("axes by cell are known in the material of a model only")
         return np.repeat(self._by_cell[name][rows], len(N), axis=0)
 
 
 def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
-    """Return the values `values` for `cells` or for all solid cells, by element type; NaN elsewhere."""
+    """Return values that are given for `cells` or for all solid cells, by element type, with NaN for other cells."""
     blocks, first = {}, 0
     for name, block in cells.mesh.solids.items():
         blocks[name] = np.full((len(block), *values.shape[1:]), np.nan)
@@ -228,15 +233,18 @@ def _by_cell(values: Array, cells: Cells) -> dict[str, Array]:
 
 
 def positions(mesh: Mesh, nodes: Numbers, N: Array) -> Array:
-    """Return positions (n_cells * n, dim) [length] in cells with `nodes` (n_cells, n_nodes) of int.
+    """Return the positions (n_cells * n, dim) [length] of points in cells with `nodes` (n_cells, n_nodes) of int.
 
-    `N` (n, n_nodes) [-] are the shape functions.
+    `N` (n, n_nodes) [-] contains the shape functions at the n points of a cell.
     """
     return np.einsum("qa,cad->cqd", N, mesh.points[nodes]).reshape(-1, mesh.dim)
 
 
 def wrapped(value: Any, vector: bool = False) -> Any:
-    """Return a number unchanged, and other constants as `Varying`; with `vector`, for each of a sequence."""
+    """Return a constant that is a number unchanged, and other constants as `Varying`.
+
+    If `vector`, a sequence of constants is converted item by item.
+    """
     if vector and isinstance(value, Sequence) and not isinstance(value, str):
         return tuple(wrapped(v) for v in value)
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "fiu":
@@ -256,10 +264,10 @@ def wrapped(value: Any, vector: bool = False) -> Any:
 
 
 def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
-    """Return `change` of a constant, or of each of a tuple."""
+    """Return the result of `change` for a constant, or a tuple of the results for a tuple of constants."""
     return tuple(change(v) for v in value) if isinstance(value, tuple) else change(value)
 
 
 def varying(value: Any) -> list[Varying]:
-    """Return the varying ones of a constant, or of a tuple of constants."""
+    """Return the list of the constants that vary, from a constant or a tuple of constants."""
     return [v for v in (value if isinstance(value, tuple) else (value,)) if isinstance(v, Varying)]

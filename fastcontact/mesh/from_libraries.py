@@ -1,4 +1,4 @@
-"""Meshes from other libraries in memory: gmsh, meshio, PyVista, each imported at first use."""
+"""Convert meshes in memory from the libraries gmsh, meshio and PyVista, each of which is imported at its first use."""
 
 from __future__ import annotations
 
@@ -18,21 +18,24 @@ from fastcontact.mesh.files.meshio_content import UNFIT, VERTEX, mesh_of
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS, plain_parts
 from fastcontact.mesh.mesh import Mesh
 
-# Prefix of groups as arrays of 0 and 1 in our result files.
+# Prefix of the arrays of 0 and 1 that represent groups in result files.
 RESULT_PREFIX = "group_"
-# Options with which gmsh writes the open model: newest format, cells in physical groups or, without any groups, all cells.
+# Options with which gmsh writes the open model: version 4.1 of the format, and only cells in physical groups if there are
+# any such groups.
 GMSH_OPTIONS = {"Mesh.MshFileVersion": 4.1, "Mesh.Binary": 1.0, "Mesh.SaveAll": 0.0, "Mesh.SaveParametric": 0.0}
 
 
 def from_meshio(mesh: Any) -> Mesh:
-    """Return the mesh that meshio holds, with its groups.
+    """Return a mesh of meshio, with its groups, as a `Mesh`.
 
-    Groups are its cell and point sets, the tags of Gmsh and Medit, and arrays of 0 and 1 called ``cell_group:...`` and
-    ``point_group:...``. Inverted cells are reoriented; a flat mesh in 3D coordinates becomes a 2D one.
+    Groups are the cell and point sets of the mesh, the tags of Gmsh and Medit, and arrays of 0 and 1 with names that begin
+    with ``cell_group:`` or ``point_group:``. Inverted cells are reoriented. A plane mesh with three coordinates is converted
+    to two coordinates.
 
     Parameters
     ----------
     mesh : meshio.Mesh
+        The mesh to convert.
 
     Returns
     -------
@@ -41,7 +44,7 @@ def from_meshio(mesh: Any) -> Mesh:
     Raises
     ------
     MeshError
-        If it has no cells or unknown cells, or its arrays are inconsistent.
+        If the mesh has no cells or cells of an unknown type, or its arrays are inconsistent.
 
     Examples
     --------
@@ -56,17 +59,18 @@ def from_meshio(mesh: Any) -> Mesh:
     sets = [mesh.cell_data, mesh.cell_sets, getattr(mesh, "point_data", {}), getattr(mesh, "point_sets", {})]
     if is_masked([mesh.points, *(block.data for block in mesh.cells), *sets]):
         raise MeshError(f"meshio's mesh {REFUSAL}")
-    # meshio's readers keep the dimension of Gmsh's tag names; the format repeats a cell for each of its groups.
+    # For files of Gmsh, meshio keeps the dimension with the names of tags, and a cell occurs once for each of its groups.
     file_format = "gmsh" if any(key.startswith("gmsh:") for key in mesh.cell_data) else ""
     return _mesh_of(plain_parts(mesh), file_format, "meshio's mesh")
 
 
 def from_pyvista(grid: Any) -> Mesh:
-    """Return the cells of a PyVista data set as a mesh, with its groups.
+    """Return a data set of PyVista, with its groups, as a `Mesh`.
 
-    Groups are its boolean arrays, and arrays of 0 and 1 called ``cell_group:...``, ``point_group:...`` (mesh files) or
-    ``group_...`` (result files). Inverted cells are reoriented; a flat mesh in 3D coordinates becomes a 2D one. Such a
-    data set has no facet cells on the surface of a solid; `Mesh.with_facet_group` adds them.
+    Groups are the boolean arrays of the data set, and arrays of 0 and 1 with names that begin with ``cell_group:`` or
+    ``point_group:`` (from mesh files) or with ``group_`` (from result files). Inverted cells are reoriented. A plane mesh
+    with three coordinates is converted to two coordinates. Usually a data set contains no facets of its solid cells;
+    `Mesh.with_facet_group` adds them.
 
     Parameters
     ----------
@@ -79,7 +83,7 @@ def from_pyvista(grid: Any) -> Mesh:
     Raises
     ------
     MeshError
-        If it has no cells or unknown cells.
+        If the data set has no cells, or cells of an unknown type.
 
     Examples
     --------
@@ -111,22 +115,26 @@ def from_pyvista(grid: Any) -> Mesh:
 
 
 def from_gmsh() -> Mesh:
-    """Return the mesh of the model that is open in gmsh, with its physical groups.
+    """Return the mesh of the model that is open in gmsh, with its physical groups, as a `Mesh`.
 
-    As in files of Gmsh, cells without a physical group are omitted if there are any groups. Inverted cells are
-    reoriented; a flat mesh in 3D coordinates becomes a 2D one.
+    If the model has physical groups, cells that belong to none of them are omitted, as in files of Gmsh. Inverted cells are
+    reoriented. A plane mesh with three coordinates is converted to two coordinates.
+
+    Returns
+    -------
+    Mesh
 
     Raises
     ------
     FileError
         If the package gmsh is not installed.
     MeshError
-        If no model is open, it has no mesh, or it has unknown cells.
+        If no model is open, or the model has no mesh or cells of an unknown type.
 
     Warns
     -----
     FastcontactWarning
-        If solid cells are omitted, with their number.
+        If solid cells are omitted; the message states their number.
 
     Examples
     --------
@@ -160,7 +168,7 @@ def from_gmsh() -> Mesh:
 
 
 def _warn_of_omissions(gmsh: Any, dim: int) -> None:
-    """Warn of solid cells without a physical group, which Gmsh does not write if there are any groups."""
+    """Warn of solid cells without a physical group, which gmsh omits if the model has physical groups."""
     if not gmsh.model.getPhysicalGroups():
         return
     loose = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
@@ -176,7 +184,7 @@ def _warn_of_omissions(gmsh: Any, dim: int) -> None:
 def _flags(data: Any, prefix: str) -> dict[str, Any]:
     """Return the arrays that define groups, under the names expected by `mesh_of`."""
     groups = {}
-    for name in data.keys():  # noqa: SIM118, PyVista's data are no mapping
+    for name in data.keys():  # noqa: SIM118, the data of PyVista are not a mapping
         values = np.asarray(data[name])
         if name in TAGS or name.startswith(prefix):
             groups[name] = values
@@ -188,7 +196,7 @@ def _flags(data: Any, prefix: str) -> dict[str, Any]:
 
 
 def _mesh_of(content: dict[str, Any], file_format: str, library: str) -> Mesh:
-    """Return the mesh of plain data, with inverted cells reoriented."""
+    """Return the mesh with the given content, in which inverted cells are reoriented."""
     try:
         mesh, _ = mesh_of(content, file_format)
     except MeshError as error:

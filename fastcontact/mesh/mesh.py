@@ -1,4 +1,4 @@
-"""Immutable meshes: points, cells by element type, named groups."""
+"""Immutable meshes of points, cells by element type, and named groups."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
 
 
 def _numbers(name: str, values: ArrayLike) -> AnyArray:
-    """Return whole numbers as an array that can be converted to 32 bits."""
+    """Return `values` as an array of integers that fit in 32 bits; raise MeshError if they are not integers."""
     array = np.asarray(values)
     if array.size == 0:
         return array.astype(np.int32)
@@ -40,7 +40,7 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
 
 
 def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
-    """Return the number of the first cell of each block, where cells are numbered over all blocks, by name."""
+    """Return the number of the first cell of each block by name, where cells are numbered consecutively over all blocks."""
     return dict(zip(blocks, np.cumsum([0, *map(len, blocks.values())]).tolist(), strict=False))
 
 
@@ -49,16 +49,16 @@ def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
 class Mesh:
     """Points, cells and named groups.
 
-    A mesh has cells of several dimensions: solids, and facets (lines in 2D) for groups of the boundary. Cells are
-    numbered consecutively over all element types in the order of `cells`; a cell group is a sorted array of these numbers.
-    MeshError if an array has the wrong shape, a number is not finite, or an index is out of range.
+    A mesh contains solid cells, and facets (lines in 2D) for groups of the boundary. Cells are numbered from 0,
+    consecutively over all element types in the order of `cells`; a cell group is a sorted array of these numbers. Points
+    are numbered from 0.
 
     Parameters
     ----------
     points : array_like (n_points, dim)
         Reference coordinates [length].
     cells : mapping of str to array_like (n_cells, n_nodes)
-        Connectivity by element type (``"tri3"``, ``"line2"``, ...).
+        Point numbers of the nodes of each cell, by element type, such as ``"tri3"`` or ``"line2"``.
     cell_groups : mapping of str to array_like (n,)
         Cell numbers of each named group of cells.
     point_groups : mapping of str to array_like (n,)
@@ -152,7 +152,7 @@ class Mesh:
 
     @property
     def dim(self) -> int:
-        """Dimension of the space, 2 or 3."""
+        """Number of coordinates of a point, 2 or 3."""
         return int(self.points.shape[1])
 
     @cached_property
@@ -162,21 +162,24 @@ class Mesh:
 
     @property
     def solids(self) -> dict[str, AnyArray]:
-        """Connectivity (n_cells, n_nodes) of the cells that have the dimension of the space, by element type."""
+        """Connectivity (n_cells, n_nodes) of the cells of dimension `dim`, by element type."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim}
 
     @property
     def facets(self) -> dict[str, AnyArray]:
-        """Connectivity (n_cells, n_nodes) of the cells one dimension below the space, by element type."""
+        """Connectivity (n_cells, n_nodes) of the cells of dimension ``dim - 1``, by element type."""
         return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim - 1}
 
     @property
     def group_names(self) -> list[str]:
-        """Names of all groups: cell groups, then point groups not already named."""
+        """Names of all groups, each once: cell groups, then point groups."""
         return list(self.cell_groups) + [name for name in self.point_groups if name not in self.cell_groups]
 
     def split(self, numbers: AnyArray) -> dict[str, Indices]:
-        """Return by element type the rows (m,) of the cells `numbers` (n,); types without such cells are absent."""
+        """Return the rows (m,) in `cells` of the cells with the given `numbers` (n,), by element type.
+
+        Element types to which none of these cells belongs are absent.
+        """
         rows = {}
         for name, start in self.offsets.items():
             inside = (numbers >= start) & (numbers < start + len(self.cells[name]))
@@ -185,9 +188,9 @@ class Mesh:
         return rows
 
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
-        """Return the connectivity (n_cells, n_nodes) of a cell group by element type, only of the dimension `dim` if given.
+        """Return the connectivity (n_cells, n_nodes) of a cell group by element type.
 
-        MeshError if there is no cell group of that name.
+        If `dim` is given, only cells of this dimension are returned. MeshError if there is no cell group of this name.
         """
         if group in self.point_groups and group not in self.cell_groups:
             near = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
@@ -203,9 +206,10 @@ class Mesh:
         return {name: self.cells[name][r] for name, r in rows.items() if dim is None or elements.get(name).dim == dim}
 
     def points_of(self, group: str) -> AnyArray:
-        """Return the sorted point numbers (n,) of a group: a point group, or else all nodes of a cell group.
+        """Return the sorted point numbers (n,) of a point group or, if there is none of this name, of a cell group.
 
-        MeshError if there is no such group; the message lists similar names.
+        The points of a cell group are the nodes of its cells. MeshError if there is no group of this name; the message
+        lists similar names.
         """
         if group in self.point_groups:
             return self.point_groups[group]
@@ -226,9 +230,9 @@ class Mesh:
         return unknown(kind, group, known)
 
     def point(self, group: str) -> int:
-        """Return the number of the only point of a group.
+        """Return the point number of a group with a single point.
 
-        MeshError if the group does not hold exactly one point.
+        MeshError if the group does not contain exactly one point.
         """
         numbers = self.points_of(group)
         if len(numbers) != 1:
@@ -236,14 +240,18 @@ class Mesh:
         return int(numbers[0])
 
     def replace(self, **changes: Any) -> Mesh:
-        """Return a mesh with some of `points`, `cells`, `cell_groups`, `point_groups` replaced."""
+        """Return a copy of the mesh in which some of `points`, `cells`, `cell_groups` and `point_groups` are replaced."""
         fields = {name: getattr(self, name) for name in ("points", "cells", "cell_groups", "point_groups")}
         return Mesh(**{**fields, **changes})
 
     def with_groups(
         self, cells: Mapping[str, ArrayLike] | None = None, points: Mapping[str, ArrayLike] | None = None
     ) -> Mesh:
-        """Return the mesh with added or redefined groups, by name: `cells` (n,) of int, `points` (n,) of int."""
+        """Return the mesh with added or redefined groups.
+
+        The mappings `cells` (n,) of int and `points` (n,) of int contain the cell numbers of cell groups and the point
+        numbers of point groups, by name.
+        """
         return self.replace(
             cell_groups={**self.cell_groups, **(cells or {})},
             point_groups={**self.point_groups, **(points or {})},
@@ -257,28 +265,29 @@ class Mesh:
         between: bool = False,
         of: str | None = None,
     ) -> Mesh:
-        """Return the mesh with a new group of facets of its solids, selected by position; missing facets are added as cells.
+        """Return the mesh with a new group of facets of its solid cells, which are selected by position.
 
-        For groups of points use ``with_groups(points={name: np.flatnonzero(...)})``.
+        Selected facets that the mesh does not contain as cells are added. To select points by position, use
+        ``with_groups(points={name: np.flatnonzero(...)})``.
 
         Parameters
         ----------
         name : str
             Name of the group; an existing group of this name is replaced.
         where : callable
-            From positions (n_points, dim) [length] to bool (n_points,). A facet belongs to the group if all its nodes are
-            True.
+            Function from positions (n_points, dim) [length] to booleans (n_points,). A facet belongs to the group if the
+            function is True for all its nodes.
         between : bool
-            Select facets between two cells, such as a section through a body, instead of those on the outer surface.
+            Select facets between two solid cells, such as a section through a body, instead of facets on the surface.
         of : str, optional
-            Group of the solid cells to which the facets belong, by default all. It distinguishes coinciding faces of
-            two bodies.
+            Group of the solid cells to which the facets belong; by default all solid cells. With this group the facets of
+            one of two coincident faces can be selected.
 
         Raises
         ------
         MeshError
-            If there is no such facet, a point group has this name, `of` holds no solid cells, or `where` returns an
-            array of another type or shape.
+            If no facet is selected, a point group has the name `name`, the group `of` contains no solid cells, or `where`
+            returns an array of another type or shape.
 
         Examples
         --------
@@ -305,7 +314,10 @@ class Mesh:
         return self.with_facets({name: facets})
 
     def _cells_inside(self, name: str, group: str) -> dict[str, Mask]:
-        """Return which solid cells (n_cells,) a group has, by element type; MeshError, with facet group `name`, if none."""
+        """Return for each solid cell (n_cells,) whether it belongs to a group, by element type.
+
+        MeshError if the group contains no solid cells; the message names the facet group `name`.
+        """
         if not self.cells_of(group, dim=self.dim):
             raise MeshError(
                 f"facet group '{name}' cannot be taken from '{group}', which has no solid cells: name a body's group"
@@ -314,9 +326,10 @@ class Mesh:
         return {kind: np.isin(np.arange(len(block)), rows.get(kind, [])) for kind, block in self.solids.items()}
 
     def with_facets(self, groups: Mapping[str, Mapping[str, ArrayLike]]) -> Mesh:
-        """Return the mesh with new groups of facets; missing facets are added, groups of the same names are replaced.
+        """Return the mesh with new groups of facets, which replace groups of the same names.
 
-        `groups` (n_facets, n_nodes) of int holds the nodes of the facets, by name of the group and by element type.
+        `groups` (n_facets, n_nodes) of int contains the nodes of the facets, by name of the group and by element type.
+        Facets that the mesh does not contain as cells are added.
         """
         cells = dict(self.cells)
         rows: dict[str, dict[str, AnyArray]] = {}
@@ -334,7 +347,7 @@ class Mesh:
         return self.replace(cells=cells, cell_groups={**renewed, **{name: numbers(rows[name]) for name in rows}})
 
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
-        """Return the mesh with a new cell group `name`, the union of the cell groups `members`."""
+        """Return the mesh with a new cell group called `name`, which is the union of the cell groups `members`."""
         cells = []
         for member in members:
             self.cells_of(member)

@@ -1,4 +1,4 @@
-"""Quality of a mesh: angles, lengths, and degenerate or inverted cells."""
+"""Quality measures of a mesh, and checks for degenerate and inverted cells."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements, quality_kernels
 from fastcontact.mesh.mesh import Mesh
 
-# Jacobians below this fraction of the squared (cubed) longest edge are round-off.
+# Jacobians below this fraction of the square, in 3D of the cube, of the longest edge are attributed to round-off.
 _FLAT = 1e-12
-# Limits for poor cells: smallest over largest Jacobian, largest angle [degrees], volume over the cube of the longest edge.
+# Limits beyond which a cell is poor: ratio of smallest to largest Jacobian, largest angle [degrees], and ratio of the volume
+# to the cube of the longest edge.
 EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
-# What to do about bad cells.
+# Remedies for bad cells, as parts of messages.
 REMEDIES = {
     "degenerate": "remove it or merge its points differently",
     "inverted": "reorient it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
@@ -25,20 +26,28 @@ REMEDIES = {
 
 @dataclass(frozen=True)
 class MeshQuality:
-    """Figures of a mesh; angles and lengths are those of the straight-sided cells on the corner nodes.
+    """Quality measures of a mesh.
+
+    Angles and lengths are those of cells with straight edges between the corner nodes.
 
     Attributes
     ----------
     smallest_angle, largest_angle : float
-        Corner angles of all two-dimensional cells [degrees]; NaN without such cells.
-    shortest_edge, longest_edge, worst_aspect : float
-        Edges of the solid cells [length], and the largest ratio of two in one cell; NaN without cells.
+        Extreme corner angles of all two-dimensional cells [degrees]; NaN without such cells.
+    shortest_edge, longest_edge : float
+        Extreme lengths of the edges of the solid cells [length]; NaN without solid cells.
+    worst_aspect : float
+        Largest ratio of the lengths of two edges of one cell [-]; NaN without solid cells.
     measure : float
-        Area in 2D [length^2], volume in 3D [length^3], of the solid cells with their curved sides.
-    n_points, n_bad, dim : int
-        Number of points, and of solid cells that are degenerate or inverted, see `check_cells`; dimension of the space.
+        Total area in 2D [length^2], or total volume in 3D [length^3], of the solid cells with their curved sides.
+    n_points : int
+        Number of points.
+    n_bad : int
+        Number of solid cells that are degenerate or inverted, see `check_cells`.
+    dim : int
+        Number of coordinates of a point, 2 or 3.
     n_cells : dict of str to int
-        Number of cells by element type, facets too.
+        Number of cells, including facets, by element type.
     """
 
     smallest_angle: float
@@ -98,9 +107,9 @@ def quality(mesh: Mesh) -> MeshQuality:
 def check_cells(mesh: Mesh) -> None:
     """Check that every solid cell has a positive Jacobian at its default quadrature points.
 
-    MeshError if a cell is degenerate (its area or volume is zero to rounding) or inverted (clockwise, or folded so that
-    the Jacobian is negative at a quadrature point), has a node twice, or is in the mesh twice; the message names the
-    first one and its place.
+    MeshError if a cell is degenerate, that is if its area or volume is zero up to round-off; if it is inverted, that is if a
+    Jacobian is negative; if it contains a node twice; or if two cells have the same nodes. The message states the number
+    and the position of the first such cell.
     """
     for name in mesh.solids:
         _check_nodes(mesh, name)
@@ -114,10 +123,10 @@ def check_cells(mesh: Mesh) -> None:
 
 
 def poorest_cell(mesh: Mesh) -> str:
-    """Return a sentence about the poorest solid cell of a mesh if it spoils the solution, else an empty string.
+    """Return a sentence about the poorest solid cell of a mesh if it impairs the solution, otherwise an empty string.
 
-    A cell is poor whose Jacobian is nearly zero somewhere, in 2D one with an angle near 180 degrees (Babuska and Aziz,
-    1976: small angles do no harm), in 3D one that is nearly flat.
+    A cell is poor if its Jacobian is nearly zero somewhere, if it has an angle near 180 degrees in 2D (small angles have no
+    such effect; Babuska and Aziz, 1976), or if it is nearly flat in 3D.
     """
     for name in mesh.solids:
         measure, low, high, longest = _extremes(mesh, name)
@@ -136,7 +145,7 @@ def poorest_cell(mesh: Mesh) -> str:
 
 
 def _check_nodes(mesh: Mesh, name: str) -> None:
-    """Raise MeshError if a cell contains a node twice: its facets there have no area, and its stresses are undefined."""
+    """Raise MeshError if a cell contains a node twice, because its stresses are then undefined."""
     nodes = np.sort(mesh.cells[name], axis=1)
     twice = nodes[:, 1:] == nodes[:, :-1]
     bad = np.flatnonzero(twice.any(axis=1))
@@ -149,9 +158,9 @@ def _check_nodes(mesh: Mesh, name: str) -> None:
 
 
 def _check_twice(mesh: Mesh, name: str) -> None:
-    """Raise MeshError if two cells of an element have the same nodes: together they would be twice as stiff."""
+    """Raise MeshError if two cells of one element type have the same nodes, because their stiffness is counted twice."""
     nodes = mesh.cells[name].astype(np.int64)
-    # Sums distinguish most cells; only those with equal sums are compared node by node.
+    # Most cells are distinguished by sums of their nodes; only cells with equal sums are compared node by node.
     key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)
     order = np.argsort(key, kind="stable")
     alike = np.flatnonzero(key[order[1:]] == key[order[:-1]])
@@ -166,7 +175,7 @@ def _check_twice(mesh: Mesh, name: str) -> None:
 
 
 def _described(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
-    """Return number, element, position and, if given, size of a cell for messages."""
+    """Return a text with number, element type, position and, if `measure` is given, size of a cell, for messages."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
     return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"
@@ -185,7 +194,7 @@ def _angles(corners: Array) -> Array:
     if corners.shape[2] == 3:
         return np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), cosine)
     sine = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
-    # Interior angles for either orientation, so that a re-entrant corner has more than 180 degrees.
+    # For either orientation of the cell the angles are interior angles, which exceed 180 degrees at re-entrant corners.
     sine *= np.where(sine.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     return np.arctan2(sine, cosine) % (2 * np.pi)
 
@@ -197,7 +206,7 @@ def _edge_lengths(mesh: Mesh, name: str) -> Array:
 
 
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
-    """Return area or volume of each cell (n_cells,), whether it is round-off, and whether a Jacobian is not positive."""
+    """Return area or volume of each cell (n_cells,), whether this is zero up to round-off, and whether a cell is inverted."""
     measure, low, high, longest = _extremes(mesh, name)
     rounding = _FLAT * longest**mesh.dim
     flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
@@ -205,7 +214,7 @@ def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
 
 
 def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
-    """Return, each (n_cells,), area or volume, smallest and largest Jacobian, longest edge of the cells of an element."""
+    """Return area or volume, smallest Jacobian, largest Jacobian and longest edge of the cells of one type (n_cells,)."""
     element = elements.get(name)
     _, gradients, weights = element.tables
     low, high, measure, longest = np.empty((4, len(mesh.cells[name])))

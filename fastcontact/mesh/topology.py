@@ -1,7 +1,8 @@
-"""Connectivity of a mesh: outer facets, bodies, their rigid parts, orientation, nodes in order along a line.
+"""Connectivity of a mesh: outer facets, bodies and their rigid parts, orientation of cells, and nodes along a line.
 
-Rigid parts are connected by hinges, a single node or nodes on one line. Cells with a common facet belong to one part, and so
-do parts with two common nodes in 2D, or with three non-collinear ones in 3D. The other common nodes of parts are hinges.
+A body consists of rigid parts if some of its cells are connected only by hinges, that is by a single node or, in 3D, by nodes
+on one line, about which they can rotate relative to each other. Cells with a common facet belong to one part, and so do parts
+with two common nodes in 2D, or with three common nodes that are not collinear in 3D. Other common nodes of parts are hinges.
 """
 
 from __future__ import annotations
@@ -25,27 +26,27 @@ from fastcontact.mesh.mesh import Mesh
 
 Found = TypeVar("Found")
 Further = ParamSpec("Further")
-# Nodes nearer to each other, or to a line, than this fraction of the size of the mesh coincide, or lie on the line.
+# Distance, relative to the size of the mesh, below which nodes are regarded as coincident, or as points of a line.
 IN_LINE = 1e-6
 
 
 def corner_areas(mesh: Mesh, name: str) -> Array:
-    """Return the signed area (n_cells,) [length^2] of the corner polygons of the 2D cells of element `name`."""
+    """Return the signed area (n_cells,) [length^2] of the polygons of the corners of the 2D cells of type `name`."""
     corners = mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]]
     x, y = corners[..., 0], corners[..., 1]
     return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
 
 
 def corner_volumes(mesh: Mesh, name: str) -> Array:
-    """Return the signed volume (n_cells,) [length^3] of the 3D cells of element `name` on their corners alone.
+    """Return the signed volume (n_cells,) [length^3] of the linear cells with the corners of the 3D cells of type `name`.
 
-    Faces of four corners are bilinear. The sum is that of the linear element's quadrature, which is exact.
+    Faces with four corners are bilinear. The quadrature of the linear element is exact for this volume.
     """
     linear = elements.get(elements.get(name).linear)
     _, gradients, weights = linear.tables
     corners = mesh.points[mesh.cells[name][:, : linear.n_nodes]]
     volumes = np.zeros(len(corners))
-    # One quadrature point at a time keeps the memory at a few arrays of n_cells.
+    # Adding one quadrature point at a time limits the memory to a few arrays of length n_cells.
     for gradient, weight in zip(gradients, weights, strict=True):
         a, b, c = np.moveaxis(np.einsum("cni,nj->cij", corners, gradient), 2, 0)
         volumes += weight * np.einsum("ci,ci->c", np.cross(a, b), c)
@@ -54,11 +55,10 @@ def corner_volumes(mesh: Mesh, name: str) -> Array:
 
 @typed(MeshError)
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
-    """Return the mesh with all solid cells oriented, and the number of reoriented cells.
+    """Return the mesh with all solid cells oriented positively, and the number of reoriented cells.
 
-    Two-dimensional cells run counter-clockwise; in three dimensions the normals of facets point outward. MeshError if
-    an inverted cell lies on the same side of a facet as its neighbour: the mesh is folded there, and reorienting the
-    cell would hide this.
+    The nodes of 2D cells are then ordered counter-clockwise, and the normals of the facets of 3D cells point outward.
+    MeshError if an inverted cell lies on the same side of a facet as its neighbour, because the mesh is folded there.
     """
     measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
@@ -98,7 +98,10 @@ def _check_folds(mesh: Mesh) -> None:
 
 
 def _direction(facets: Indices) -> Indices:
-    """Return three nodes (n, 3) by which facets and their orientation differ: the lowest, the next, the last."""
+    """Return three nodes (n, 3) of each facet which identify it with its orientation.
+
+    They are the node with the lowest number, the node after it and the node before it.
+    """
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
     # The orientation of a line is the order of its two ends.
@@ -107,7 +110,7 @@ def _direction(facets: Indices) -> Indices:
 
 
 def remembered(function: Callable[Concatenate[Mesh, Further], Found]) -> Callable[Concatenate[Mesh, Further], Found]:
-    """Decorate `function` to cache its result for each mesh and further arguments; meshes are immutable."""
+    """Decorate `function` such that its result is cached for each mesh, which is immutable, and further arguments."""
     known: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Found]] = WeakKeyDictionary()
 
     @wraps(function)
@@ -123,9 +126,9 @@ def remembered(function: Callable[Concatenate[Mesh, Further], Found]) -> Callabl
 @typed(MeshError)
 @remembered
 def bodies(mesh: Mesh) -> tuple[int, Numbers]:
-    """Return the number of bodies (sets of solid cells connected by nodes) and the body (n_points,) of each point.
+    """Return the number of bodies and the body (n_points,) to which each point belongs, -1 for points without a solid cell.
 
-    It is -1 for points without a solid cell.
+    A body is a set of solid cells that are connected by common nodes.
     """
     rows, columns, used = [], [], np.zeros(mesh.n_points, bool)
     for block in mesh.solids.values():
@@ -146,22 +149,25 @@ def bodies(mesh: Mesh) -> tuple[int, Numbers]:
 
 @typed(MeshError)
 def outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
-    """Return by facet element the facets (n_facets, n_nodes) of exactly one solid cell, normals pointing outward."""
+    """Return the facets (n_facets, n_nodes) that belong to exactly one solid cell, by element type of the facet.
+
+    Their nodes are ordered such that normals point outward.
+    """
     return _facets(mesh)[0]
 
 
 @typed(MeshError)
 def cells_joined_by_facets(mesh: Mesh) -> Numbers:
-    """Return for each cell (n_cells,) of the mesh the lowest cell connected with it through common facets.
+    """Return for each cell (n_cells,) the lowest number of a cell that is connected with it by a chain of common facets.
 
-    For cells that are not solids it is the cell itself.
+    For cells that are not solid cells it is the number of the cell itself.
     """
     return _facets(mesh)[1]
 
 
 @typed(MeshError)
 def cells_of_outer_facets(mesh: Mesh) -> Mapping[str, Numbers]:
-    """Return by facet element the number (n_facets,) of the solid cell behind each of the `outer_facets`."""
+    """Return the number (n_facets,) of the solid cell of each of the `outer_facets`, by element type of the facet."""
     return _facets(mesh)[2]
 
 
@@ -190,7 +196,10 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
 
 
 def same_facets(among: Numbers, facets: Numbers) -> Indices:
-    """Return for each of `facets` (n, k) the row (n,) in `among` (m, k) of the one with the same nodes, -1 for none."""
+    """Return for each of the `facets` (n, k) the row (n,) in `among` (m, k) of the facet with the same nodes.
+
+    The row is -1 if there is no such facet.
+    """
     near = np.flatnonzero(np.isin(among, facets).all(axis=1))
     keys = np.sort(np.vstack([among[near], facets]), axis=1)
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
@@ -199,14 +208,14 @@ def same_facets(among: Numbers, facets: Numbers) -> Indices:
 
 @dataclass(frozen=True, eq=False)
 class OrderedLine:
-    """Nodes of a line of facets in order, with the length along it.
+    """The nodes of a line of facets in their order along the line.
 
     Attributes
     ----------
     points : ndarray of int (m,)
-        Point numbers from the start node on.
+        Point numbers of the nodes, beginning at the start of the line.
     abscissa : ndarray (m,)
-        Length from the start node along the straight pieces between consecutive nodes [length].
+        Distance from the start along the straight segments between consecutive nodes [length].
     """
 
     points: Numbers
@@ -215,15 +224,16 @@ class OrderedLine:
 
 @typed(MeshError)
 def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> OrderedLine:
-    """Return the ordered nodes and the abscissa of a line group, like code_aster's NOEUD_ORDO and ABSC_CURV.
+    """Return the nodes of a line group in order with their abscissae, like NOEUD_ORDO and ABSC_CURV of code_aster.
 
     Parameters
     ----------
     mesh : Mesh
     group : str
-        A group of line cells that form one open line.
+        Group of line cells that form a single open line.
     start : str or int, optional
-        The end to start from: a group with one point, or a point number; by default the end nearest to x = 0.
+        End at which the line starts: the name of a group with one point, or the number of a point; by default the end
+        nearest to x = 0.
 
     Returns
     -------
@@ -232,7 +242,7 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     Raises
     ------
     MeshError
-        If the group holds no lines, branches, is closed or disconnected, or `start` is not one of its ends.
+        If the group contains no lines, has branches, is closed or not connected, or `start` is not one of its ends.
 
     Examples
     --------
@@ -276,16 +286,16 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
 
 @dataclass(frozen=True, eq=False)
 class RigidParts:
-    """Parts of bodies, and the hinges between them.
+    """The rigid parts of bodies, and the hinges between them.
 
     Attributes
     ----------
     count : int
-        Number of parts; that of the bodies where there are no hinges.
+        Number of parts, which is the number of bodies if there are no hinges.
     part : ndarray of int (n_points,)
-        The part of each point, the lowest one of several; -1 for points without a solid cell.
+        Number of the part of each point, the lowest if it belongs to several parts; -1 for points without a solid cell.
     hinge_node, hinge_part : ndarray of int (k,)
-        Nodes at hinges, ascending, each once for every part that it belongs to.
+        Pairs of a node at a hinge and a part to which it belongs, in ascending order of the nodes.
     """
 
     count: int
@@ -294,18 +304,18 @@ class RigidParts:
     hinge_part: Indices
 
     def hinges_of(self, number: int) -> Indices:
-        """Return the nodes (k,) of int at which a part is attached to others, ascending."""
+        """Return the numbers (k,) of int of the nodes at which a part is connected to other parts, in ascending order."""
         return self.hinge_node[self.hinge_part == number]
 
     def nodes_of(self, number: int) -> Indices:
-        """Return the nodes (k,) of int of a part, ascending, with those at hinges."""
+        """Return the numbers (k,) of int of all nodes of a part, including those at hinges, in ascending order."""
         nodes, hinges = np.flatnonzero(self.part == number), self.hinges_of(number)
         return np.union1d(nodes, hinges) if len(hinges) else nodes
 
 
 @remembered
 def rigid_parts(mesh: Mesh) -> RigidParts:
-    """Return the parts of the bodies of a mesh."""
+    """Return the rigid parts of the bodies of a mesh."""
     count, body = bodies(mesh)
     joined = cells_joined_by_facets(mesh)
     roots = {name: joined[mesh.offsets[name] :][: len(block)] for name, block in mesh.solids.items()}
@@ -330,9 +340,10 @@ def rigid_parts(mesh: Mesh) -> RigidParts:
 
 
 def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return a part (n_points,) of each point, the lowest of several, and nodes (k,) of several parts with each part.
+    """Return the lowest part (n_points,) of each point, and pairs (k,) of shared nodes and their parts.
 
-    `label` (n_solids,) is the part of each solid cell; points without one get -1.
+    `label` (n_solids,) contains the part of each solid cell. The part is -1 for points without a solid cell. A shared node
+    belongs to several parts and occurs in a pair with each of them.
     """
     part = np.full(mesh.n_points, -1, np.intp)
     shared = np.zeros(mesh.n_points, bool)
@@ -352,7 +363,7 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
 
 
 def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return pairs of parts (m,) and their common nodes, from ascending nodes with each of their parts."""
+    """Return pairs of parts (m,) with a common node, and this node, from nodes in ascending order and their parts."""
     meetings = [np.empty((3, 0), np.intp)]
     shift = 1
     while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
@@ -363,7 +374,7 @@ def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
 
 
 def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
-    """Return whether two parts cannot rotate relative to each other, for each pair (m,) `first`, `second` at a node."""
+    """Return for each pair (m,) of parts `first` and `second` with a common node whether they are rigidly connected."""
     if not len(at):
         return np.empty(0, bool)
     _, pair, count = np.unique(np.stack([first, second]), axis=1, return_inverse=True, return_counts=True)
@@ -371,6 +382,6 @@ def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
     mean = np.column_stack([np.bincount(pair, points[at, d]) for d in range(dim)]) / count[:, None]
     away = points[at] - mean[pair]
     moment = np.stack([[np.bincount(pair, away[:, i] * away[:, j]) for j in range(dim)] for i in range(dim)])
-    # In two dimensions the common nodes must extend in one direction, in three in two.
+    # To prevent a relative rotation, the common nodes must extend in one direction in 2D, and in two directions in 3D.
     spread = np.linalg.eigvalsh(np.moveaxis(moment, 2, 0))[:, 1]
     return np.asarray((spread > (IN_LINE * np.ptp(points, axis=0).max()) ** 2)[pair])

@@ -1,4 +1,4 @@
-"""Model: a mesh with kinematics, materials, supports, loads and contact pairs; checked whole before any computation.
+"""A contact problem: a mesh with kinematics, materials, supports, loads and contact pairs, and its check as a whole.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -31,8 +31,8 @@ from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
 
-# Public methods and attributes of a model other than `add_...`; the rest is for the analysis.
-# Items that may act in some load steps only.
+# Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
+# Types of items that may act in some load steps only.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
 PUBLIC = (
     "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
@@ -42,33 +42,36 @@ PUBLIC = (
 
 @typed(ModelError)
 class Model(ModelSupports):
-    """An elastic contact problem.
+    """A contact problem of elastic or elastoplastic bodies.
 
-    Methods check their arguments, and `check` checks the whole model: a MeshError, ModelError or ContactError states
-    in one line the cause and the remedy. Prescribed values are numbers, or functions from reference positions (n, dim)
-    [length] to numbers (n,). A `ramp` is a separate history, as pairs (instant, multiplier) or a `Ramp`, whose table
-    is used; by default the history is that of the analysis. Normals and areas are those of the reference
-    configuration.
+    Each method checks its arguments, and `check` checks the complete model. The MeshError, ModelError or ContactError of a
+    check states the cause and the remedy in one line.
+
+    Prescribed values are numbers, or functions from reference positions (n, dim) [length] to numbers (n,). They are
+    multiplied by a history, a piecewise linear function of the load factor. The parameter `ramp` of many methods gives
+    an item a separate history, as pairs (load factor, multiplier) or as a `Ramp`, of which only the table is used. By
+    default all items have the history of the analysis, see `solve`. Normals and areas refer to the reference
+    configuration unless stated otherwise.
 
     Parameters
     ----------
     mesh : Mesh
-    kinematics : str
-        ``"axisymmetric"`` (x is the radius, y the axis, on which x is held at zero without a support),
-        ``"plane_strain"``, ``"plane_stress"`` or ``"3d"``.
+        Mesh of all bodies.
+    kinematics : {"plane_strain", "plane_stress", "axisymmetric", "3d"}
+        In axisymmetry x is the radius and y the axis, and the radial displacement on the axis is fixed at zero.
     case_text : str
-        Text kept in result files beside the numbers, usually the case file.
+        Text that result files store, usually the case file.
     strain : {"small", "finite"}
-        ``"finite"``: finite strains and rotations (total Lagrangian), with hyperelastic materials such as
-        `NeoHookean`, or with `LinearElastic` as the Saint Venant-Kirchhoff law for small strains and large rotations.
-        Pressures follow the deformed surface, other loads keep their directions and reference areas; stresses are
-        Cauchy stresses.
+        With ``"finite"`` strains and rotations are finite (total Lagrangian formulation). Materials are then hyperelastic,
+        such as `NeoHookean`, or `LinearElastic`, which is interpreted as the Saint Venant-Kirchhoff law for small strains
+        and large rotations. Pressures follow the deformed surface; other loads keep their directions and reference areas.
+        Stresses are Cauchy stresses.
     reference_temperature : float
-        With heat conduction, the initial temperature of the bodies, without thermal strain [temperature].
-    units : str or mapping of str to str
-        Names of the units of length, force and pressure, ``"mm, N, MPa"``, or by ``"length"``, ``"force"``,
-        ``"pressure"``. Tables, reports, pictures and result files show them, and a warning is given if force /
-        length^2 is not the unit of pressure. They are optional and change no number.
+        Initial temperature of the bodies with heat conduction, at which the thermal strain is zero [temperature].
+    units : str or mapping of str to str, optional
+        Names of the units of length, force and pressure, either in this order as a text such as ``"mm, N, MPa"``, or by
+        the keys ``"length"``, ``"force"`` and ``"pressure"``. Tables, reports, plots and result files show them, and a
+        warning is given if force / length^2 is not the unit of pressure. Computed numbers do not depend on them.
 
     Examples
     --------
@@ -96,7 +99,7 @@ class Model(ModelSupports):
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
-        """Return a description of the model, one line each for kinematics, materials, supports, loads and contact.
+        """Return a description of the model with one line for the kinematics and for each material, support, load and pair.
 
         Examples
         --------
@@ -114,16 +117,17 @@ class Model(ModelSupports):
         return "\n".join(sentences(self))
 
     def check(self, ramp: Ramp | None = None) -> None:
-        """Check the whole model and the consistency of its histories with `ramp`; `solve` begins with this check.
+        """Check the complete model, and the consistency of its histories with the load steps; `solve` calls this method.
 
         Parameters
         ----------
         ramp : Ramp, optional
+            Load steps of the analysis; by default 20 equal steps.
 
         Raises
         ------
         MeshError, ModelError, ContactError
-            With one line that names the error and its remedy.
+            If the model is incomplete or contradictory; the message states the cause and the remedy in one line.
 
         Examples
         --------
@@ -182,14 +186,14 @@ class Model(ModelSupports):
                 raise _in_steps_after(begin, error) from None
 
     def _acting(self, begin: float) -> Model:
-        """Return the model with the items that act in the load step that begins at an instant."""
+        """Return the model with only those items that act in the load step that begins at the load factor `begin`."""
         acting = copy.copy(self)
         acting.relations = [r for r in self.relations if not isinstance(r, TemporaryConstraint) or r.acts_from(begin)]
         acting.heat_loads = [r for r in self.heat_loads if not isinstance(r, TemporaryHeat) or r.acts_from(begin)]
         return acting
 
     def _changes(self) -> list[float]:
-        """Return the instants at which temporary constraints, temperatures or films begin or end, and 0."""
+        """Return 0 and the load factors at which temporary constraints, prescribed temperatures or films begin or end."""
         temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
         return sorted({0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)})
 
@@ -203,7 +207,10 @@ class Model(ModelSupports):
             motion.lift(lift.ravel(), motion.values([multiplier(r.ramp, ramp, instant) for r in relations]))
 
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
-        """Refuse rigid-body motions that no supports, constraints, springs or loads against a contact prevent."""
+        """Raise ModelError if a rigid-body motion is possible.
+
+        Supports, constraints and springs prevent rigid-body motions, and so does contact against which a load acts.
+        """
         driven = self.force_driven
         motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
@@ -218,5 +225,5 @@ class Model(ModelSupports):
 
 
 def _in_steps_after(begin: float, error: ModelError) -> ModelError:
-    """Return an error of the load steps that begin at an instant."""
+    """Return `error` with the addition that it concerns the load steps after the load factor `begin`."""
     return ModelError(f"in the load steps after {begin:g}: {error}") if begin else error

@@ -1,4 +1,4 @@
-"""The load ramp: the instants to solve at, and the multiplier of the loads there."""
+"""The load ramp: the load factors at which the model is solved, and the multiplier of the loads as a function of them."""
 
 from __future__ import annotations
 
@@ -15,22 +15,24 @@ from fastcontact.arrays import Array
 from fastcontact.elasticity.loads import LARGEST
 from fastcontact.errors import ModelError
 
-# Points (instant, multiplier of the loads) of a piecewise linear function.
+# Points (load factor, multiplier of the loads) of a piecewise linear function.
 Table = tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True)
 class Harmonic:
-    """The history of the sine of an angle, or of one minus its cosine, in which a rotation is linear.
+    """The history of the sine, or of one minus the cosine, of a rotation angle.
+
+    The displacement of a rigid rotation is a linear combination of these two functions.
 
     Attributes
     ----------
     ramp : Table, optional
-        History of the angle; None: that of the analysis.
+        History of the angle; None stands for the history of the analysis.
     angle : float
         Angle at multiplier 1 [radian].
     versine : bool
-        Whether it is one minus the cosine.
+        Whether the history is one minus the cosine instead of the sine.
     """
 
     ramp: Table | None
@@ -38,12 +40,12 @@ class Harmonic:
     versine: bool
 
     def value(self, multiplier: float) -> float:
-        """Return sine, or one minus cosine, at a multiplier of the angle [-]."""
+        """Return the sine, or one minus the cosine, of `multiplier` times the angle [-]."""
         angle = multiplier * self.angle
         return 2.0 * math.sin(0.5 * angle) ** 2 if self.versine else math.sin(angle)
 
 
-# Histories of parts of the prescribed displacements.
+# History of a part of the prescribed displacements; None stands for the history of the analysis.
 PartHistory = Table | Harmonic | None
 # Largest number of equal steps; more are probably a typing error.
 MOST_STEPS = 1_000_000
@@ -69,14 +71,14 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
 
 
 def table_of(ramp: History, caption: str) -> Table | None:
-    """Return the table of a history, pass None through; errors as for `checked_table`."""
+    """Return the table of a history, or None for None; raise the errors of `checked_table`."""
     if ramp is None:
         return None
     return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, caption)
 
 
 def table_value(table: Table, instant: float) -> float:
-    """Return the piecewise linear function `table` at `instant`; constant beyond its ends."""
+    """Return the value of the piecewise linear function `table` at `instant`; the function is constant beyond its ends."""
     times, values = zip(*table, strict=True)
     return float(np.interp(instant, times, values))
 
@@ -84,19 +86,21 @@ def table_value(table: Table, instant: float) -> float:
 @typed(ModelError)
 @dataclass(frozen=True)
 class Ramp:
-    """Instants and a piecewise linear load function.
+    """The load steps of an analysis, and the multiplier of its loads as a piecewise linear function of the load factor.
+
+    The load factor is the pseudo-time of the analysis; its values at the ends of the load steps are called instants.
 
     Parameters
     ----------
-    instants : sequence or array of float
-        Ascending load factors (pseudo-times) at the ends of the steps.
+    instants : sequence of float or ndarray (n_steps,)
+        Ascending load factors at the ends of the load steps [-].
     table : sequence of (float, float)
-        Points (instant, multiplier of the loads) of the function, with ascending instants.
+        Points (load factor, multiplier of the loads) of the function, with ascending load factors [-].
 
     Raises
     ------
     ModelError
-        If the instants or the table do not ascend, or an instant lies outside the table.
+        If the instants or the load factors of the table do not ascend, or an instant lies outside the table.
 
     Examples
     --------
@@ -132,17 +136,28 @@ class Ramp:
         return len(self.instants)
 
     def value(self, instant: float) -> float:
-        """Return the multiplier of the loads at `instant`."""
+        """Return the multiplier of the loads at the load factor `instant` [-]."""
         return table_value(self.table, instant)
 
 
-# History of a single load: a ramp, of which the table is used, or pairs (instant, multiplier).
+# History of a single item of a model: a ramp, of which only the table is used, or pairs (load factor, multiplier).
 History = Ramp | Iterable[Iterable[float]] | None
 
 
 @typed(ModelError)
 def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
-    """Return a ramp of equal steps from zero load to full load at `end`.
+    """Return a ramp of equal load steps, along which the multiplier of the loads increases linearly from 0 to 1.
+
+    Parameters
+    ----------
+    steps : int
+        Number of load steps.
+    end : float
+        Load factor at the end of the last step, where the multiplier is 1 [-].
+
+    Returns
+    -------
+    Ramp
 
     Raises
     ------
@@ -168,10 +183,11 @@ RampLike = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
 
 
 def ramp_of(steps: RampLike | None) -> Ramp:
-    """Return the ramp of a `Ramp`, a number of equal steps, or an array; None: 20 equal steps.
+    """Return the ramp that `steps` describes: a `Ramp`, a number of equal steps, or an array; None stands for 20 steps.
 
-    Load factors (n,) are the ends of the steps, with loads proportional to them, also beyond 1. Pairs (instant, multiplier)
-    (n, 2) are the points of the load function, and all except the first end a step.
+    An array (n,) contains the load factors at the ends of the steps; the multiplier of the loads is equal to the load
+    factor, also beyond 1. An array (n, 2) contains the points (load factor, multiplier) of the load function, and each
+    point except the first one is the end of a step.
     """
     if steps is None:
         return linear_ramp()
@@ -195,12 +211,12 @@ def ramp_of(steps: RampLike | None) -> Ramp:
 
 
 def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
-    """Return the multiplier of a load at `instant`: that of its own history, or that of the ramp."""
+    """Return the multiplier of a load at `instant`, from its history `table` or, if `table` is None, from the ramp."""
     if isinstance(table, Harmonic):
         return table.value(multiplier(table.ramp, ramp, instant))
     return ramp.value(instant) if table is None else table_value(table, instant)
 
 
 def combined(by_ramp: Mapping[Any, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
-    """Return the sum of the parts at `instant`, each times its multiplier."""
+    """Return the sum of the arrays in `by_ramp` at `instant`, each times the multiplier of its history."""
     return sum((multiplier(table, ramp, instant) * values for table, values in by_ramp.items()), np.zeros(shape))

@@ -1,4 +1,4 @@
-"""Named units of a model: parsing, and consistency checks."""
+"""Parse the names of the units of a model, and check whether the units are consistent."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from fastcontact.errors import ModelError, check_known
 
-# Known units in SI.
+# Size of the known units in SI units, by quantity and name.
 KNOWN: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "in": 0.0254},
     "force": {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "lbf": 4.448222},
@@ -19,9 +19,9 @@ EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MP
 
 
 def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units by quantity, given as a text in the order of `KNOWN` or as a mapping.
+    """Return the names of units by quantity, from a text in the order of `KNOWN` or from a mapping.
 
-    Raises ModelError for anything else, and for a unit in the place of another kind.
+    Raise ModelError for other arguments, and for a name that is known as the unit of another quantity.
 
     Examples
     --------
@@ -42,12 +42,15 @@ def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
 
 
 def in_si(units: Mapping[str, str], kind: str) -> float | None:
-    """Return the unit of a quantity in SI; None if it has no name, or an unknown one."""
+    """Return the size of the unit of quantity `kind` in SI units; None if the unit has no name or an unknown name."""
     return KNOWN[kind].get(units.get(kind, ""))
 
 
 def misfit(units: Mapping[str, str]) -> str:
-    """Return a message if force / length^2 is not the unit of pressure; empty if it is, or a unit is unknown."""
+    """Return a message if force / length^2 is not the unit of pressure.
+
+    The message is empty if the units are consistent, or if the size of a unit is unknown.
+    """
     metre, newton, pascal = (in_si(units, kind) for kind in KNOWN)
     if metre is None or newton is None or pascal is None or 0.99 < (ratio := newton / metre**2 / pascal) < 1.01:
         return ""

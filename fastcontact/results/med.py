@@ -1,4 +1,4 @@
-"""Results of all load steps as fields of a MED file, for Salome and code_aster."""
+"""Write the results of all load steps as fields of a MED file, for Salome and code_aster."""
 
 from __future__ import annotations
 
@@ -15,35 +15,39 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import contact_pressure
 from fastcontact.results.step import StepResult
 
-# Position of each component in our order, xx yy zz xy yz xz: Salome and code_aster have xz before yz.
+# Index of each MED component in the order xx, yy, zz, xy, yz, xz of this package; in MED files xz precedes yz.
 STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
 
 
 @typed(FileError)
 def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh") -> None:
-    """Write a mesh and nodal results at all instants, for Salome and ParaVis.
+    """Write a mesh and the nodal results of all steps to a MED file, for Salome and ParaVis.
+
+    The file contains the following fields, whose instants are the load factors and whose order numbers are the indices of
+    the steps:
 
     - DEPL (DX, DY [, DZ]): displacement [length].
-    - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress [pressure]; in axisymmetry radial, axial, hoop, shear.
-    - SIEQ_NOEU (VMIS, VMIS_SG): equivalent stress, and with the sign of the trace [pressure].
-    - REAC_NODA (DX, DY [, DZ]): reactions [force]; in axisymmetry of the full circle, not of one radian as in code_aster.
-    - PRES_CONT (PRES): contact pressure [pressure], zero off the contact surfaces.
-
-    The instant is the load factor of the step, the order number its index.
+    - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress, in axisymmetry radial, axial, hoop and shear [pressure].
+    - SIEQ_NOEU (VMIS, VMIS_SG): von Mises stress, and von Mises stress with the sign of the trace [pressure].
+    - REAC_NODA (DX, DY [, DZ]): reactions [force]. In axisymmetry they are integrated over the full circle, in code_aster
+      over one radian.
+    - PRES_CONT (PRES): contact pressure, zero at nodes outside the contact surfaces [pressure].
 
     Parameters
     ----------
     path : path-like
+        File to write; an existing file is replaced.
     mesh : Mesh
+        The mesh of the steps.
     steps : iterable of StepResult
-        Consumed one by one, so that a generator is possible.
+        Steps, which are taken one by one, so that a generator can be passed.
     mesh_name : str
         Name of the mesh in the file, at most 64 bytes.
 
     Raises
     ------
     FileError
-        If the file cannot be written, there is no step, or two steps have the same index.
+        If the file cannot be written, there are no steps, or two steps have the same index.
     MeshError
         If a step does not belong to the mesh.
 
@@ -77,7 +81,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
 
 
 def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Return components and values (n_points, n_components) of each field."""
+    """Return the component names and the values (n_points, n_components) of each field, by name."""
     directions = tuple(f"D{axis}" for axis in AXES[: mesh.dim])
     stresses = tuple(STRESSES)[: 4 if mesh.dim == 2 else 6]
     stress = _checked(mesh, step, "stress", (len(stresses),))

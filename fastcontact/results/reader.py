@@ -1,4 +1,4 @@
-"""Reader of result files, which need neither the model nor the mesh file."""
+"""Read result files; neither the model nor the mesh file is needed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from fastcontact.results.units import units_of_results
 if TYPE_CHECKING:
     import pandas
 
-# Contact resultants that are None for NaN in files.
+# Contact resultants for which a NaN in the file represents None.
 OR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
@@ -44,17 +44,17 @@ def open_results(path: PathLike) -> Results:
     Parameters
     ----------
     path : path-like
-        A file that ``ResultWriter`` wrote or is still writing, in which case all complete steps are visible.
+        A file that a ``ResultWriter`` has written or is still writing; all complete steps can be read.
 
     Returns
     -------
     Results
-        A sequence of ``StepResult``.
+        A sequence of ``StepResult``, which reads a step on access. Use it in a ``with`` statement, or call ``close``.
 
     Raises
     ------
     FileError
-        If the file is missing, no result file, damaged, or written by a newer fastcontact.
+        If the file does not exist, is not a result file, is damaged, or was written by a newer version of fastcontact.
 
     Examples
     --------
@@ -64,40 +64,46 @@ def open_results(path: PathLike) -> Results:
 
 
 class Results(StepSequence):
-    """The steps of a result file, read on access, and further data of the file.
+    """A sequence of the steps of a result file, which are read on access, and further data of the file.
 
-    Steps are plain NumPy data and remain valid when the file is closed.
+    Steps contain NumPy arrays and remain valid after the file is closed.
 
     Attributes
     ----------
     path : pathlib.Path
-        The file.
+        Path of the file.
     schema : int
         Version of the layout of the file.
     mesh : Mesh
         The mesh with its groups.
-    kinematics, case_text : str
-        Kinematics of the analysis, and text of the case file, empty if there was none; that of the last steps if it
-        changed.
+    kinematics : str
+        Kinematics of the analysis, see `Model`.
+    case_text : str
+        Text of the case file, empty if there was none. If the run was resumed with a changed case file, the text is the
+        one with which the last steps were computed.
     versions : dict of str to str
         Versions of the packages that computed the results.
     load_factors : ndarray (n_steps,)
-        Pseudo-time of each step [-].
+        Load factor at the end of each step [-].
     units : dict of str to str
-        Names of units from the model or the case file, as in `StepResult`; otherwise empty.
+        Names of units from the model or the case file, as described for `ContactResult`; empty without names.
     warnings : tuple of str
-        All distinct warnings of the run and its steps.
+        All distinct warnings of the run and of its steps.
     log : object
-        Log of the run, None if there is none; ``{"failed_step": history}``, the iterations of the step (or the part of
-        it) that failed, if the run did not converge.
+        Log of the run, None without a log. If the run did not converge, it is ``{"failed_step": history}`` with the
+        iterations of the step, or of the substep, that failed.
     complete : bool
-        Whether the run has finished: False after a crash and during the run.
+        Whether the run has finished; False during the run and after a crash.
     error : str
-        Error that stopped the run; empty if there was none or it could not be written.
+        Error that stopped the run; empty if there was no error or it could not be written.
     """
 
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
-        """Open the file; `repeat` applies journalled writes after a power loss, which is not allowed beside a writer."""
+        """Open the file.
+
+        If `repeat`, writes of the journal that a power loss interrupted are repeated first, which requires that no other
+        program writes to the file.
+        """
         import h5py
 
         self.path: Path = existing_file(path)
@@ -105,7 +111,7 @@ class Results(StepSequence):
             raise FileError(f"'{path}' may not be read: ask its owner for the permission")
         if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is not an HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
-        # A separate file object: by name HDF5 would return a file already open in this process, in its former state.
+        # Opened by a separate file object, because HDF5 would reuse an open file of the same name with its cached state.
         self._raw: Any = open(path, "rb")  # noqa: SIM115
         self._file: Any = None
         try:
@@ -120,7 +126,7 @@ class Results(StepSequence):
             raise
 
     def _checked(self) -> Any:
-        """Return the group of fastcontact in the file, after a check of its schema."""
+        """Return the HDF5 group of fastcontact in the file, after a check of its schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
             raise ValueError("its addresses are not ours")
         check_contents(self._file, self.path)
@@ -159,7 +165,7 @@ class Results(StepSequence):
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
-        """Return the record of the end of the run; None during the run, after a crash, and if steps were added since."""
+        """Return the record of the end of the run; None during the run, after a crash, and if steps were added later."""
         if "runs" not in group:  # schema 1
             return _read_json(group["run"], self._raw) if "run" in group else None
         rows = group["runs"][-1:]
@@ -200,7 +206,7 @@ class Results(StepSequence):
         return f"Results('{self.path}': {self._n_steps} steps, {state}, {self.kinematics}, {self.mesh!r})"
 
     def _repr_html_(self) -> str:
-        """Return a table of the contents, and the last step, for notebooks."""
+        """Return tables of the contents and of the last step for notebooks."""
         reached = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
         rows = [
             ("steps", reached),
@@ -217,21 +223,21 @@ class Results(StepSequence):
         return html_table(rows, (), str(self.path)) + last
 
     def close(self) -> None:
-        """Close the file; steps already read remain valid, further ones cannot be read."""
+        """Close the file; steps that were read before remain valid, and no further steps can be read."""
         if self._file is not None:
             self._file.close()
         self._raw.close()
 
     def to_pyvista(self, step: int | StepResult | None = None) -> Any:
-        """Return all steps as a ``pyvista.MultiBlock``, or one as a ``pyvista.UnstructuredGrid``.
+        """Return all steps as a ``pyvista.MultiBlock``, or a single step as a ``pyvista.UnstructuredGrid``.
 
-        A grid has the solid cells with fields and groups, and ``field_data["load_factor"]``. Blocks are named ``"step 1"``,
-        ``"step 2"``, ...
+        A grid contains the solid cells with their fields and groups, and the load factor as ``field_data["load_factor"]``.
+        The blocks of all steps are named ``"step 1"``, ``"step 2"``, and so on.
 
         Parameters
         ----------
         step : int or StepResult, optional
-            A step, or its position, from 0, or from the end if negative.
+            A step, or its index in this sequence, which may be negative; by default all steps.
 
         Raises
         ------
@@ -245,8 +251,9 @@ class Results(StepSequence):
     def to_pandas(self) -> pandas.DataFrame:
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
 
-        There is a row for each secondary node, contact pair and step, with the columns ``step``, ``load_factor``,
-        ``contact`` and those of `contact_table`; ``attrs["units"]`` holds units by column.
+        The table has a row for each secondary node of each contact pair in each step. Its columns are ``step``,
+        ``load_factor``, ``contact`` (the name of the pair) and the columns of `contact_table`; ``attrs["units"]`` contains
+        the units by column.
 
         Raises
         ------
@@ -256,12 +263,12 @@ class Results(StepSequence):
         return conversions.contact_frame(self, self.units)
 
     def to_xarray(self) -> Any:
-        """Return the fields of all steps, in memory, as an ``xarray.Dataset``.
+        """Return the fields of all steps as an ``xarray.Dataset``, which is held in memory.
 
-        Its dimensions are ``step``, ``point``, ``axis``, ``stress_component`` and ``contact``: ``displacement`` [length],
-        ``stress``, ``von_mises``, ``contact_pressure`` [pressure], ``reaction`` [force] at the points; ``contact_force``
-        [force] and ``contact_pressure_max`` [pressure] of the pairs. ``x``, ``y`` (``z``) are reference coordinates
-        [length]. Names of `units` are attributes.
+        The dimensions are ``step``, ``point``, ``axis``, ``stress_component`` and ``contact``. The variables at the points
+        are ``displacement`` [length], ``stress``, ``von_mises``, ``contact_pressure`` [pressure] and ``reaction`` [force];
+        the variables of the pairs are ``contact_force`` [force] and ``contact_pressure_max`` [pressure]. The coordinates
+        ``x``, ``y`` and, in 3D, ``z`` are the reference positions [length]. The names of `units` are attributes.
 
         Raises
         ------
@@ -309,7 +316,11 @@ class Results(StepSequence):
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
-        """Return the restart data of the last step; None without any, or if steps were written since the file was opened."""
+        """Return the restart data of step `number`.
+
+        Only the last step has restart data. Return None if there are none, or if steps were written after the file was
+        opened.
+        """
         group, name = self._file["fastcontact"], layout.restart_table(number)
         try:
             stored = unpacked(group[name][()]) if name in group else {}
@@ -318,7 +329,7 @@ class Results(StepSequence):
         return stored["restart"] if stored.get("step") == number else None
 
     def _material_stress(self, number: int) -> MaterialStress | None:
-        """Return the stress of each side of material interfaces; None for a step or file without."""
+        """Return the stress in each material at nodes where materials meet; None if the step has no such stress."""
         group = self._file["fastcontact"]
         if "materials" not in group:
             return None
@@ -335,12 +346,12 @@ class Results(StepSequence):
 
     @property
     def point_field_names(self) -> list[str]:
-        """Names of the point fields stored for each step; earlier versions wrote fewer."""
+        """Names of the point fields that the file contains for each step; earlier versions wrote fewer fields."""
         return [name for name in (*layout.POINT_FIELDS, *layout.HEAT_FIELDS) if name in self._file["VTKHDF/PointData"]]
 
     @property
     def cell_field_names(self) -> list[str]:
-        """Names of the cell fields stored for each step."""
+        """Names of the cell fields that the file contains for each step."""
         static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
         return [name for name in self._file["VTKHDF/CellData"] if name not in static]
 
@@ -373,7 +384,7 @@ class Results(StepSequence):
 
     @contextlib.contextmanager
     def _explained(self) -> Iterator[None]:
-        """Convert errors of HDF5 and of reading a damaged file to one message."""
+        """Convert errors of HDF5, and errors due to damaged data, to a FileError."""
         try:
             yield
         except (FileError, Warning):
@@ -414,7 +425,10 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
 
 
 def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
-    """Return the rows of a table given by ``first`` and ``count`` of a step; ValueError if some are missing."""
+    """Return the rows of table `name` that belong to a step; ValueError if rows are missing.
+
+    The fields ``first`` and ``count`` of the step, with a prefix, contain the number of the first row and of rows.
+    """
     first, count = int(step[f"{prefix}first"]), int(step[f"{prefix}count"])
     rows = table[first : first + count]
     if len(rows) != count or first < 0:
@@ -428,7 +442,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     columns: dict[str, Any] = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
-    # Earlier files lack some of these, and forces on the primary side: the defaults of ContactResult replace them.
+    # Files of earlier versions lack some of these data; the defaults of ContactResult then apply.
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.PLACES):
         value = step[column]

@@ -14,22 +14,24 @@ from fastcontact.errors import FastcontactError, unknown
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
-# Fraction of the normal forces below which their resultant is negligible.
+# The resultant of a contact is negligible below this fraction of the sum of the normal forces.
 CANCELLED = 1e-3
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
-    """Return the bracket of the half-width of a contact [length]: (NaN, NaN) where nothing is closed.
+    """Return a lower and an upper bound of the half-width of a contact [length]; (NaN, NaN) if no node is closed.
 
-    `place` (n,) are coordinates of nodes relative to the middle, signed if they lie on both sides of it [length]. The
-    bracket is half the width of the outermost `closed` nodes, and that of the next ones beyond, measured in `across`
-    (n,), by default `place` [length]. If all nodes lie on one side, the other half is the mirror image.
+    `place` (n,) [length] contains the positions of the nodes relative to the middle, with a sign if they lie on both sides
+    of it, and `closed` (n,) states which nodes are closed. The lower bound is half the distance between the two outermost
+    closed nodes, the upper bound half the distance between the next nodes beyond them. Distances are measured in `across`
+    (n,) [length], by default `place`. If all nodes lie on one side, the contact is assumed to be symmetric. The upper bound
+    is infinite if there is no node beyond the closed ones.
     """
     if not closed.any():
         return float("nan"), float("nan")
     across, one_sided = place if across is None else across, bool(place.min() >= 0.0)
     beyond = place == place[place > place[closed].max()].min(initial=np.inf)
-    if not one_sided:  # the contact cannot extend beyond an end of the surface
+    if not one_sided:  # the contact has a second end
         beyond |= place == place[place < place[closed].min()].max(initial=-np.inf)
 
     def half(nodes: Mask) -> float:
@@ -40,86 +42,91 @@ def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactResult:
-    """State of one contact pair at the end of a step, on the secondary nodes in order along the surface.
+    """State of one contact pair at the end of a load step.
+
+    Arrays of length m belong to the m nodes of the secondary side, which are ordered along the surface.
 
     Attributes
     ----------
     name, formulation : str
         Name of the pair and of its formulation.
     points : ndarray of int (m,)
-        Point numbers.
+        Point numbers of the secondary nodes.
     coordinates : ndarray (m, dim)
-        Reference coordinates [length].
+        Reference coordinates of the secondary nodes [length].
     abscissa : ndarray (m,)
-        Length along the reference surface from its first node; in 3D the distance from the axis of first contact, the line
-        along the normal through the node with the smallest gap before any load (of equal ones the nearest to the origin)
-        [length].
+        Arc length along the reference surface from its first node. In 3D the distance from the axis of first contact
+        [length]; this axis is the line along the normal through the node with the smallest gap in the reference
+        configuration or, of several such nodes, the one nearest to the origin.
     gap : ndarray (m,)
-        Gap function, clearance included: positive where open, zero where closed, negative where a penalty admits
-        penetration; infinite at nodes without an opposite point, such as at the edge of a hole, even if the facets
-        around them carry pressure [length].
+        Gap function, which includes the clearance: positive at open nodes, zero at closed nodes, and negative where a
+        penalty admits penetration. It is infinite at nodes without an opposite point, for example at the edge of a hole,
+        even if the facets around them carry pressure [length].
     pressure : ndarray (m,)
-        Contact pressure, positive in compression, per reference area; negative only in tied or bilateral contact under
-        tension. Interpolated by the shape functions of the facets, it integrates to the sum of the normal forces. In finite
-        strain it refers to the deformed area (in plane stress of unit thickness), as `multiplier` and `shear` do [pressure].
+        Contact pressure per unit reference area, positive in compression; it is negative only in tied or bilateral contact
+        under tension. Its interpolation by the shape functions of the facets integrates to the sum of the normal forces.
+        In finite strain `pressure`, `multiplier` and `shear` are per unit deformed area, with unit thickness in plane
+        stress [pressure].
     multiplier : ndarray (m,)
-        Nodal pressure of the formulation itself, before that of open nodes and in tension is redistributed to the
-        closed nodes [pressure].
+        Nodal pressure as computed by the formulation, before the pressure of open nodes and of nodes in tension is
+        redistributed to the closed nodes [pressure].
     force_vectors : ndarray (m, dim)
-        Contact force on each secondary node; axisymmetric: over the full circle [force].
+        Contact force on each secondary node, in axisymmetry integrated over the full circle [force].
     normal : ndarray (m, dim)
         Unit outward normal of the opposite primary facet [-].
     active : ndarray of bool (m,)
-        Closed constraints.
+        Whether the constraint of each node is closed.
     force : ndarray (dim,)
-        Resultant on the secondary side [force].
+        Resultant contact force on the secondary side [force].
     radius : (float, float)
-        Bracket of the contact radius, in plane problems the half-width along the `tangent`: from the `middle` to the
-        outermost closed constraint, and to the first open one beyond it [length]; NaN without contact. In finite strain
-        that of the deformed shape.
+        Lower and upper bound of the contact radius, in 2D of the half-width along the `tangent`: the distances from the
+        `middle` to the outermost closed node and to the first open node beyond it, in finite strain in the deformed
+        configuration [length]; NaN without contact.
     shear : ndarray (m, dim)
-        Tangential traction on the secondary side, zero for frictionless contact [pressure].
+        Tangential traction on the secondary side, zero in frictionless contact [pressure].
     sticking : ndarray of bool (m,)
-        Closed nodes that stick; without friction all closed nodes.
+        Whether each node is closed and sticks; without friction all closed nodes stick.
     dissipation : float
-        Work of friction in this step [energy].
+        Frictional work of this step [energy].
     obstacle_displacement : ndarray (dim,), optional
         Displacement of a rigid obstacle [length]; None for contact between bodies.
     obstacle_angle : float, optional
         Rotation of a rigid obstacle [radian]; None unless it rotates.
     torque : float, optional
-        Torque about the axis of a rotating rigid obstacle that balances the contact, that is the moment of the contact
-        forces on the body in the deformed configuration [force times length]; None unless it rotates.
+        Torque about the axis of a rotating rigid obstacle that is in equilibrium with the contact forces, that is their
+        moment on the deformable body in the deformed configuration [force times length]; None unless the obstacle rotates.
     middle : ndarray (dim,)
-        Centre of the contact on the reference surface: in axisymmetry on the axis; otherwise the centre of pressure, moved
-        onto the planes of symmetry that the contact reaches, where supports hold an end of the surface [length].
+        Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis; otherwise it is the
+        centre of pressure, moved onto the planes of symmetry that the contact reaches. A plane of symmetry is assumed where
+        supports hold an end of the surface.
     place : ndarray (m,)
-        Distance of each node from the middle: in axisymmetry its radius; in plane problems, and where an axisymmetric
-        surface is parallel to the axis, the signed arc length from the middle; in 3D the distance from the line through the
-        middle along the mean normal [length].
+        Position of each node relative to the `middle` [length]: the radius in axisymmetry; the signed arc length in 2D, and
+        where an axisymmetric surface is parallel to the axis; in 3D the distance from the line through the middle along
+        the mean normal.
     tangent : ndarray (dim,), optional
-        In plane problems the direction along which half-widths are measured [-]; None where `place` is used instead: in
-        axisymmetry, in 3D, and on a ring in contact along its whole circumference.
+        Direction along which half-widths are measured in 2D [-]. It is None in axisymmetry, in 3D, and on a ring in contact
+        along its entire circumference, where `place` is used instead.
     wear : ndarray (m,), optional
-        Accumulated depth of wear, with the option ``wear`` [length]; the next load step starts from it.
+        Accumulated depth of wear at the end of the step, with the option ``wear`` [length].
     heat_flux : ndarray (m,), optional
-        Heat flux from the secondary to the primary side per reference area, with the option ``conductance``
+        Heat flux from the secondary to the primary side per unit reference area, with the option ``conductance``
         [power / area].
     damage : ndarray (m,), optional
         Damage of the cohesive layer, from 0 (intact) to 1 (broken), with the option ``cohesion`` [-].
     fluid_pressure : ndarray (m,), optional
-        Pressure of the fluid that has reached the nodes, with `Model.add_fluid_pressure` [pressure].
+        Pressure of the fluid at the nodes that it has reached, with `Model.add_fluid_pressure` [pressure].
     slip, slip_total : ndarray (m, dim)
-        Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps;
-        zero at sticking nodes, and for the step at open ones [length]. NaN in result files of versions without it.
+        Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps
+        [length]. At open and at sticking nodes `slip` is zero. Both are NaN if the result file was written by a version
+        that did not store them.
     primary_points : ndarray of int (k,)
-        Point numbers of the primary side; none for a rigid obstacle.
+        Point numbers of the nodes of the primary side; empty for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
-        Contact force on each of them; axisymmetric: over the full circle [force]. Forces on a node of both sides are
-        included here alone.
+        Contact force on each primary node, in axisymmetry integrated over the full circle [force]. The force on a node
+        that belongs to both sides is included here and not in `force_vectors`.
     units : mapping of str to str
-        Names of the units of ``length``, ``force`` and ``pressure``, if the model names them, in plane models with
-        forces per thickness; shown by reprs, pictures and tables.
+        Names of the units of ``length``, ``force`` and ``pressure``, which reprs, plots and tables show; empty if the model
+        does not name its units. In plane models the name of the unit of force is per thickness.
 
     Examples
     --------
@@ -174,7 +181,7 @@ class ContactResult:
                 f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
             )
         dim = self.coordinates.shape[1]
-        defaults = {  # for files of versions that did not measure from the middle
+        defaults = {  # result files of earlier versions do not contain these positions
             "middle": lambda: np.zeros(dim),
             "place": lambda: np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
             "primary_points": lambda: np.empty(0, np.int32),
@@ -189,7 +196,7 @@ class ContactResult:
 
     @property
     def shown(self) -> dict[str, str]:
-        """Texts for reprs and tables: force, largest pressure, closed nodes, contact radius."""
+        """Captions and texts of the force, the largest pressure, the closed nodes and the contact radius, for reprs."""
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
@@ -214,13 +221,13 @@ class ContactResult:
 
     @property
     def measured_from_axis(self) -> bool:
-        """Whether `place` holds radii, in axisymmetry, rather than arc lengths or distances."""
-        flat = self.coordinates.shape[1] == 2 and self.tangent is None  # plane problems have one, but for rings
+        """Whether `place` contains distances from the axis of symmetry instead of arc lengths or distances in 3D."""
+        flat = self.coordinates.shape[1] == 2 and self.tangent is None  # in plane models only rings have no tangent
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property
     def per_thickness(self) -> bool:
-        """Whether forces are per thickness, as in a plane model."""
+        """Whether forces are per unit thickness, as in plane models."""
         if self.coordinates.shape[1] == 3 or self.measured_from_axis:
             return False
         across, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
@@ -228,12 +235,12 @@ class ContactResult:
 
     @property
     def stick_radius(self) -> tuple[float, float]:
-        """Bracket of the stick radius, like `radius`: outermost sticking node and the next one; NaN if none sticks."""
+        """Lower and upper bound of the radius of the stick zone, defined like `radius` [length]; NaN if no node sticks."""
         return half_width(self.place, self.active & self.sticking, self.across)
 
     @property
     def across(self) -> Array:
-        """Distance (m,) of each node from the middle, perpendicular to the normal there: radii and half-widths [length]."""
+        """Position (m,) of each node relative to `middle` along `tangent`, or `place` without a tangent [length]."""
         return self.place if self.tangent is None else (self.coordinates - self.middle) @ self.tangent
 
     @property
@@ -243,13 +250,13 @@ class ContactResult:
 
     @property
     def normal_force(self) -> float:
-        """Sum of the nodal forces, each along its own normal, positive in compression [force]."""
+        """Sum of the normal components of the nodal forces, positive in compression [force]."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
         return float(np.einsum("nd,nd->", self.force_vectors, normal))
 
     @property
     def cancels(self) -> bool:
-        """Whether the resultant is negligible compared with the normal forces, as in a press fit."""
+        """Whether the normal forces balance each other, so that their resultant is negligible, as in a press fit."""
         return bool(np.linalg.norm(self.force) < CANCELLED * self.normal_force)
 
     @property
@@ -259,7 +266,7 @@ class ContactResult:
 
 
 class ContactsByName(dict[str, ContactResult]):
-    """Contact pairs by name; the error for an unknown name lists the known ones."""
+    """Contact results by name of the pair; the error for an unknown name lists the known names."""
 
     def __missing__(self, name: object) -> ContactResult:
         raise KeyError(unknown("contact pair", str(name), self))
@@ -272,46 +279,52 @@ class StepResult:
     Attributes
     ----------
     index : int
-        1 for the first step.
+        Number of the step; the first step has the number 1.
     load_factor : float
-        Pseudo-time of the step [-].
+        Load factor, the pseudo-time of the analysis, at the end of the step [-].
     displacement : ndarray (n_points, dim)
-        [length].
+        Nodal displacements [length].
     stress : ndarray (n_points, 4) or (n_points, 6)
-        Nodal stress, averaged over the elements of one material at each node; where materials meet, that of the side
-        with the largest von Mises stress. Components are xx, yy, zz, xy (then yz, xz in 3D), in axisymmetry rr, yy,
-        hoop, ry [pressure].
-    von_mises, von_mises_signed : ndarray (n_points,)
-        Equivalent stress of `stress`; the same with the sign of its trace [pressure].
+        Nodal stress [pressure], averaged at each node over the adjacent cells of one material. Where materials meet, it is
+        the average of the material with the largest von Mises stress. Components are xx, yy, zz, xy, in 3D also yz, xz;
+        in axisymmetry rr, yy, hoop, ry.
+    von_mises : ndarray (n_points,)
+        Equivalent stress of `stress` according to von Mises [pressure].
+    von_mises_signed : ndarray (n_points,)
+        Equivalent stress with the sign of the trace of the stress [pressure].
     reaction : ndarray (n_points, dim)
-        Forces of supports, multi-point constraints and springs to the ground, zero elsewhere; axisymmetric: over the
-        full circle [force].
+        Nodal forces of supports, multi-point constraints and springs to the ground, zero at other nodes; in axisymmetry
+        integrated over the full circle [force].
     contact : dict of str to ContactResult
         Contact results by name of the pair.
     iterations : dict
-        ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``, ``history`` (list of dict). With
-        floating bodies, ``regularised``: their springs and the forces in them. If round-off prevents the contact
-        geometry from meeting the criterion, ``scatter``: the variation of ``displacement`` and contact ``force`` [-].
-        With temperatures, ``temperature_factors``, their multipliers; likewise ``initial_factors`` with initial
-        stresses and strains, and ``pressure_factors`` with pressures in finite strain [-]. ``work`` and, with
-        pretension sections, ``pretension``: see the properties of these names. ``parameter`` of modes and their phases:
-        what their load factor is, ``frequency`` or ``phase``.
+        Iteration counts and further data of the step:
+
+        - ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``: numbers of iterations.
+        - ``history``: list of dicts with the iterations.
+        - ``regularised``, with floating bodies: their soft springs and the forces in these springs.
+        - ``scatter``, if round-off prevents the contact geometry from meeting the criterion: relative variation of
+          ``displacement`` and of the contact ``force`` [-].
+        - ``temperature_factors``, ``initial_factors``, ``pressure_factors``: multipliers of the temperatures, of the
+          initial stresses and strains, and of the pressures in finite strain [-].
+        - ``work`` and ``pretension``: data of the properties of the same names.
+        - ``parameter``, in vibration modes: quantity that the load factor represents, ``frequency`` or ``phase``.
     warnings : tuple of str
         Warnings of the step.
     cell_fields : dict of str to ndarray (n_solids,)
-        Further values of every solid cell, in the order of ``mesh.solids``, e.g. an estimated error [unit of the
-        field].
+        Further fields with one value for each solid cell, in the order of ``mesh.solids``, for example an estimated error
+        [unit of the field].
     material_stress : MaterialStress, optional
-        The stress of each side at nodes where materials meet; None if there are none.
+        Stress in each material at nodes where materials meet; None if there are no such nodes.
     temperature : ndarray (n_points,), optional
         Nodal temperature [temperature]; None without heat conduction.
     heat_reaction : ndarray (n_points,), optional
-        Heat flow into the nodes with a prescribed temperature, zero elsewhere; axisymmetric: over the full circle
-        [power].
+        Heat flow into the nodes with a prescribed temperature, zero at other nodes; in axisymmetry integrated over the
+        full circle [power].
     restart : dict, optional
-        Restart data for the next step: plain numbers, strings and arrays. Result files keep those of their last step.
+        Data from which the next step starts: numbers, strings and arrays. Result files store them for their last step only.
     units : mapping of str to str
-        As in `ContactResult`.
+        Names of units, as described for `ContactResult`.
 
     Examples
     --------
@@ -351,12 +364,12 @@ class StepResult:
 
     @property
     def instant(self) -> str:
-        """Load factor, or the frequency of a mode, as text."""
+        """Text with the load factor, or with the frequency if the step is a vibration mode."""
         return f"{self.iterations.get('parameter', 'load factor')} {self.load_factor:.6g}"
 
     @property
     def shown(self) -> dict[str, str]:
-        """Texts for reprs and tables: load factor, largest displacement and stress, iterations."""
+        """Captions and texts of the load factor, the largest displacement and stress, and the iterations, for reprs."""
         moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
@@ -382,43 +395,61 @@ class StepResult:
 
     @property
     def pretension(self) -> dict[str, dict[str, float]]:
-        """``force``, positive in tension [force], and ``shortening`` [length] of each pretension section."""
+        """The ``force``, positive in tension [force], and ``shortening`` [length] of pretension sections, by name."""
         return dict(self.iterations.get("pretension", {}))
 
     @property
     def work(self) -> dict[str, float]:
         """Energies at the end of the step, and work accumulated over all steps [energy].
 
-        ``strain_energy``: springs included, with temperatures treated as forces; for nonlinear bodies the elastic
-        energy. ``plastic_work``. ``external_work``: of loads, supports, obstacles and thermal expansion.
-        ``friction_work``. ``friction_while_touching``: its part at nodes in the step in which they close, which is too
-        large in long steps. ``penalty_energy``: of penalties and cohesive layers. ``energy_released``: dissipated by
-        damage of cohesive layers. ``imbalance``: external work minus all others. Empty in files of versions without
-        it, and in steps resumed from these.
+        - ``strain_energy``: energy of the bodies and springs, for nonlinear bodies the elastic energy. Thermal strains are
+          treated as external forces.
+        - ``plastic_work``: work of plastic deformation.
+        - ``external_work``: work of loads, supports, obstacles and thermal strains.
+        - ``friction_work``: work dissipated by friction.
+        - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which they
+          close. It is overestimated in long steps.
+        - ``penalty_energy``: energy of penalties and cohesive layers.
+        - ``energy_released``: energy dissipated by damage of cohesive layers.
+        - ``imbalance``: external work minus the sum of all other energies.
+
+        The dict is empty if the result file was written by a version that did not store these values, and in steps that
+        were resumed from such a file.
         """
         return dict(self.iterations.get("work", {}))
 
     @property
     def heat(self) -> dict[str, Any]:
-        """Heat balance at the end of the step, positive into the bodies [power]; empty without heat conduction.
+        """Heat flows at the end of the step, positive into the bodies [power]; empty without heat conduction.
 
-        ``supports``: of prescribed temperatures; ``loads``: of fluxes, sources and nodal heat; ``films``;
-        ``friction``; ``imbalance``: largest residual of a node; ``contacts``: heat flow of each pair to its primary
-        side; ``exchanges``: number of alternations between heat and contact [-].
+        - ``supports``: heat flow at nodes with prescribed temperatures.
+        - ``loads``: heat flow of fluxes, volumetric sources and nodal sources.
+        - ``films``: heat flow of convection.
+        - ``friction``: frictional heat.
+        - ``imbalance``: largest residual of the heat balance of a node.
+        - ``contacts``: heat flow to the primary side of each contact pair, by name.
+        - ``exchanges``: number of alternating solutions of the heat conduction and the contact problem [-].
         """
         return dict(self.iterations.get("heat", {}))
 
     @property
     def heat_flux(self) -> Array | None:
-        """Mean heat flux (n_solids, dim) of every solid cell [power / area]; None without heat conduction."""
+        """Mean heat flux vector (n_solids, dim) of each solid cell [power / area]; None without heat conduction."""
         fluxes = [values for name, values in sorted(self.cell_fields.items()) if name.startswith("heat_flux_")]
         return np.column_stack(fluxes) if fluxes else None
 
     def stress_of_material(self, number: int) -> Array:
-        """Return the nodal stress (n_points, 4) or (n_points, 6) with that of a given material where several meet [pressure].
+        """Return the nodal stress with the values of a given material where several materials meet [pressure].
 
-        Materials are numbered from 0, in the order in which they were added to the model; at nodes of other materials
-        the stress is that of `stress`.
+        Parameters
+        ----------
+        number : int
+            Number of the material, from 0, in the order in which materials were added to the model.
+
+        Returns
+        -------
+        ndarray (n_points, 4) or (n_points, 6)
+            Stress averaged over the cells of the material at its nodes, and `stress` at all other nodes [pressure].
         """
         stress = self.stress.copy()
         if self.material_stress is not None:

@@ -1,4 +1,4 @@
-"""Results as tables: NumPy structured arrays with a row for each node, and CSV files of them."""
+"""Results as tables, which are NumPy structured arrays with a row for each node, and as CSV files."""
 
 from __future__ import annotations
 
@@ -24,23 +24,31 @@ STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 @typed(CaseError)
 def contact_table(contact: ContactResult, step: StepResult | None = None) -> AnyArray:
-    """Return the state of a contact pair as a table, one row for each secondary node in order along the surface.
+    """Return the state of a contact pair as a table with a row for each secondary node, in order along the surface.
 
     Parameters
     ----------
     contact : ContactResult
+        Result of a contact pair.
     step : StepResult, optional
-        The step of the contact, which adds the fields at its nodes.
+        The step to which the result belongs; it adds columns with fields of the body.
 
     Returns
     -------
     structured ndarray (m,)
-        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from the middle of the contact), ``place`` (the
-        same with a sign, see `ContactResult`), ``gap`` [length]; ``pressure`` [pressure]; ``multiplier`` [force or
-        pressure]; ``force_x`` ... [force]; ``shear_x`` ... [pressure]; ``slip_x`` ..., ``slip_total_x`` ... [length];
-        with a conductance ``heat_flux`` [power / area]; ``active``, ``sticking`` (true or false). With `step` also
-        ``displacement_x`` ... [length], ``stress_xx`` ..., ``normal_stress``, ``von_mises``, ``von_mises_signed``
-        [pressure].
+        Table with the columns
+
+        - ``point``: number of the node;
+        - ``x``, ``y`` and, in 3D, ``z``: reference coordinates [length];
+        - ``abscissa``, ``place`` and ``gap``, see `ContactResult` [length];
+        - ``radius``: distance from the middle of the contact, the magnitude of ``place`` [length];
+        - ``pressure`` [pressure] and ``multiplier`` [force or pressure];
+        - ``force_x`` etc. [force], ``shear_x`` etc. [pressure], ``slip_x`` and ``slip_total_x`` etc. [length];
+        - ``heat_flux``, with the option ``conductance`` [power / area];
+        - ``active`` and ``sticking``: booleans.
+
+        With `step` there are also ``displacement_x`` etc. [length] and ``stress_xx`` etc., ``normal_stress``,
+        ``von_mises`` and ``von_mises_signed`` [pressure].
 
     Examples
     --------
@@ -84,10 +92,22 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
 
 @typed(CaseError)
 def normal_stress(contact: ContactResult, step: StepResult) -> Array:
-    """Return the normal stress ``n . sigma . n`` (m,) at the secondary nodes of a contact [pressure].
+    """Return the normal stress ``n . sigma . n`` at the secondary nodes of a contact pair.
 
-    `step` is the step of the contact, n the normal of the opposite facet. In contact it is minus the pressure, up to
-    the discretisation error; NaN at nodes without an opposite facet.
+    n is the normal of the opposite primary facet and sigma the nodal stress. At closed nodes the normal stress is equal to
+    minus the contact pressure up to the discretisation error.
+
+    Parameters
+    ----------
+    contact : ContactResult
+        Result of a contact pair.
+    step : StepResult
+        The step to which the result belongs.
+
+    Returns
+    -------
+    ndarray (m,)
+        Normal stress [pressure]; NaN at nodes without an opposite facet.
 
     Examples
     --------
@@ -113,28 +133,36 @@ def normal_stress(contact: ContactResult, step: StepResult) -> Array:
 
 @typed(CaseError)
 def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None = None) -> AnyArray:
-    """Return the fields along a line of nodes as a table, one row for each node in order.
+    """Return the fields along a line as a table with a row for each node, in order along the line.
 
     Parameters
     ----------
     mesh : Mesh
+        The mesh of the step.
     step : StepResult
+        The step with the fields.
     group : str
-        A group of line cells that form one open line.
+        Group of line cells that form a single open line.
     start : str or int, optional
-        The first end, as in ``topology.ordered_line``; by default the one nearest to x = 0.
+        End of the line at which the table begins: the name of a point group or the number of a point. By default it is the
+        end nearest to x = 0.
 
     Returns
     -------
     structured ndarray (m,)
-        ``point``; ``x``, ``y`` (``z``), ``abscissa``, ``radius`` (distance from x = 0, in 3D from the y axis),
-        ``displacement_x`` ... [length];
-        ``stress_xx`` ..., ``von_mises``, ``von_mises_signed`` [pressure].
+        Table with the columns
+
+        - ``point``: number of the node;
+        - ``x``, ``y`` and, in 3D, ``z``: reference coordinates [length];
+        - ``abscissa``: arc length from the first node [length];
+        - ``radius``: distance from x = 0, in 3D from the y axis [length];
+        - ``displacement_x`` etc. [length];
+        - ``stress_xx`` etc., ``von_mises`` and ``von_mises_signed`` [pressure].
 
     Raises
     ------
     MeshError
-        If there is no such group, or it is not an open line.
+        If the group does not exist or is not a single open line.
 
     Examples
     --------
@@ -156,7 +184,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
 
 
 def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
-    """Return a table (m,) with an additional column `name` of `values` (m,)."""
+    """Return a table (m,) with an additional column called `name`, which contains `values` (m,)."""
     return structured({**_columns(table), name: values})
 
 
@@ -164,20 +192,21 @@ def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
 def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 
-    Numbers are written with all digits, so that reading them back gives the same bits.
+    Numbers are written with as many digits as are needed to recover them exactly.
 
     Parameters
     ----------
     path : path-like
-        File to write, replaced if it exists.
+        File to write; an existing file is replaced.
     table : structured ndarray (m,)
+        The table, for example the result of `contact_table`.
     units : mapping of str to str, optional
-        Units by column, shown in brackets in the header.
+        Names of units by column, which are written in brackets in the header.
 
     Raises
     ------
     CaseError
-        If `units` names an unknown column.
+        If `units` contains an unknown column.
     FileError
         If the file cannot be written.
 
@@ -210,12 +239,12 @@ def _text(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float):
         text = f"{value:.17g}"
-        return text if text.strip("-0123456789") else text + ".0"  # keeps it recognisable as a float
+        return text if text.strip("-0123456789") else text + ".0"  # readers must not take it for an integer
     return str(value)
 
 
 def structured(columns: Mapping[str, AnyArray | Sequence[Any]]) -> AnyArray:
-    """Return columns (m,) of equal length, by name, as one structured array (m,)."""
+    """Return columns (m,) of equal length, given by name, as one structured array (m,)."""
     arrays = {name: np.asarray(column) for name, column in columns.items()}
     table = np.empty(len(next(iter(arrays.values()))), dtype=[(name, array.dtype) for name, array in arrays.items()])
     for name, array in arrays.items():

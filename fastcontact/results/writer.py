@@ -1,8 +1,9 @@
-"""Crash-safe writer of result files: no completed step is lost.
+"""Write result files such that a crash does not damage the steps that are complete.
 
-Data are written first, then the rows of the step, the number of steps last, with a flush after each. Uncompressed tables and
-small fields grow in place, larger fields have a separate chunk for each step, so that data of a completed step never move.
-Disk space is reserved beforehand, because HDF5 loses the whole file when one of its writes fails.
+For each step the fields are written first, then its rows in the tables, and finally the number of steps, with a flush after
+each of the three. Uncompressed tables and small fields grow in place, and larger fields have a separate chunk for each step,
+so that data of a completed step are never moved. Disk space is reserved beforehand, because HDF5 loses the entire file when
+one of its writes fails.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ from fastcontact.results.step import StepResult
 from fastcontact.results.stored_steps import StoredSteps
 from fastcontact.results.texts import read_text
 
-# Time after which steps are synchronised with the disk: shorter runs lose little in a power loss [s].
+# Time after which each step is synchronised with the disk [s]; a shorter run is quickly repeated after a power loss.
 SHORT = 10.0
-# Reserve for HDF5's own records [bytes].
+# Disk space that is reserved for the metadata of HDF5 [bytes].
 MARGIN = 1 << 19
 # Size in the file of the indices that HDF5 caches in memory [bytes].
 INDICES = 1 << 18
@@ -49,51 +50,53 @@ INDICES = 1 << 18
 class ResultWriter:
     """A result file to which steps are appended.
 
-    The file is created at once, so that errors appear before any step is computed. It can then be opened at any time,
-    also by viewers, and contains all steps so far, even after an exception or a crash. Several threads may share a
-    writer.
+    The constructor creates the file, so that errors of the path appear before any step is computed. From then on the file
+    can be opened at any time, also by viewers, and contains all steps written so far, even after an exception or a crash.
+    Several threads may share a writer.
 
     Parameters
     ----------
     path : path-like
         File to write; viewers recognise the suffix ``.vtkhdf``.
     mesh : Mesh or model
-        A mesh, or any object with `mesh` and `kinematics`, and optionally `case_text`, such as a ``Model``.
+        A mesh or a ``Model``. Any object with the attributes `mesh` and `kinematics`, and optionally `case_text`, can
+        replace the model.
     kinematics : str
-        Kinematics of a bare mesh; a model brings its own.
+        Kinematics, if `mesh` is a mesh; a model has its own kinematics.
     case_text : str
-        Text of the case file to store.
+        Text of the case file, which the result file stores.
     overwrite : bool
         Whether an existing result file may be replaced.
     cell_fields : iterable of str
-        Names of further `StepResult.cell_fields` of every step, in addition to those of the model; viewers show them,
-        the XDMF sidecar does not.
+        Names of further `StepResult.cell_fields` that every step contains, in addition to those of the model. Viewers show
+        these fields if they read the VTKHDF file, not if they read its XDMF sidecar.
     resume : bool
-        Whether to keep the steps of an existing file of this mesh and append to them. A file that is missing or has no
-        complete step is created. An existing file is not changed before a step is added.
+        Whether to keep the steps of an existing file with the same mesh and to append further steps. If the file does not
+        exist or contains no complete step, it is created. An existing file is not changed before a step is added.
     synchronise : bool, optional
-        Whether each step is on the disk when `write` returns, so that it survives a loss of power; by default from ten
-        seconds after the creation of the file, so that short runs are not slowed. Steps always survive the end of the
-        process.
+        Whether `write` waits until the step is on the disk, so that the step survives a power loss. By default this is
+        the case from ten seconds after the creation of the file on, so that short runs are not slowed down. Steps survive
+        a crash of the process in any case.
     background : bool
-        Whether a step is written while the next one is computed. It is then complete when the next `write`, `wait` or
-        `close` returns, which also raise the errors of the previous write; `n_steps` counts complete steps. A copy of
-        the step is kept in memory until then, so that the caller's arrays may change.
+        Whether a step is written while the next one is computed. A step is then complete when the next call of `write`,
+        `wait` or `close` returns; this call also raises the errors of the previous one. `n_steps` counts complete steps.
+        The writer copies the step, so that the arrays of the caller may change.
 
     Attributes
     ----------
     path : pathlib.Path
-        The file, absolute.
+        Absolute path of the file.
     n_steps : int
         Number of steps in the file.
     done : sequence of StepResult
-        The steps of the existing file, read on access, for ``solve(..., resume=out.done)``; empty without `resume`.
+        With `resume` the steps of the existing file, which are read on access, for ``solve(..., resume=out.done)``;
+        otherwise empty.
 
     Raises
     ------
     FileError
-        If the file cannot be written, exists and must not be replaced, is not a result file, has another writer, or is
-        to be resumed but belongs to another mesh.
+        If the file cannot be written, or another writer is writing to it; if it exists, but may not be replaced or is not
+        a result file; or if it is to be resumed, but belongs to another mesh.
     ModelError
         If `mesh` is neither a mesh nor a model.
 
@@ -153,7 +156,7 @@ class ResultWriter:
                 raise
 
     def _take_up(self, kinematics: str, case_text: str) -> None:
-        """Check whether the file contains steps to append to."""
+        """Check whether the file contains steps, and prepare to append to them."""
         left = left_at(self.path)
         self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
         self.n_steps = len(self.done)
@@ -184,7 +187,14 @@ class ResultWriter:
             self._finish(run)
 
     def write(self, step: StepResult) -> None:
-        """Append a step. When this returns, the step survives a crash of the process, unless `background` is set.
+        """Append a step.
+
+        When this method returns, the step survives a crash of the process, unless the writer works in the background.
+
+        Parameters
+        ----------
+        step : StepResult
+            The step after the last one of the file.
 
         Raises
         ------
@@ -224,7 +234,7 @@ class ResultWriter:
             restart = packed({"step": self.n_steps, "restart": step.restart})
             room = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * room if self._committed.synchronised else room)
-            # The parts of a step are flushed in their order of dependence, unless one journal contains them all.
+            # Fields, rows and number of steps are flushed in this order, unless a single journal contains all of them.
             in_parts = not self._committed.synchronised or room > journal.LARGEST
             write_arrays.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
@@ -240,7 +250,7 @@ class ResultWriter:
             self._last = step.index, _case_of(step)
 
     def _check_next(self, step: StepResult) -> None:
-        """Refuse a step that is already there, out of order, or computed for another case than the earlier ones."""
+        """Raise FileError unless the step follows the last one and was computed for the same case."""
         index, case = self._last
         if step.index <= index:
             raise FileError(f"step {step.index} cannot be written after step {index}: write each step once, in order")
@@ -250,14 +260,14 @@ class ResultWriter:
             )
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
-        """Finish the file; a second call does nothing.
+        """Finish the file; further calls have no effect.
 
         Parameters
         ----------
         log : str, list or dict, optional
-            Log of the whole run, as JSON data.
+            Log of the run, which must be convertible to JSON.
         warnings : iterable of str
-            Warnings of the run that belong to no step.
+            Warnings of the run that do not belong to a single step.
 
         Raises
         ------
@@ -304,12 +314,12 @@ class ResultWriter:
         self._lock.release()
 
     def _release_done(self) -> None:
-        """Close the file for reading, before it changes."""
+        """Close the reader of the existing steps, before the file changes."""
         if isinstance(self.done, StoredSteps):
             self.done.release()
 
     def _open(self) -> None:
-        """Open a resumed file before the first addition."""
+        """Open the file of a resumed run for writing, before the first step is added."""
         import h5py
 
         if self._file is None:
@@ -326,7 +336,7 @@ class ResultWriter:
             self._pairs = {json.loads(read_text(pair["name"], self._committed)): pair for pair in pairs}
 
     def _check_in_place(self) -> None:
-        """Refuse to write to a file that is no longer at its path, or after an error."""
+        """Raise FileError if the file is no longer at its path, or an earlier write has failed."""
         self._committed.check()
         self._check_ours()
         with contextlib.suppress(OSError):
@@ -335,7 +345,7 @@ class ResultWriter:
         raise FileError(self._gone())
 
     def _check_ours(self) -> None:
-        """Refuse to write to a file that another program has changed."""
+        """Raise FileError if another program has changed the file."""
         if not self._committed.intact():
             raise FileError(
                 f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
@@ -362,7 +372,7 @@ class ResultWriter:
 
     @contextlib.contextmanager
     def _explained(self, action: str) -> Iterator[None]:
-        """Convert errors of HDF5 and of the system to one message with a remedy, and defer signals meanwhile."""
+        """Convert errors of HDF5 and of the operating system to a FileError with a remedy, and defer signals meanwhile."""
         with uninterrupted():
             try:
                 yield
@@ -382,7 +392,7 @@ class ResultWriter:
                 ) from error
 
     def _begin(self, kinematics: str, case_text: str) -> None:
-        """Write everything except the steps under another name, then replace the old file."""
+        """Write all data except the steps to a temporary file, then replace the old file by it."""
         with replacing(self.path) as temporary:
             with open(temporary, "r+b") as probe:
                 size = write_arrays.header_size(self._mesh) + len(case_text) + MARGIN
@@ -390,12 +400,12 @@ class ResultWriter:
             with new_hdf5(temporary) as file:
                 write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._heat)
                 write_arrays.write_own(file, self._mesh, kinematics, case_text, self._units)
-        # Closed in between because Windows does not rename open files; without locks viewers may read along.
+        # The file is closed in between, because Windows does not rename open files; without locks viewers can read it.
         self._open()
 
 
 def _limit_index_memory(file: Any) -> None:
-    """Limit HDF5's cache of index nodes: in memory they take ten times their size in the file, and grow with the steps."""
+    """Limit the cache of HDF5 for index nodes, which grows with the steps and takes ten times the size in the file."""
     settings = file.id.get_mdc_config()
     settings.set_initial_size = True
     settings.initial_size = settings.min_size = settings.max_size = INDICES
@@ -403,7 +413,7 @@ def _limit_index_memory(file: Any) -> None:
 
 
 def _materials_that_meet(model: Any) -> Any:
-    """Return the materials of all solid cells (n_solids,) of a model with material interfaces, else None."""
+    """Return the numbers of the materials of all solid cells (n_solids,); None for a model without material interfaces."""
     if not getattr(model, "materials", None) or not hasattr(model, "material_numbers"):
         return None
     material = model.material_field().distinct
@@ -415,9 +425,9 @@ def _materials_that_meet(model: Any) -> Any:
 def _steps_to_resume(
     path: Path, mesh: Mesh, kinematics: str, cell_fields: Sequence[str]
 ) -> tuple[Sequence[StepResult], bool, str]:
-    """Return the steps of the file at `path`, if there is one, whether its run is complete, and its case file.
+    """Return the steps of the file at `path`, whether its run is complete, and the text of its case file.
 
-    Raises FileError if steps of this mesh cannot be appended.
+    If there is no file, there are no steps. FileError if steps of this mesh cannot be appended to the file.
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
@@ -476,7 +486,7 @@ def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:
 
 
 def _check_replaceable(path: Any, overwrite: bool) -> None:
-    """Refuse to replace a file without `overwrite`, or a file that is no result file."""
+    """Raise FileError if the file exists and `overwrite` is False, or if it is not a result file."""
     import h5py
 
     if not path.exists() or not path.stat().st_size:
@@ -486,7 +496,7 @@ def _check_replaceable(path: Any, overwrite: bool) -> None:
     is_result = h5py.is_hdf5(path)
     if is_result:
         with contextlib.suppress(OSError), h5py.File(path, "r", locking=False) as file:
-            # Not `in`, which follows links, even to other files.
+            # The operator `in` would follow links, even to other files.
             is_result = isinstance(file.get("VTKHDF", getlink=True), h5py.HardLink)
     if not is_result:
         raise FileError(f"'{path}' exists and is not a result file: name another file or remove it first")

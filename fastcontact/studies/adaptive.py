@@ -1,4 +1,4 @@
-"""Adaptive meshes: solve, estimate the error, refine where it is large, until a quantity is accurate enough."""
+"""Adaptive mesh refinement: solve, estimate the error and refine in turn, until a quantity is accurate enough."""
 
 from __future__ import annotations
 
@@ -27,9 +27,9 @@ from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.report import of_case
 from fastcontact.studies.settings import Combination, Settings, one_combination, settings
 
-# Cells that contribute this fraction of the error are refined; a larger one needs fewer, larger meshes (Dörfler, 1996).
+# Fraction of the error whose cells are refined (Dörfler, 1996). With a larger fraction there are fewer but larger meshes.
 BULK = 0.7
-# If refinement converges, differences shrink by at least this factor from round to round.
+# Factor by which the changes of a quantity decrease from round to round if the refinement converges.
 SHRINKING = 3.0
 
 
@@ -48,28 +48,31 @@ def adaptive_study(
 ) -> AdaptiveStudy:
     """Refine the mesh of a case adaptively until a quantity is accurate enough.
 
-    Every round solves the case, estimates the error of each cell (`estimate_error`), weights it by its influence on
-    the quantity, and divides the cells with the largest contributions in four. The error of the quantity is estimated
-    from its changes.
+    Each round solves the case, estimates the error of each cell with `estimate_error`, weights it by the influence of the
+    cell on the quantity, and divides the cells with the largest contributions in four. The error of the quantity is
+    estimated from its changes from round to round.
 
     Parameters
     ----------
     case : Case or path-like
-        A case in two dimensions, with triangles and quadrangles. The first mesh is level 0 of its ``[study]``,
-        otherwise its own mesh.
+        A two-dimensional case with triangles and quadrangles, or the path of a case file. The first mesh is that of level 0
+        of the table ``[study]`` or, without this table, the mesh of the case.
     quantity : str
-        The quantity of interest, e.g. ``"force"``, ``"pressure_max"``, ``"C1.stress.yy"``.
+        The quantity of interest, such as ``"force"``, ``"pressure_max"`` or ``"C1.stress.yy"``.
     tolerance : float
-        Target relative error [-].
+        Relative error of the quantity at which the refinement stops [-].
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or those of the case.
-    max_dofs, max_rounds : int
-        Limits at which the refinement stops: no new mesh after one with more than 60 % of `max_dofs`, since the next may
-        exceed it.
+        Element type and contact formulation; by default the last of ``study.combinations`` or, without these, those of the
+        case.
+    max_dofs : int
+        Largest number of degrees of freedom. After a mesh with more than 60 % of this number the refinement stops, because
+        the next mesh may exceed it.
+    max_rounds : int
+        Largest number of meshes.
     on_round : callable, optional
-        Called with every `Round`.
+        Function that is called with a `Round` after every round.
     progress : bool
-        Show the progress on standard error, updated after every round, on terminals and in notebooks.
+        Whether to show the progress on standard error, in terminals and notebooks.
 
     Returns
     -------
@@ -123,7 +126,7 @@ def _checked(case: Case | str | Path, tolerance: float) -> Case:
 
 
 def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple[Forest, list[Any]]:
-    """Return the first mesh, of divisible linear cells, and the curves of its boundary."""
+    """Return the first mesh as a forest of linear cells that can be divided, and the curves of its boundary."""
     mesh = case.mesh
     if chosen.by_shape and combination.element is not None:
         mesh = make_mesh(recipe(chosen, combination.element, 0), None)
@@ -132,7 +135,7 @@ def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple
 
 
 def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, combination: Combination) -> Case:
-    """Return the case on another mesh of linear cells, which become quadratic if the element is."""
+    """Return the case on another mesh of linear cells, which are converted if the element type is quadratic."""
     element = combination.element
     quadratic = element is not None and elements.get(element).order == 2
     mesh = to_quadratic(linear, curves, centre_nodes=element == "quad9") if quadratic else linear
@@ -142,7 +145,7 @@ def _case_on(linear: Mesh, curves: Sequence[Any], case: Case, chosen: Settings, 
 def _solved(
     case: Case, quantity: str, pair: str | None, before: Sequence[Round], started: float
 ) -> tuple[StepResult, ErrorEstimate, Round]:
-    """Solve a case, estimate its error, measure its quantities; warnings are issued in the first round only."""
+    """Solve a case, estimate the errors of its cells, and evaluate its quantities; only the first round issues warnings."""
     with warnings.catch_warnings():
         if before:
             warnings.simplefilter("ignore", FastcontactWarning)
@@ -167,10 +170,10 @@ def _solved(
 
 
 def _estimate(values: Sequence[float]) -> float:
-    """Return the estimated relative error of the last of a quantity's values; NaN before there are three meshes.
+    """Return the estimated relative error of the last value of a quantity [-]; NaN with fewer than three values.
 
-    The last change bounds the remaining error if changes shrink by a factor of two or more; the change before it guards
-    against one that is small by chance.
+    If changes decrease by a factor of at least two from mesh to mesh, the last change is an upper bound of the remaining
+    error. The change before it is also taken into account, because the last one may be small by chance.
     """
     if len(values) < 3 or not values[-1]:
         return float("nan")
@@ -181,11 +184,11 @@ def _estimate(values: Sequence[float]) -> float:
 def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str, pair: str | None) -> Array:
     """Return the contribution (n_solids,) of each cell to the error of a quantity, up to a common factor.
 
-    The error of a functional is at most the sum over all cells of the solution's error times that of the dual solution, the
-    solution under a load where the quantity is measured (Becker and Rannacher, 2001). For a force the dual solution is
-    proportional to the solution itself.
-    For a value at a point the dual stress falls with the distance d like that under a point force, d^(1 - dim) with dim = 3
-    in axisymmetry, too (Boussinesq, 1885; Flamant, 1892), and its error in a cell of size h like h d^-dim.
+    The error of a functional is bounded by the sum over all cells of the error of the solution times the error of the dual
+    solution, which is the solution under a load that corresponds to the functional (Becker and Rannacher, 2001). For a
+    force the dual solution is proportional to the solution itself.
+    For a value at a point the dual stress decreases with the distance d like the stress of a point force, as d^(1 - dim)
+    with dim = 3 also in axisymmetry (Boussinesq, 1885; Flamant, 1892). Its error in a cell of size h decreases as h d^-dim.
     """
     where = _place(case, last, quantity, pair)
     if where is None:
@@ -203,7 +206,7 @@ def _indicator(case: Case, last: StepResult, error: ErrorEstimate, quantity: str
 
 
 def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Array | None:
-    """Return the point (dim,) where a quantity is measured [length]; None for global quantities."""
+    """Return the position (dim,) [length] at which a quantity is evaluated; None for quantities of the entire model."""
     probe = quantity.split(".")[0]
     if probe in case.probes:
         return case.mesh.points[case.probes[probe]]
@@ -217,7 +220,10 @@ def _place(case: Case, last: StepResult, quantity: str, pair: str | None) -> Arr
 
 
 def _marked(indicator: Array, leaf: Indices, n_leaves: int) -> Mask:
-    """Mark leaves (n_leaves,) to divide: the fewest cells that hold the fraction `BULK` of an indicator (n_solids,)."""
+    """Return for each leaf (n_leaves,) whether to divide it.
+
+    The marked leaves are those of the fewest cells whose sum is the fraction `BULK` of the sum of `indicator` (n_solids,).
+    """
     order = np.argsort(-indicator, kind="stable")
     carried = np.cumsum(indicator[order])
     count = int(np.searchsorted(carried, BULK * carried[-1])) + 1

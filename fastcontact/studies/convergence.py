@@ -1,4 +1,4 @@
-"""Mesh-convergence study: solve a case on a sequence of finer meshes, fit limits, compare them with theory."""
+"""Mesh-convergence studies: solve a case on successively finer meshes, fit the limits, and compare them with a theory."""
 
 from __future__ import annotations
 
@@ -40,39 +40,42 @@ def convergence_study(
     on_progress: Callable[[Progress], None] | None = None,
     progress: bool = False,
 ) -> Study:
-    """Solve a case or a Python model on successively finer meshes, fit limit and order, separate model and mesh error.
+    """Solve a case or a Python model on successively finer meshes, and fit limits and orders of convergence.
 
-    The meshes of a case come from its generator, with sizes halved on every level, or from uniform refinement of its
-    mesh file with arcs kept circular; see the table ``[study]`` of case files. The meshes of a function are those that
-    it generates.
+    From the limits follow the mesh error of every quantity and, if a theory is known, the model error. The meshes of a
+    case come from its mesh generator, with sizes that are halved from level to level, or from uniform refinement of its
+    mesh file, with new nodes on circular arcs placed on these arcs. The table ``[study]`` of a case file contains the
+    settings. The meshes of a function are those that it generates.
 
     Parameters
     ----------
     case : Case, path-like or callable
-        A function receives the mesh size and returns a `Model`, which is solved in 20 equal steps, or the result of
-        `solve`.
+        A case, the path of a case file, or a function. The function receives the mesh size and returns a `Model`, which is
+        solved in 20 equal steps, or the result of `solve`.
     levels : int or sequence of float
-        For a case the number of meshes; a limit needs three, a reliable one five. For a function the mesh sizes, any
-        length that tends to zero as the mesh is refined [length].
+        For a case the number of meshes. At least three are required for a limit, and five for a reliable error bar. For a
+        function the mesh sizes, which may be any length that tends to zero as the mesh is refined [length].
     elements, formulations : sequence of str, optional
-        For a case, compared in all combinations; ``["all"]`` for all; by default those of ``[study]``, or of the case.
+        Element types and contact formulations of a case, which are compared in all combinations; ``["all"]`` stands for all
+        of them. By default those of ``[study]`` or, without this table, those of the case.
     quantities : sequence of str, or dict of str to callable
-        Further quantities to fit, such as ``"C1.stress.yy"``, ``"C1.displacement.y"``, ``"C1.pressure"``. For a
-        function, names of standard quantities, or functions by name that receive the last `StepResult` and return a
-        number; a function whose argument is called ``steps`` receives the list of all steps.
+        Further quantities, in addition to the standard ones. For a case, their names, such as ``"C1.stress.yy"``,
+        ``"C1.displacement.y"`` and ``"C1.pressure"`` at the point group C1. For a function, names of standard quantities,
+        or functions by name. Such a function receives the last `StepResult`, or the list of all steps if its argument is
+        called ``steps``, and returns a number.
     executor : concurrent.futures.Executor, optional
-        Executor of the runs, e.g. ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py, which is not
-        shut down; by default processes of this machine.
+        Executor of the runs, for example ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py; it is not
+        shut down. By default the runs are executed in processes on this machine.
     workers : int, optional
-        Number of processes, by default one for each processor, for a function 1, which runs everything in this
-        process. Several processes import the calling script, where the call must be under ``if __name__ ==
-        "__main__":``.
+        Number of processes; by default one for each processor, and 1 for a function. With 1 all runs are executed in the
+        calling process. Several processes import the calling script, which must therefore call this function under
+        ``if __name__ == "__main__":``.
     store : path-like, optional
-        Folder of finished runs of a case, which are reused; new ones are added.
+        Folder with the results of finished runs of a case. They are reused, and new results are added.
     on_progress : callable, optional
-        Called with a `Progress` after every run.
+        Function that is called with a `Progress` after every run.
     progress : bool
-        Show the progress on standard error, updated after every run, on terminals and in notebooks.
+        Whether to show the progress on standard error, in terminals and notebooks.
 
     Returns
     -------
@@ -81,12 +84,12 @@ def convergence_study(
     Raises
     ------
     CaseError, FastcontactError
-        If the case, a name or a number is wrong, or no level of any combination could be solved.
+        If the case, a name or a number is invalid, or no mesh of any combination could be solved.
 
     Warns
     -----
     FastcontactWarning
-        If the meshes of a function do not become finer as its sizes decrease.
+        If the meshes of a function do not become finer with decreasing mesh size.
 
     Examples
     --------
@@ -126,7 +129,7 @@ def convergence_study(
 def _of_function(
     function: Function, sizes: int | Sequence[float], wanted: Quantities, options: dict[str, Any]
 ) -> Study:
-    """Return the study of a model function; `options` are those of `run_functions`."""
+    """Return the study of a function that returns models; `options` are passed to `run_functions`."""
     if isinstance(sizes, int | np.integer):
         raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
     descending = sorted(map(float, sizes), reverse=True)
@@ -162,13 +165,16 @@ def _warn_of_coarser_meshes(levels: Sequence[Level]) -> None:
 
 
 def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
-    """Return the job of one element and formulation on one mesh."""
+    """Return the job that solves a case with one element type and formulation on the mesh of one level."""
     marks = {"level": level, "element": member.element, "formulation": member.formulation}
     return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
 
 
 def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
-    """Return the study of finished runs; quantities in `wanted` are fitted besides the standard ones and those of checks."""
+    """Return the study of finished runs.
+
+    The quantities in `wanted` are fitted in addition to the standard quantities and to those of the checks of the case.
+    """
     by_combination: dict[Combination, list[tuple[int, Result]]] = {}
     for job, result in zip(jobs, results, strict=True):
         member = Combination(job.marks["element"], job.marks["formulation"])
@@ -194,9 +200,10 @@ def _series(
     theory: tuple[Any, float, str],
     asked: tuple[str, ...] = (),
 ) -> Series:
-    """Return the series of one element and formulation with its limits; `checked` quantities are fitted if known.
+    """Return the series of one element type and formulation with its limits.
 
-    `theory` holds the theory of the pair, the fraction of it that the model represents, and the basis of comparison.
+    Quantities in `checked` are fitted if the results contain them. `theory` consists of the theory of the contact pair, the
+    fraction of the contact that the model represents, and the condition of the comparison (see `Series.compared`).
     """
     solved = [(number, result) for number, result in results if "error" not in result]
     levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
@@ -215,7 +222,7 @@ def _series(
 
 
 def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
-    """Return the values of the theory at the limit of the force, and their variation over its error bar."""
+    """Return the values of the theory at the limit of the force, and their variation within the error bar of the force."""
     if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
         return {}, {}
     middle, upper = (of_theory(theory.at_force((force.value + off) / share), share) for off in (0.0, force.uncertainty))

@@ -1,8 +1,8 @@
-"""Error estimate of a solution by cell, from the smoothed stress and the traction jump at the contact surface.
+"""Estimate the error of a solution in each cell from the smoothed stress and the traction jump at the contact surface.
 
-The smoothed stress is more accurate than the stress of the solution, so that their difference estimates the error
-(Zienkiewicz and Zhu, 1987). This does not include the difference between smoothed stress and contact pressure on the contact
-surface, which is added as in residual estimates (e.g. Wriggers and Scherf, 1998).
+The smoothed stress is more accurate than the stress of the solution, so that their difference is an estimate of the error
+(Zienkiewicz and Zhu, 1987). On the contact surface the difference between the smoothed normal stress and the contact
+pressure is added, as in residual-based estimates (for example Wriggers and Scherf, 1998).
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from fastcontact.studies.error_norms import stress_in_cells
 
 @dataclass(frozen=True, eq=False)
 class ErrorEstimate:
-    """Estimated errors in the energy norm, see `error_norms.ErrorNorms` [energy^(1/2)].
+    """Estimated errors of a solution in the energy norm, which `ErrorNorms` defines.
 
     Attributes
     ----------
     cells : ndarray (n_solids,)
-        Error of every solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
+        Error of each solid cell, in the order of ``mesh.solids`` [energy^(1/2)].
     contact : ndarray (n_solids,)
-        Contribution of the contact surface [energy^(1/2)].
+        Contribution of the traction jump at the contact surface to the error of each solid cell [energy^(1/2)].
     energy : float
         Energy norm of the solution [energy^(1/2)].
 
     Examples
     --------
-    See `estimate_error`.
+    `estimate_error` has a complete example.
 
     >>> import fastcontact as fc
     >>> fc.estimate_error(model, step).relative  # doctest: +SKIP
@@ -59,12 +59,12 @@ class ErrorEstimate:
 
     @property
     def total(self) -> float:
-        """Error of the solution."""
+        """Estimated error of the solution in the energy norm [energy^(1/2)]."""
         return float(np.linalg.norm(self.cells))
 
     @property
     def relative(self) -> float:
-        """Error of the solution divided by its energy norm [-]."""
+        """Estimated error of the solution divided by the energy norm of the solution [-]."""
         return self.total / math.hypot(self.energy, self.total) if self.total else 0.0
 
 
@@ -75,7 +75,9 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
     Parameters
     ----------
     model : Model
+        The model that was solved.
     step : StepResult
+        A step of its solution.
 
     Returns
     -------
@@ -112,7 +114,7 @@ def estimate_error(model: Model, step: StepResult) -> ErrorEstimate:
 def _differences(
     model: Model, displacement: Array, name: str, smooth: Array, offset: StressOffset | None
 ) -> tuple[Array, float]:
-    """Return the squared energy norms (n_cells,) of smoothed minus computed stress, and the total of the computed stress."""
+    """Return the squared energy norms (n_cells,) of smoothed minus computed stress, and that of the computed stress."""
     N, stress, volume, elastic = stress_in_cells(
         model, name, slice(None), displacement, elements.get(name).order + 1, offset
     )
@@ -156,7 +158,7 @@ def _add_contact(model: Model, result: ContactResult, smooth: dict[str, Array], 
 
 
 def _owners(name: str, cells: Numbers, facets: Numbers) -> tuple[Indices, Indices, Indices]:
-    """Return the facets of cells of a kind, these cells, and the facet nodes as local nodes of the cells."""
+    """Return the facets that belong to cells of one element type, these cells, and the local nodes of the facets."""
     near = np.flatnonzero(np.isin(cells, facets).sum(axis=1) >= facets.shape[1])
     sides = [list(side) for side in elements.get(name).facets if len(side) == facets.shape[1]]
     rows = np.array([same_facets(facets, cells[near][:, side]) for side in sides], np.intp).reshape(-1, len(near))

@@ -1,7 +1,7 @@
-"""Energy and L2 norms of the difference between a finite-element solution and a theory, by quadrature.
+"""Compute energy and L2 norms of the difference between a finite-element solution and a theory by quadrature.
 
-They are for convergence studies against exact solutions such as `analytic.hertz_box`. Errors at the nodes alone often
-converge faster than the solution between them.
+These norms are for convergence studies with exact solutions such as `analytic.hertz_box`. Errors at the nodes often converge
+faster than errors within the cells, and are thus no substitute.
 """
 
 from __future__ import annotations
@@ -26,40 +26,47 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.elements import Element
 from fastcontact.model.model import Model
 
-# Number of quadrature points evaluated at a time, which limits the intermediate arrays of theories.
+# Number of quadrature points that are evaluated at a time, which limits the memory of the intermediate arrays.
 AT_ONCE = 100_000
 
 
 class Theory(Protocol):
-    """An exact solution in the whole body."""
+    """An exact solution that is known everywhere in the bodies."""
 
     def displacement(self, points: Array) -> Array:
         """Return the displacements (n, dim) [length] at `points` (n, dim) [length]."""
         ...
 
     def stress(self, points: Array) -> Array:
-        """Return the stresses (n, 4), in 3D (n, 6) [pressure], at `points` (n, dim) [length], ordered as in results."""
+        """Return the stresses (n, 4), in 3D (n, 6) [pressure] at `points` (n, dim) [length].
+
+        The order of the components is that of `StepResult.stress`.
+        """
         ...
 
 
 @dataclass(frozen=True)
 class ErrorNorms:
-    """Norms of an error, and of the theory for comparison.
+    """Norms of the error of a solution, and of the theory with which it is compared.
 
-    The energy norm of stresses s is the square root of the integral of s : C^-1 : s with the elastic moduli C, that is
-    of twice the elastic energy [(force length)^(1/2)]. The norm of displacements is the square root of the integral of
-    their square (L2) [length^(1 + dim/2)]. In axisymmetry integrals run over the full circle.
+    The energy norm of a stress field s is the square root of the integral of s : C^-1 : s with the elastic moduli C, which
+    is twice the elastic energy. The L2 norm of a displacement field is the square root of the integral of its square. In
+    axisymmetry integrals extend over the full circle.
 
     Attributes
     ----------
-    energy, displacement : float
-        Norms of the solution minus the theory.
-    energy_of_theory, displacement_of_theory : float
-        Norms of the theory.
+    energy : float
+        Energy norm of the difference between solution and theory [(force length)^(1/2)].
+    displacement : float
+        L2 norm of the difference between solution and theory [length^(1 + dim/2)].
+    energy_of_theory : float
+        Energy norm of the theory [(force length)^(1/2)].
+    displacement_of_theory : float
+        L2 norm of the displacement of the theory [length^(1 + dim/2)].
 
     Examples
     --------
-    See `error_against`.
+    `error_against` has a complete example.
 
     >>> import fastcontact as fc
     >>> fc.error_against(fc.analytic.hertz_box(), model, step.displacement).relative_energy  # doctest: +SKIP
@@ -74,12 +81,12 @@ class ErrorNorms:
 
     @property
     def relative_energy(self) -> float:
-        """Energy norm of the error divided by that of the theory [-]."""
+        """Energy norm of the error divided by the energy norm of the theory [-]."""
         return self.energy / self.energy_of_theory
 
     @property
     def relative_displacement(self) -> float:
-        """L2 norm of the error of displacements divided by that of the theory [-]."""
+        """L2 norm of the error of the displacement divided by the L2 norm of the displacement of the theory [-]."""
         return self.displacement / self.displacement_of_theory
 
 
@@ -95,25 +102,25 @@ def error_against(
 ) -> ErrorNorms:
     """Return the norms of the difference between a finite-element solution and a theory.
 
-    Both are compared at the same quadrature points of the reference configuration; the stresses of the solution come
-    from the derivatives of its displacements there, without averaging (Zienkiewicz and Taylor, 2000, section 14.1).
+    Both are evaluated at the same quadrature points in the reference configuration. The stresses of the solution follow from
+    the derivatives of its displacements there, without averaging (Zienkiewicz and Taylor, 2000, section 14.1).
 
     Parameters
     ----------
     theory : Theory
         An object with methods ``displacement(points)`` and ``stress(points)``, such as `analytic.hertz_box`.
     model : Model
-        The model, of which mesh, kinematics and materials are used.
+        The model of the solution; only its mesh, kinematics, materials and initial states are used.
     displacement : array_like (n_points, dim)
-        Displacement of the solution, e.g. ``fc.solve(model)[-1].displacement`` [length].
+        Nodal displacements of the solution, such as ``fc.solve(model)[-1].displacement`` [length].
     groups : sequence of str or str, optional
-        Groups of solid cells to integrate over, by default all.
+        Groups of solid cells over which to integrate; by default all solid cells.
     n_points : int, optional
-        Quadrature points along each direction of a cell; by default three more than the order of the element, so that
-        the quadrature error is negligible.
+        Number of quadrature points along each direction of a cell. By default it is the order of the element plus three, so
+        that the quadrature error is negligible.
     rise : ndarray (n_points,), optional
-        Temperature rise at every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and
-        strains of the model are included in full.
+        Temperature rise of every point of the mesh, see `Model.temperature_rise` [temperature]. Initial stresses and strains
+        of the model act with the multiplier 1.
 
     Returns
     -------
@@ -122,7 +129,7 @@ def error_against(
     Raises
     ------
     MeshError, ModelError
-        If a group is unknown or holds no solid cells, an array has the wrong shape, or the theory is not finite.
+        If a group is unknown or contains no solid cells, an array has a wrong shape, or a value of the theory is not finite.
 
     Examples
     --------
@@ -165,11 +172,12 @@ def stress_in_cells(
     n_points: int | None,
     offset: StressOffset | None = None,
 ) -> tuple[Array, Array, Array, Array]:
-    """Return shape functions, stresses, volumes and compliances at the quadrature points of some cells of a kind.
+    """Return shape functions, stresses, volumes and compliances at the quadrature points of some cells of one element type.
 
-    Shape functions (n_q, n_nodes) [-]; stresses (n_cells, n_q, n_components) [pressure]; volumes (n_cells, n_q) [length^dim];
-    compliances (n_cells, 1 or n_q, n_components, n_components) [1 / pressure], by quadrature point if they vary inside cells.
-    `displacement` is (n_points, dim) [length].
+    The shape functions are (n_q, n_nodes) [-], the stresses (n_cells, n_q, n_components) [pressure], and the volumes of the
+    quadrature points (n_cells, n_q) [length^dim]. The compliances are (n_cells, n_q, n_components, n_components)
+    [1 / pressure] if they vary within cells, otherwise (n_cells, 1, n_components, n_components). `displacement` is
+    (n_points, dim) [length].
     """
     mesh, element, axisymmetric = model.mesh, elements.get(name), model.kinematics == "axisymmetric"
     xi, weights = integration_rule(element, n_points)
@@ -193,7 +201,7 @@ def _squares(
     n_points: int | None,
     offset: StressOffset | None,
 ) -> Array:
-    """Return the squared norms (4,) over some cells, in the order of `ErrorNorms`."""
+    """Return the squares (4,) of the norms over some cells, in the order of the attributes of `ErrorNorms`."""
     N, stress, volume, elastic = stress_in_cells(model, name, rows, u, n_points, offset)
     cells = model.mesh.cells[name][rows]
     places = np.einsum("qa,cad->cqd", N, model.mesh.points[cells])

@@ -1,15 +1,16 @@
-r"""The fitted limit of a quantity over a family of meshes, and its order of convergence, with error bars.
+r"""Fit the limit of a quantity under mesh refinement and its order of convergence, with error bars.
 
-The values are taken to be
+The model of the values on meshes of size :math:`h_i` is
 
 .. math:: v_i = L + C h_i^p (1 + s e_i)
 
-with independent normal :math:`e_i`: the mesh error fluctuates by a fraction s of itself. L, C and s are
-integrated out for every order p (Bayesian linear regression with weights :math:`h^{-2p}`; Zellner 1971, chapter 3), and
-the orders are averaged with their evidence; docs/theory/convergence.md gives the reasons. The prior of p is log-normal;
-that of s^2 weighs as much as one and a half meshes, so that a chance agreement of few meshes does not make the error bar
-too small. The first k meshes may be too coarse for one power of h, with a prior probability of 1/2 for each further k, as
-long as three meshes are left. The error bar is half of the 95 % interval of L, the greater half if they differ.
+with the limit L, the order p, a constant C and independent standard normal variables :math:`e_i`: the mesh error has a
+relative scatter s. For each order p the parameters L, C and s are integrated out (Bayesian linear regression with weights
+:math:`h^{-2p}`; Zellner 1971, chapter 3), and the results are averaged with the evidence of the orders. The prior of p is
+log-normal. The prior of s^2 has the weight of one and a half meshes, so that a chance agreement of few meshes does not make
+the error bar too small. The first k meshes may be too coarse for a single power of h; each further mesh has the prior
+probability 1/2, as long as three meshes remain. The error bar is the distance from the median of L to the farther end of its
+95 % interval. The reasons for these choices are given in docs/theory/convergence.md.
 """
 
 from __future__ import annotations
@@ -28,27 +29,29 @@ CONFIDENCE = 0.95
 ORDERS = np.geomspace(0.4, 6.0, 81)
 PRIOR_ORDER, PRIOR_SPREAD = 1.6, 0.35
 PRIOR_NOISE, PRIOR_WEIGHT = 0.2, 1.5
-# Factor by which the first meshes may scatter more, and the probability of this for each of them.
+# Factor by which the scatter of meshes that are too coarse is larger, and the prior probability of each further such mesh.
 COARSE_NOISE, COARSE_PROBABILITY = 10.0, 0.5
 
 
 @dataclass(frozen=True)
 class Limit:
-    """The limit of a quantity as the mesh is refined.
+    """The limit of a quantity under mesh refinement.
 
     Attributes
     ----------
     value : float
         Estimated limit, in the unit of the quantity.
     uncertainty : float
-        The limit lies within `value` +- `uncertainty` with a probability of 95 %.
+        Half-width of the interval ``value - uncertainty`` to ``value + uncertainty``, which contains the limit with a
+        probability of 95 %, in the unit of the quantity.
     order, order_uncertainty : float
-        Fitted order of convergence in h, and its standard deviation; NaN if the values do not change.
+        Fitted order of convergence with respect to the mesh size, and its standard deviation [-]; NaN if the values do not
+        change.
     n_levels : int
         Number of meshes in the fit.
     converging : bool
-        Whether the values settle: the last change is smaller than nine tenths of the median of the earlier changes, or
-        than a twentieth of the largest one. Otherwise there may be no limit.
+        Whether the values converge: the last change is smaller than 0.9 times the median of the earlier changes, or smaller
+        than 0.05 times the largest change. Otherwise a limit may not exist.
     """
 
     value: float
@@ -59,19 +62,19 @@ class Limit:
     converging: bool
 
     def contains(self, value: float) -> bool:
-        """Whether `value` lies within the error bar."""
+        """Return whether `value` lies within the 95 % interval of the limit."""
         return abs(value - self.value) <= self.uncertainty
 
 
 def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
-    """Fit limit and order of convergence, as described in docs/theory/convergence.md.
+    """Fit the limit and the order of convergence of a quantity, with the statistical model described in the module.
 
     Parameters
     ----------
     h : array_like (n,)
-        Mesh sizes, all different, n >= 3 [length].
+        Mesh sizes, which must be positive and distinct, n >= 3 [length].
     values : array_like (n,)
-        The quantity on each mesh, in its own unit; meshes with a value that is not finite are omitted.
+        Value of the quantity on each mesh [unit of the quantity]; values that are not finite are omitted.
 
     Returns
     -------
@@ -80,7 +83,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
     Raises
     ------
     CaseError
-        If fewer than three meshes remain, or mesh sizes are not positive and distinct.
+        If there are fewer than three finite values, or mesh sizes are not positive and distinct.
 
     Examples
     --------
@@ -129,9 +132,9 @@ def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
 
 
 def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
-    """Return location and scale of the limit's Student distribution, and log evidence, (3, n_orders).
+    """Return location and scale of the Student distribution of the limit, and the logarithm of the evidence (3, n_orders).
 
-    The first `coarse` meshes are taken to be too coarse.
+    The first `coarse` meshes are assumed to be too coarse for a single power of the mesh size.
     """
     result = np.empty((3, len(ORDERS)))
     dof = len(x) - 2 + PRIOR_WEIGHT
@@ -151,7 +154,7 @@ def _regressions(x: Array, y: Array, floor: float, coarse: int) -> Array:
 
 
 def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[float]:
-    """Return the median of a mixture of Student distributions between the bounds of its central interval."""
+    """Return lower bound, median and upper bound of the central interval of a mixture of Student distributions."""
     from scipy.optimize import brentq
     from scipy.special import stdtr
 
@@ -165,9 +168,10 @@ def _quantiles(centre: Array, width: Array, weight: Array, dof: float) -> list[f
 
 
 def step_orders(h: Sequence[float], values: Sequence[float], limit: float) -> list[float]:
-    """Return the order from each mesh to the next (n,) [-], the first NaN; these orders are erratic, see the module header.
+    """Return the observed order of convergence from the previous to each mesh (n,) [-]; the first is NaN.
 
-    `h` (n,) are mesh sizes [length], `values` (n,) and `limit` are in the unit of the quantity.
+    `h` (n,) [length] contains the mesh sizes; `values` (n,) and `limit` are in the unit of the quantity. These orders are
+    sensitive to the scatter of the values.
     """
     error = np.abs(np.asarray(values, np.float64) - limit)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""One element and formulation on all meshes of a convergence study: values, limits, model error and mesh error."""
+"""Results of one element type and formulation in a convergence study: values, limits, model errors and mesh errors."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from fastcontact.cases.summary import finite
 from fastcontact.studies.fit import Limit, step_orders
 from fastcontact.studies.settings import Combination
 
-# Relative differences below this stem from straight facets and tolerances, not from the formulation [-].
+# Relative differences below this value are attributed to straight facets and tolerances, not to the formulation [-].
 EXACT = 1e-4
 
 
 @dataclass(frozen=True)
 class Split:
-    """Differences from a theory, relative to it; ``total = model + mesh``.
+    """The model error and the mesh error of a quantity, both relative to the value of a theory.
 
     Attributes
     ----------
     theory : float
         Value of the theory, in the unit of the quantity.
     model : float
-        Model error: difference of the limit from the theory.
+        Model error, the difference between the limit of mesh refinement and the theory [-].
     mesh : float
-        Mesh error: difference of the finest mesh from the limit.
+        Mesh error, the difference between the value of the finest mesh and the limit [-].
     uncertainty : float
-        Uncertainty of both errors, from that of the limit, at 95 %.
+        Half-width of the 95 % interval of both errors, which follows from the uncertainty of the limit [-].
     """
 
     theory: float
@@ -39,17 +39,30 @@ class Split:
 
     @property
     def total(self) -> float:
-        """Difference of the finest mesh from the theory."""
+        """Difference between the value of the finest mesh and the theory, ``model + mesh`` [-]."""
         return self.model + self.mesh
 
     @property
     def resolved(self) -> bool:
-        """Whether the model error is larger than its error bar."""
+        """Whether the magnitude of the model error is larger than its uncertainty."""
         return abs(self.model) > self.uncertainty
 
 
 def split(finest: float, limit: Limit, theory: float) -> Split:
-    """Split the difference between the finest mesh and a theory into model error and mesh error.
+    """Split the difference between the value of the finest mesh and a theory into model error and mesh error.
+
+    Parameters
+    ----------
+    finest : float
+        Value of the finest mesh, in the unit of the quantity.
+    limit : Limit
+        Limit of mesh refinement.
+    theory : float
+        Value of the theory, in the same unit.
+
+    Returns
+    -------
+    Split
 
     Examples
     --------
@@ -74,13 +87,16 @@ class Measured:
     h : float
         Shortest facet of the secondary surface; without contact the shortest edge; NaN if unknown [length].
     n_dofs : int
+        Number of degrees of freedom.
     values : dict of str to float
-        Quantities of interest, in the case's units.
+        Quantities of interest by name, in the units of the case.
     profile : dict
-        ``r`` [length] and ``pressure`` [pressure], lists (n_nodes,) over the secondary nodes.
+        Lists ``r`` [length] and ``pressure`` [pressure] of the secondary nodes, with the distance from the middle of the
+        contact and the contact pressure.
     seconds : float
-        Time of the run [s].
+        Duration of the run [s].
     warnings : tuple of str
+        Warnings of the run.
     """
 
     h: float
@@ -91,7 +107,7 @@ class Measured:
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return sizes, quantities, time and warnings for JSON; without an unknown mesh size, and None for NaN."""
+        """Return sizes, quantities, duration and warnings for JSON; NaN becomes None, and an unknown mesh size is omitted."""
         size = {} if math.isnan(self.h) else {"h": self.h}
         values = {name: finite(value) for name, value in self.values.items()}
         return {**size, "n_dofs": self.n_dofs, **values, "seconds": self.seconds, "warnings": list(self.warnings)}
@@ -99,36 +115,41 @@ class Measured:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Level(Measured):
-    """Results of one mesh, see `Measured`; its `number` is 0 for the coarsest."""
+    """Results of one mesh, see `Measured`; the coarsest mesh has the `number` 0."""
 
     number: int
 
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Results of one element and formulation on all levels.
+    """Results of one element type and formulation on all meshes.
 
     Attributes
     ----------
     combination : Combination
+        The element type and the formulation.
     levels : list of Level
-        Levels that could be solved, coarsest first.
+        Results of the meshes on which the case could be solved, the coarsest first.
     failed : dict of int to str
-        Reason why a level failed, by its number.
-    theory, reference : dict of str to float
-        Theory at equal approach, and mesh-converged solution if the case names one, by quantity.
-    equal_force, equal_force_spread : dict of str to float
-        Theory at the limit of the force, and its variation within the error bar of the force, by quantity.
+        Reason of the failure of each other mesh, by number of the level.
+    theory : dict of str to float
+        Values of the theory at equal approach, by quantity.
+    reference : dict of str to float
+        Values of the mesh-converged solution, by quantity; empty if the case does not name one.
+    equal_force : dict of str to float
+        Values of the theory at the limit of the force, by quantity.
+    equal_force_spread : dict of str to float
+        Variation of the values in `equal_force` within the error bar of the force, by quantity.
     quantities : tuple of str
-        Quantities that are fitted if there are enough levels.
+        Quantities that are fitted if there are at least three levels.
     limits : dict of str to Limit
-        Limits by quantity; empty with fewer than three levels.
+        Limits of mesh refinement by quantity; empty with fewer than three levels.
     exact_theory : bool
-        Whether the theory describes exactly the bodies of the model, so that there is no model error.
+        Whether the theory describes the bodies of the model exactly, so that there is no model error.
     compared : str
-        Condition of the comparison with theory: "at equal approach" or "under the given load".
+        Condition of the comparison with the theory, ``"at equal approach"`` or ``"under the given load"``.
     share : float
-        Modelled fraction of the theory's contact [-].
+        Fraction of the contact of the theory that the model represents [-].
     asked : tuple of str
         Requested quantities, which tables, figures and sentences show before the standard ones.
     """
@@ -148,7 +169,7 @@ class Series:
     asked: tuple[str, ...] = ()
 
     def shown(self, standard: Sequence[str]) -> list[str]:
-        """Return the quantities to show: the requested ones, then the `standard` ones that are known."""
+        """Return the quantities to show: the requested quantities, then the known ones among `standard`."""
         return [name for name in dict.fromkeys((*self.asked, *standard)) if name in self.quantities]
 
     @property
@@ -162,42 +183,42 @@ class Series:
         return [level.h for level in self.levels]
 
     def values(self, quantity: str) -> list[float]:
-        """Return a quantity on every level (n_levels,), in its unit; NaN if it is unknown."""
+        """Return the values of a quantity on all levels (n_levels,), in its unit; unknown values are NaN."""
         return [level.values.get(quantity, math.nan) for level in self.levels]
 
     def errors(self, quantity: str) -> list[float]:
-        """Return (value - limit) / limit on every level (n_levels,) [-]; NaN without a limit."""
+        """Return the relative errors (value - limit) / limit on all levels (n_levels,) [-]; NaN without a limit."""
         limit = self.limits.get(quantity)
         return [value / limit.value - 1.0 if limit and limit.value else math.nan for value in self.values(quantity)]
 
     def orders(self, quantity: str) -> list[float]:
-        """Return the observed orders of successive levels (n_levels,) [-], the first being NaN."""
+        """Return the observed order of convergence from the previous to each level (n_levels,) [-]; the first is NaN."""
         limit = self.limits.get(quantity)
         return step_orders(self.h, self.values(quantity), limit.value) if limit else [math.nan] * len(self.levels)
 
     def from_theory(self, quantity: str) -> list[float]:
-        """Return value / theory - 1 at equal approach on every level (n_levels,) [-]; NaN without a theory."""
+        """Return value / theory - 1 at equal approach on all levels (n_levels,) [-]; NaN without a theory."""
         theory = self.theory.get(quantity)
         return [value / theory - 1.0 if theory else math.nan for value in self.values(quantity)]
 
     def split(self, quantity: str) -> Split | None:
-        """Return model and mesh error at equal approach, if there are a limit and a theory."""
+        """Return the model and the mesh error at equal approach; None without a limit or a theory."""
         limit, theory = self.limits.get(quantity), self.theory.get(quantity)
         return split(self.values(quantity)[-1], limit, theory) if limit and theory else None
 
     def converges_to_theory(self, quantity: str) -> bool | None:
-        """Return whether the limit agrees with an exact theory within its error bar; None without such a theory."""
+        """Return whether the limit agrees with an exact theory within its error bar; None without an exact theory."""
         split, limit = self.split(quantity), self.limits.get(quantity)
         if split is None or limit is None or not self.exact_theory:
             return None
         return bool(limit.converging and abs(split.model) <= max(split.uncertainty, EXACT))
 
     def split_equal_force(self, quantity: str) -> Split | None:
-        """Return model and mesh error relative to the theory at the limit of the force."""
+        """Return the model and the mesh error relative to the theory at the limit of the force; None if unknown."""
         limit, theory = self.limits.get(quantity), self.equal_force.get(quantity)
         if not (limit and theory):
             return None
-        # The value of the theory inherits the uncertainty of the force.
+        # The uncertainty of the force causes an uncertainty of the value of the theory.
         error_bar = math.hypot(limit.uncertainty, self.equal_force_spread.get(quantity, 0.0))
         return split(self.values(quantity)[-1], dataclasses.replace(limit, uncertainty=error_bar), theory)
 

@@ -1,4 +1,4 @@
-"""Parameter sweep: solve a case for several values of its parameters."""
+"""Parameter sweeps: solve a case for several values of its parameters."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from fastcontact.studies.sweep_figures import label_of
 from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 from fastcontact.studies.sweep_report import Sweep
 
-# Default level of the meshes: fine enough for trends larger than the mesh error.
+# Default refinement level of the meshes, on which mesh errors are smaller than the trends of interest.
 LEVEL = 2
-# Number of points of a theory curve.
+# Number of points of the curve of a theory.
 CURVE = 60
 
 
@@ -54,22 +54,23 @@ def parameter_sweep(
     Parameters
     ----------
     case : Case, path-like or callable
-        A function receives the parameters and returns a `Model`, which is solved in 20 equal steps, or the result of
-        `solve`.
+        A case, the path of a case file, or a function. The function receives the parameters and returns a `Model`, which is
+        solved in 20 equal steps, or the result of `solve`.
     parameters : mapping of str to sequence, or sequence
-        Values by parameter; for a function by argument, or a sequence for its first argument. For a case, a parameter
-        is the path of a number in the case file, e.g. ``"contact.hertz.friction"``, ``"material[0].E"`` or
-        ``"mesh.size"`` (tables in a list are numbered from 0), or a name of ``[study.parameters]``, which sets several
-        linked values.
-    quantities
-        Further quantities, as in `convergence_study`.
+        Values of each parameter, by name. The parameters of a function are its arguments; a sequence alone contains values
+        of the first argument. A parameter of a case is the path of a number in the case file, such as
+        ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"``, where tables in a list are numbered from 0. It
+        can also be a name in ``[study.parameters]``, which sets several linked values.
+    quantities : sequence of str, or dict of str to callable
+        Further quantities, described for `convergence_study`.
     element, formulation : str, optional
-        By default the last of ``study.combinations``, or those of the case.
+        Element type and contact formulation; by default the last of ``study.combinations`` or, without these, those of the
+        case.
     level : int, optional
-        Refinement level, as in `convergence_study`; by default 2 if ``[study]`` defines the meshes of level 0,
-        otherwise the mesh of the case.
+        Number of refinements of the mesh. By default 2 if ``[study]`` defines the meshes of level 0; otherwise the mesh of
+        the case is used.
     executor, workers, store, on_progress, progress
-        As in `convergence_study`.
+        Described for `convergence_study`.
 
     Returns
     -------
@@ -78,7 +79,7 @@ def parameter_sweep(
     Raises
     ------
     CaseError, FastcontactError
-        If the case, a parameter or a value is wrong, or no point could be solved.
+        If the case, a parameter or a value is invalid, or the model could not be solved for any combination.
 
     Examples
     --------
@@ -107,7 +108,7 @@ def parameter_sweep(
     asked = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
     check_names(case, asked)
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
-    # An unknown key would make every run fail.
+    # Building one case in advance finds unknown keys, with which every run would fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
@@ -126,7 +127,7 @@ def _of_function(
     wanted: Quantities,
     options: dict[str, Any],
 ) -> Sweep:
-    """Return the sweep of a model function; `options` are those of `run_functions`."""
+    """Return the sweep of a function that returns models; `options` are passed to `run_functions`."""
     named = isinstance(parameters, Mapping)
     by_name = parameters if isinstance(parameters, Mapping) else {functions.first_parameter(function): [*parameters]}
     choices, name, measures = _choices(by_name), functions.function_name(function), functions.measures_of(wanted)
@@ -145,7 +146,10 @@ def _of_function(
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
-    """Return all combinations of values, the last parameter fastest; raises CaseError for none or too many."""
+    """Return all combinations of the values, in which the last parameter varies fastest.
+
+    CaseError if there are no combinations, or too many.
+    """
     if not parameters or not all(len(values) for values in parameters.values()):
         raise CaseError("a sweep needs at least one parameter with at least one value")
     check_runs(prod(len(values) for values in parameters.values()))
@@ -159,7 +163,7 @@ def _label(choice: Mapping[str, Value]) -> str:
 def _points(
     parameters: Mapping[str, Sequence[Value]], choices: Sequence[dict[str, Value]], results: Sequence[Result]
 ) -> dict[str, Any]:
-    """Return the fields of a `Sweep` on its parameters and points."""
+    """Return the fields of a `Sweep` that describe its parameters and points."""
     runs = list(zip(choices, results, strict=True))
     return {
         "parameters": {name: tuple(values) for name, values in parameters.items()},
@@ -169,7 +173,7 @@ def _points(
 
 
 def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
-    """Return the theory of a pair over the first parameter, for each choice of the others."""
+    """Return the theory of a contact pair as a function of the first parameter, for each choice of the other parameters."""
     (first, values), *others = parameters.items()
     numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
     if len(numbers) < len(values) or min(numbers) == max(numbers):
@@ -191,12 +195,12 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
 def _theory_at(
     data: dict[str, Any], choice: Mapping[str, Value], linked: Mapping[str, Any], pair: str | None
 ) -> dict[str, float]:
-    """Return the quantities of the theory of a pair for a choice of parameters; empty where it is undefined."""
+    """Return the quantities of the theory of a contact pair for a choice of parameters; empty if it is undefined there."""
     for parameter, value in choice.items():
         data = substituted(data, parameter, value, linked)
     try:
         theories = described(data)["theories"].get(pair or "", {})
-    except FastcontactError:  # such as a Poisson's ratio outside the range of the theory
+    except FastcontactError:  # for example because Poisson's ratio is outside the range of the theory
         return {}
     return of_theory(theories.get("theory"), theories.get("share", 1.0))
 
@@ -209,7 +213,7 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     chosen = settings(case, data)
     member = one_combination(chosen, element, formulation)
     finer = (LEVEL if chosen.by_shape else 0) if level is None else level
-    # The largest mesh starts first; for a generator, its size is the number of points on level 0.
+    # The runs with the largest meshes start first. With a generator, the size of a run is the number of points on level 0.
     size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {finer}"}
     return job_of(case, chosen, member, finer, label=_label(choice), marks=marks, size=size)

@@ -1,4 +1,4 @@
-"""Rectangular blocks, one block on another, and a cylinder on a block."""
+"""Meshes of rectangular blocks, of a block on a block, and of a cylinder on a block in 2D."""
 
 from __future__ import annotations
 
@@ -30,25 +30,26 @@ def block(
     name: str = "BLOCK",
     distortion: float = 0.0,
 ) -> Mesh:
-    """Rectangle of equal cells; for three dimensions see `box`.
+    """Rectangle of equal cells; `box` is the corresponding generator in 3D.
 
-    Groups of cells: `name` (all of it), BOTTOM, RIGHT, TOP, LEFT. Groups of points: BOTTOM_LEFT, BOTTOM_RIGHT,
-    TOP_RIGHT, TOP_LEFT.
+    Groups of cells: `name` (all solid cells) and the sides BOTTOM, RIGHT, TOP, LEFT. Groups of points: the corners
+    BOTTOM_LEFT, BOTTOM_RIGHT, TOP_RIGHT, TOP_LEFT.
 
     Parameters
     ----------
     size : (float, float)
         Width and height [length].
     divisions : (int, int)
-        Cells along the width and the height; triangles are halves of these.
+        Numbers of quadrangles along the width and the height; for triangles each quadrangle is divided in two.
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Element of the solid.
+        Element type of the solid cells.
     origin : (float, float)
         Lower left corner [length].
     name : str
-        Name of the solid group.
+        Name of the group of all solid cells.
     distortion : float
-        How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
+        Largest displacement of inner nodes in an irregular but fixed pattern, relative to the size of a cell; from 0 to
+        0.24 [-].
 
     Returns
     -------
@@ -71,7 +72,7 @@ def block(
 
 
 def _finished(grid: Array, element: str, name: str) -> Mesh:
-    """Return the mesh of a grid in an element, with named sides and corners."""
+    """Return the mesh of a grid with cells of type `element` and with groups for its sides and corners."""
     sides = {side: side for side in SIDES}
     mesh = in_element(structured(grid, name, sides, triangles=element in TRIANGLES), element)
     places = {"BOTTOM_LEFT": grid[0, 0], "BOTTOM_RIGHT": grid[-1, 0]}
@@ -79,7 +80,7 @@ def _finished(grid: Array, element: str, name: str) -> Mesh:
 
 
 def _pattern(n: int, m: int) -> Array:
-    """Return irregular but reproducible shifts (n + 1, m + 1, 2) between -1 and 1, zero on the sides."""
+    """Return irregular but reproducible displacements (n + 1, m + 1, 2) [-] from -1 to 1, which vanish on the sides."""
     i, j = np.indices((n + 1, m + 1))
     shift = np.stack([np.sin(5.1 * i + 2.3 * j + 0.7), np.cos(3.7 * i - 4.3 * j)], axis=2)
     shift[0] = shift[-1] = shift[:, 0] = shift[:, -1] = 0.0
@@ -97,24 +98,26 @@ def block_on_block(
     shift: float = 0.0,
     distortion: float = 0.0,
 ) -> Mesh:
-    """Two rectangles, the upper one resting on the lower one along y = 0; their nodes need not match.
+    """Two rectangular blocks that touch along y = 0; their nodes need not coincide.
 
-    Groups of cells: LOWER, UPPER, CONT_LOWER (top of the lower block), CONT_UPPER (bottom of the upper one) and the
-    outer sides LOWER_BOTTOM, LOWER_LEFT, LOWER_RIGHT, UPPER_TOP, UPPER_LEFT, UPPER_RIGHT. Groups of points: the
-    corners LOWER_BOTTOM_LEFT ... UPPER_TOP_RIGHT.
+    Groups of cells: LOWER, UPPER, CONT_LOWER (top of the lower block), CONT_UPPER (bottom of the upper block) and the
+    other sides LOWER_BOTTOM, LOWER_LEFT, LOWER_RIGHT, UPPER_TOP, UPPER_LEFT, UPPER_RIGHT. Groups of points: the eight
+    corners, from LOWER_BOTTOM_LEFT to UPPER_TOP_RIGHT.
 
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Element of both solids.
+        Element type of both solids.
     size_lower, size_upper : (float, float)
-        Widths and heights [length].
+        Width and height of each block [length].
     divisions_lower, divisions_upper : (int, int)
-        Cells along the widths and the heights.
+        Numbers of quadrangles along the width and the height of each block; for triangles each is divided in two.
     shift : float
-        x of the left side of the upper block; that of the lower block is 0. The blocks must overlap in x [length].
+        Coordinate x of the left side of the upper block; the left side of the lower block is at x = 0 [length]. The blocks
+        must overlap in x.
     distortion : float
-        How far inner nodes are moved, 0 to 0.24 of a cell, in a fixed pattern.
+        Largest displacement of inner nodes in an irregular but fixed pattern, relative to the size of a cell; from 0 to
+        0.24 [-].
 
     Returns
     -------
@@ -142,7 +145,7 @@ def block_on_block(
 
 
 def _side_name(name: str, body: str, contact: str) -> str:
-    """Return the name of a block's group if the block is one of two."""
+    """Return the name that group `name` of a single block has if the block is one of two."""
     if name == contact:
         return f"CONT_{body}"
     return name if name == body else f"{body}_{name}"
@@ -159,23 +162,23 @@ def cylinder_on_block(
 ) -> Mesh:
     """Lower half of a cylinder on a block, the half x >= 0 of both, for plane strain.
 
-    The cylinder's quarter disc touches the block at the origin; both meshes are finest there. Groups of cells:
-    CYLINDER, BLOCK, AXIS (x = 0 of both), CYLINDER_TOP, CYLINDER_SIDE (outer half of the arc), CONT_CYLINDER (the
-    45 degrees of arc next to the pole), CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points:
+    The cylinder is a quarter disc that touches the block at the origin, where both meshes are finest. Groups of cells:
+    CYLINDER, BLOCK, AXIS (x = 0 of both bodies), CYLINDER_TOP, CONT_CYLINDER (the arc from the pole to 45 degrees),
+    CYLINDER_SIDE (the rest of the arc), CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points:
     POLE_CYLINDER, POLE_BLOCK (two points at the origin), CENTRE (of the cylinder).
 
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Element of both solids.
+        Element type of both solids.
     R : float
         Radius of the cylinder [length].
     block_size : (float, float), optional
-        Width (from the axis x = 0) and height of the block, 2 R each by default [length].
+        Width of the modelled half of the block, and its height; by default both are 2 R [length].
     size : float, optional
-        Longest edges far from the contact, R/10 by default [length].
+        Largest length of the edges far from the contact; by default R/10 [length].
     contact_size : float, optional
-        Edges along the surfaces at the contact, R/100 by default [length].
+        Length of the edges along the surfaces at the contact; by default R/100 [length].
 
     Returns
     -------
@@ -201,7 +204,7 @@ def cylinder_on_block(
 
 
 def _cylinder(element: str, R: float, near: float, far: float) -> Mesh:
-    """Return the quarter disc above the block, with the cylinder's names."""
+    """Return the quarter disc above the block, with the group names of the cylinder."""
     if element in TRIANGLES:
         disc = quarter_disc(element, body="upper", R=R, size=far, contact_size=near)
     else:
@@ -219,14 +222,14 @@ _BLOCK_NAMES = {
 
 
 def _graded_block(element: str, width: float, height: float, near: float, far: float) -> Mesh:
-    """Return a block of quadrangles whose sides grow geometrically from the pole."""
+    """Return a block of quadrangles whose lengths form geometric progressions from the pole."""
     x = width * geometric(width, near, far)
     y = -height * geometric(height, near, far)[::-1]
     return renamed(_finished(rectangular(x, y + 0.0), element, "BLOCK"), _BLOCK_NAMES.get)
 
 
 def _free_block(element: str, width: float, height: float, spacing: Spacing) -> Mesh:
-    """Return a block of triangles whose sides grow with the distance from the pole, as in the cylinder."""
+    """Return a block of triangles whose size increases with the distance from the pole, as in the cylinder."""
     corners = [(0.0, 0.0), (0.0, -height), (width, -height), (width, 0.0)]
     names = ["LEFT", "BOTTOM", "RIGHT", "TOP"]
     sides = [

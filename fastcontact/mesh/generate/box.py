@@ -1,4 +1,4 @@
-"""Rectangular boxes in three dimensions: hexahedra, or hexahedra cut into tetrahedra, wedges or pyramids; grids of lines."""
+"""Meshes of rectangular boxes in 3D: hexahedra, or hexahedra that are divided into tetrahedra, wedges or pyramids."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from fastcontact.mesh.generate.blocks import block as rectangle
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 
-# All nodes of all elements are on a lattice of four steps per hexahedron, including mid nodes of the inner edges of pyramids.
+# Steps per hexahedron of the lattice that contains all nodes of all elements, also the mid-side nodes of pyramids.
 STEPS = 4
 _HEX = elements.get("hex8")
 _CORNERS = ((_HEX.nodes + 1) / 2 * STEPS).astype(np.int64)
-# Corners of the cells that make up a hexahedron, 8 being its centre. Neighbours match, because opposite faces are
-# divided in the same way.
+# Corners of the cells into which a hexahedron is divided; the number 8 is its centre. Adjacent hexahedra are compatible,
+# because opposite faces are divided in the same way.
 _CUTS = {
     "hex8": [list(range(8))],
     "tet4": [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
@@ -40,22 +40,22 @@ def box(
     *,
     name: str = "BOX",
 ) -> Mesh:
-    """Box of equal hexahedra, whole or cut into 6 tetrahedra, 2 wedges (standing along z) or 6 pyramids each.
+    """Box of equal hexahedra, which may be divided into 6 tetrahedra, 2 wedges with axes along z, or 6 pyramids each.
 
-    Groups of cells: `name` (all of it) and the outer facets XMIN, XMAX, YMIN, YMAX, ZMIN, ZMAX.
+    Groups of cells: `name` (all solid cells) and the outer facets XMIN, XMAX, YMIN, YMAX, ZMIN, ZMAX.
 
     Parameters
     ----------
     size : (float, float, float)
-        Lengths along x, y, z [length].
+        Lengths of the box along x, y, z [length].
     divisions : (int, int, int)
-        Hexahedra along x, y, z.
+        Numbers of hexahedra along x, y, z.
     element : {"hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "wedge18", "pyramid5", "pyramid13"}
-        Element of the solid.
+        Element type of the solid cells.
     origin : (float, float, float)
         Corner with the smallest coordinates [length].
     name : str
-        Name of the solid group.
+        Name of the group of all solid cells.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
     affordable(float(np.prod(shape, dtype=float)) * len(_CUTS[solid.linear]))
     corners = np.vstack([_CORNERS, _CORNERS.mean(axis=0, keepdims=True).astype(np.int64)])
     local = solid.corner_shape(solid.nodes) @ corners[_CUTS[solid.linear]]
-    # One number for each lattice point, by summation over the axes.
+    # A single integer for each position in the lattice, by which equal points are identified.
     n_y, n_z = STEPS * shape[1:] + 1
     weights = np.array([n_y * n_z, n_z, 1])
     first = STEPS * np.indices(tuple(shape.tolist())).reshape(3, -1).T @ weights
@@ -97,16 +97,16 @@ def _solids(solid: Element, shape: Indices) -> tuple[Indices, Indices]:
 
 
 def on_lines(element: str, lines: Sequence[Array], name: str = "BLOCK") -> Mesh:
-    """Return a block, or a box in three dimensions, with the groups of `block` or `box`.
+    """Return a mesh with the given grid lines, and with the groups of `block` in 2D and of `box` in 3D.
 
     Parameters
     ----------
     element : str
-        Element of the solid.
+        Element type of the solid cells.
     lines : sequence of ndarray (n + 1,)
-        Coordinates of the grid lines of each axis, ascending [length].
+        Ascending coordinates of the grid lines of each axis [length].
     name : str
-        Name of the solid group.
+        Name of the group of all solid cells.
     """
     divisions = [len(places) - 1 for places in lines]
     if len(lines) == 2:

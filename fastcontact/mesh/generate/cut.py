@@ -20,27 +20,29 @@ Facet = frozenset[int]
 
 @typed(MeshError)
 def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
-    """Return the mesh cut along a group of facets: both sides get separate nodes at the same positions.
+    """Return the mesh cut along a group of facets, with separate nodes at the same positions on the two sides.
 
     Parameters
     ----------
     mesh : Mesh
     group : str
-        Facets between solid cells that divide a body completely: the edge of the cut lies on the surface of the body.
+        Group of facets between solid cells. They must divide a body completely, so that the edge of the cut lies on the
+        surface of the body.
     normal : sequence of float (dim,), optional
-        Direction to the side that gets the new nodes [-]. By default the normal of the plane fitted to the facets,
-        with its largest component positive.
+        Direction from the cut to the side whose cells get the new nodes [-]; by default the normal of the plane fitted to
+        the facets, oriented such that its largest component is positive.
 
     Returns
     -------
     Mesh
-        `group` holds the facets of the old side, ``"<group> opposite"`` those of the new one, in the same order. New
-        nodes belong to the point groups of the old ones; facets on the new side follow their solids.
+        `group` contains the facets with the existing nodes, ``"<group> opposite"`` those with the new nodes, in the same
+        order. New nodes belong to the point groups of the existing nodes at the same positions. Other facets have the
+        nodes of their solid cells.
 
     Raises
     ------
     MeshError
-        If there is no such group of facets, if some do not lie between two solids, or if the cut ends inside a body.
+        If the group of facets does not exist, a facet does not lie between two solid cells, or the cut ends inside a body.
 
     Examples
     --------
@@ -76,12 +78,12 @@ def _direction(mesh: Mesh, group: str, points: Numbers, normal: Sequence[float] 
 
 
 def _as_sets(facets: dict[str, Numbers]) -> set[Facet]:
-    """Return the nodes of facets (n, k), by element, as sets."""
+    """Return the facets as a set with the set of nodes of each facet."""
     return {frozenset(facet) for block in facets.values() for facet in block.tolist()}
 
 
 def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
-    """Yield the facets of all solids that have touched points: element, row and nodes."""
+    """Yield the element type, the row of the cell and the nodes of all facets of solid cells that have marked points."""
     for name, block in mesh.solids.items():
         rows = np.flatnonzero(touched[block].any(axis=1))
         for facet in elements.get(name).facets:
@@ -92,7 +94,7 @@ def _facets_at(mesh: Mesh, touched: Mask) -> Iterator[tuple[str, int, Facet]]:
 def _cells_beyond(
     mesh: Mesh, group: str, section: set[Facet], points: Numbers, direction: Array
 ) -> dict[str, list[int]]:
-    """Return the solids at a section on the side to which `direction` points, by element type."""
+    """Return the rows of the solid cells at a section on the side to which `direction` points, by element type."""
     touched = np.zeros(mesh.n_points, bool)
     touched[points] = True
     number: dict[tuple[str, int], int] = {}
@@ -114,7 +116,7 @@ def _cells_beyond(
     cells: dict[str, list[int]] = {}
     for (name, row), body, centre in zip(number, component, middle, strict=True):
         nodes = mesh.cells[name][row]
-        at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # for a cell that touches the section in an edge or a node
+        at = mesh.points[nodes[touched[nodes]]].mean(axis=0)  # the cell may touch the section only in an edge or a node
         if side.get(int(body), bool((centre - at) @ direction > 0)):
             cells.setdefault(name, []).append(row)
     return cells
@@ -123,7 +125,10 @@ def _cells_beyond(
 def _sides_of_parts(
     mesh: Mesh, group: str, between: dict[Facet, list[int]], component: Numbers, middle: Array, direction: Array
 ) -> dict[int, bool]:
-    """Return whether each part of the cells at a section lies beyond it; MeshError if one lies on both sides."""
+    """Return for each connected part of the cells at a section whether it lies on the side of `direction`.
+
+    MeshError if a part lies on both sides.
+    """
     side: dict[int, bool] = {}
     for facet, pair in between.items():
         here, there = sorted(pair, key=lambda cell: float(middle[cell] @ direction))
@@ -140,7 +145,10 @@ def _sides_of_parts(
 def _opened(
     mesh: Mesh, group: str, facets: dict[str, Numbers], beyond: dict[str, list[int]], new_node: Numbers
 ) -> Mesh:
-    """Return the mesh with each `new_node` (n_points,), -1 where there is none, in the cells beyond the section."""
+    """Return the mesh in which the cells beyond the section have new nodes.
+
+    `new_node` (n_points,) is the number of the new node of each point, -1 for points that do not lie in the section.
+    """
     cells = {name: np.array(block) for name, block in mesh.cells.items()}
     moved = [_with_nodes(cells, name, np.array(rows), new_node) for name, rows in beyond.items()]
     outer = {facet for sides in moved for facet in sides} - _as_sets(facets)
@@ -159,7 +167,7 @@ def _opened(
 
 
 def _with_nodes(cells: dict[str, Numbers], name: str, rows: Indices, new_node: Numbers) -> list[Facet]:
-    """Replace the nodes of some cells of an element by the new ones, in place; return the old facets of solid cells."""
+    """Replace the nodes of some cells by new nodes, in place, and return the facets that these solid cells had before."""
     if not len(rows):
         return []
     block = cells[name][rows]

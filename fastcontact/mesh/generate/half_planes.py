@@ -1,4 +1,4 @@
-"""Blocks that represent half-planes and half-spaces: under an indenter, under a flat punch, crowned against each other."""
+"""Meshes of blocks that represent half-planes and half-spaces: under an indenter, under a punch, and two crowned blocks."""
 
 from __future__ import annotations
 
@@ -34,31 +34,32 @@ def graded_block(
     size: float | None = None,
     growth: float = 0.4,
 ) -> Mesh:
-    """Block under an indenter: x >= 0, and y >= 0 in three dimensions, its top at height 0, finest at the origin.
+    """Block under an indenter, the part x >= 0, in 3D also y >= 0, with its top at height 0 and a mesh refined at the origin.
 
-    It represents a half-plane or half-space in contact with a rigid obstacle: with a width and depth of 8 contact
-    radii the error of the pressure is a few thousandths. The height is the last coordinate, as for obstacles. Groups
-    of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in three
-    dimensions, SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
+    It represents a half-plane or half-space in contact with a rigid obstacle. If its width and depth are 8 contact radii,
+    the relative error of the pressure is a few thousandths. The height is the last coordinate, y in 2D and z in 3D. Groups
+    of cells: BLOCK, TOP, CONTACT (the finely meshed part of the top), BOTTOM, SIDE, SYMMETRY_X (x = 0) and, in 3D,
+    SYMMETRY_Y (y = 0). Group of points: POLE (the origin).
 
     Parameters
     ----------
     element : str
-        Any solid element; its dimension is that of the mesh.
+        Any element type of solid cells; its dimension is the dimension of the mesh.
     width : float
-        Extent along x, and along y in three dimensions [length].
+        Extent along x, in 3D also along y [length].
     depth : float, optional
-        Extent downward, `width` by default [length].
-    contact_radius, contact_radius_y : float, optional
-        Distances along x, and along y in three dimensions, up to which `contact_size` holds; width/10 and `contact_radius`
-        by default. Below the surface `contact_size` holds to half of this distance. Choose them a little wider than the
-        contact [length].
+        Extent downward; by default `width` [length].
+    contact_radius : float, optional
+        Distance from the origin along x up to which edges have the length `contact_size`; by default width/10 [length].
+        Below the surface this fine region is half as deep. Choose the distance slightly larger than the contact radius.
+    contact_radius_y : float, optional
+        The corresponding distance along y in 3D; by default `contact_radius` [length].
     contact_size : float, optional
-        Edges at the contact, a tenth of the smaller radius by default [length].
+        Length of the edges at the contact; by default a tenth of the smaller of the two radii [length].
     size : float, optional
-        Longest edges far from the contact, width/4 by default [length].
+        Largest length of the edges far from the contact; by default width/4 [length].
     growth : float
-        Increase of the edge length per unit of distance outside this region, until it reaches `size`.
+        Increase of the edge length per unit distance outside the fine region, until `size` is reached [-].
 
     Returns
     -------
@@ -93,7 +94,7 @@ def graded_block(
 def _named(mesh: Mesh, lines: list[Array], radii: list[float]) -> Mesh:
     """Return the mesh with the groups of `graded_block`."""
     mesh = renamed(mesh, dict.fromkeys(_CORNERS) | (_NAMES_2D if mesh.dim == 2 else _NAMES_3D))
-    # Up to the first grid line at or beyond the radius.
+    # The fine region ends at the first grid line at or beyond the radius.
     edges = np.array(
         [places[places >= min(radius, places[-1]) * (1 - 1e-9)][0] for places, radius in zip(lines, radii)]
     )
@@ -111,24 +112,26 @@ def punched_block(
     edge_size: float | None = None,
     growth: float = 1.3,
 ) -> Mesh:
-    """Block under a flat punch, the half x >= 0, its top at y = 0, finest at the punch's edge.
+    """Block under a flat punch, the half x >= 0, with its top at y = 0 and the finest mesh at the edge of the punch.
 
-    A grid line passes through the edge. The body represents a half-plane or half-space: its finite size changes the
-    results by about `punch_radius` over `extent`, in plane problems by twice as much. Groups of cells: BLOCK, TOP,
-    PUNCHED (the top under the punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points: POLE (the origin) and EDGE.
+    A grid line passes through the edge of the punch. The block represents a half-plane or half-space. Its finite size
+    changes the results by a relative amount of about `punch_radius` / `extent`, in plane problems by twice this amount.
+    Groups of cells: BLOCK, TOP, PUNCHED (the top under the punch), BOTTOM, SIDE, SYMMETRY_X (x = 0). Groups of points:
+    POLE (the origin) and EDGE (the edge of the punch).
 
     Parameters
     ----------
     element : {"quad4", "quad8", "quad9"}
-        Element of the solid.
+        Element type of the solid cells.
     punch_radius : float
-        Radius of the punch, half its width in plane problems [length].
+        Radius of the punch, in plane problems half its width [length].
     extent : float
         Width and depth of the block [length].
     edge_size : float, optional
-        Edges at the punch's edge and below the whole top, punch_radius/200 by default [length].
+        Length of the edges at the edge of the punch and, normal to the surface, below the entire top; by default
+        punch_radius/200 [length].
     growth : float
-        Ratio of the lengths of adjacent edges away from the punch's edge, more than 1.
+        Ratio of the lengths of adjacent edges with increasing distance from the edge of the punch, greater than 1.
 
     Returns
     -------
@@ -165,28 +168,29 @@ def crowned_blocks(
     contact_size: float = 0.05,
     growth: float = 1.25,
 ) -> Mesh:
-    """Two blocks above each other whose facing sides are parabolas of radius R that touch at the origin.
+    """Two blocks, one above the other, whose facing sides are parabolas that touch at the origin.
 
-    Both represent half-planes. They include x < 0, for tangential loads, and mirror each other, so that nodes match
-    and equal materials do not couple pressure and shear. Groups of cells: LOWER, UPPER, CONT_LOWER, CONT_UPPER (their
-    facing sides around the origin), FAR_LOWER, FAR_UPPER (the flat sides far from it). Groups of points: POLE_LOWER,
-    POLE_UPPER (two points at the origin).
+    The blocks represent half-planes. They are modelled on both sides of x = 0, which tangential loads require. The upper
+    block is the mirror image of the lower one, so that their nodes coincide and, with equal materials, pressure and shear
+    are not coupled. Groups of cells: LOWER, UPPER, CONT_LOWER, CONT_UPPER (the facing sides around the origin), FAR_LOWER,
+    FAR_UPPER (the flat bottom of the lower and the flat top of the upper block). Groups of points: POLE_LOWER, POLE_UPPER
+    (two points at the origin).
 
     Parameters
     ----------
     element : {"quad4", "quad8", "quad9"}
-        Element of both solids.
+        Element type of both solids.
     R : float
-        Radius at the origin of each facing side [length].
+        Radius of curvature of each facing side at the origin [length].
     extent : float
         Height and half the width of each block [length].
     contact_radius : float
-        Distance from the origin up to which edges have their smallest length. Choose it a little wider than the contact
-        [length].
+        Distance from the origin up to which edges have the length `contact_size` [length]. Choose it slightly larger than
+        the contact.
     contact_size : float
-        Smallest length of edges [length].
+        Smallest length of the edges [length].
     growth : float
-        Ratio of the lengths of adjacent edges outside `contact_radius`, more than 1.
+        Ratio of the lengths of adjacent edges outside `contact_radius`, greater than 1.
 
     Returns
     -------
@@ -207,7 +211,7 @@ def crowned_blocks(
     right, down = _lines(size, fine, width, rate), _lines(size, size, width, rate)
     lattice = on_lines(element, [np.concatenate([-right[:0:-1], right]), -down[::-1]], "LOWER")
     across, up = lattice.points.T
-    crown = across**2 / (2 * R) * (1 + up / width)  # decays downward
+    crown = across**2 / (2 * R) * (1 + up / width)  # the displacement of the nodes decays downward
     lower = renamed(lattice.replace(points=np.column_stack([across, up - crown])), _NAMES_CROWNED.get)
     lower = with_cells_inside(lower, "CONT_LOWER", "CONT_LOWER", lambda points: np.abs(points[:, 0]) <= 1.2 * fine)
     lower = with_points_at(lower, {"POLE_LOWER": (0.0, 0.0)})
@@ -216,6 +220,6 @@ def crowned_blocks(
 
 
 def _lines(size: float, fine: float, length: float, growth: float) -> Array:
-    """Return positions (n + 1,) [length] from 0 to `length`: about `size` apart up to `fine`, then growing."""
+    """Return positions (n + 1,) [length] from 0 to `length` with a spacing of about `size` up to `fine`, growing beyond."""
     equal = np.linspace(0.0, fine, segments(round(fine / size)) + 1)
     return np.concatenate([equal, fine + growing(length - fine, size * growth, growth)[1:]])

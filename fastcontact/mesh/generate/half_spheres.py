@@ -1,4 +1,4 @@
-"""Two half-spheres as quarter discs in the (r, y) plane: the meshes of the Hertz contact study."""
+"""Meshes of two half-spheres, which are quarter discs in the (r, y) plane, such as those of the test case FORMA04."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.mesh.generate.quadratic import Circle, in_element
 from fastcontact.mesh.generate.transform import merge_points, mirrored, union, with_points_at
 from fastcontact.mesh.mesh import Mesh
 
-# Names of the upper body's groups by those of the lower one; A1A2 is the axis of both.
+# Group names of the upper body by those of the lower body; A1A2 is the axis of both.
 _UPPER = {"SPHBAS": "SPHHAU", "A1B1": "A2B2", "CONT1": "CONT2", "D1B1": "D2B2"}
 _UPPER |= {f"{letter}1": f"{letter}2" for letter in "ABCD"} | {f"{letter}1": letter for letter in "MNP"}
 
@@ -37,37 +37,38 @@ def half_spheres(
 ) -> Mesh:
     """Two half-spheres that touch at the origin, each a quarter disc in the (r, y) plane.
 
-    The lower body has its centre at A1 = (0, -R), the end of its flat edge at B1 = (R, -R), its pole at C1 = (0, 0)
-    and D1 half-way along the arc; the upper body is its mirror image in y = 0. The poles C1 and C2 are two points at
-    the same position. Equal arguments give equal meshes.
+    The lower body has its centre at A1 = (0, -R), the end of its flat side at B1 = (R, -R), its pole at C1 = (0, 0), and
+    D1 at the middle of its arc. The upper body is the mirror image in y = 0. The poles C1 and C2 are two points at the
+    same position. The generator is deterministic.
 
-    Groups of cells: SPHBAS, SPHHAU (lower, upper body), A1A2 (axis of both), A1B1, A2B2 (flat edges), CONT1, CONT2
-    (arcs C1-D1, C2-D2), D1B1, D2B2 (the rest of the arcs). Groups of points: A1 B1 C1 D1 A2 B2 C2 D2; with
-    quadrangles also the block corners M N P (upper body, at (0, R/2), (R/2, R/2), (R/2, R)) and M1 N1 P1 (lower).
+    Groups of cells: SPHBAS (lower body), SPHHAU (upper body), A1A2 (axis of both bodies), A1B1, A2B2 (flat sides), CONT1,
+    CONT2 (arcs C1-D1 and C2-D2), D1B1, D2B2 (the rest of the arcs). Groups of points: A1, B1, C1, D1, A2, B2, C2, D2; with
+    quadrangles also the corners of structured blocks, M = (0, R/2), N = (R/2, R/2) and P = (R/2, R) in the upper body, and
+    M1, N1 and P1 in the lower body.
 
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Triangles form an unstructured mesh, quadrangles three structured blocks per body. The mid-side nodes of
-        quadratic elements lie on the circle.
+        Element type of both bodies. Triangles form an unstructured mesh, quadrangles three structured blocks in each body.
+        The mid-side nodes of quadratic elements lie on the circle.
     R : float
         Radius [length].
-    size, contact_size : float, optional
-        Triangles only: longest edge, R/25 by default, and longest edge at the pole, from which it grows linearly to `size`
-        at the distance R; by default the mesh is uniform [length].
+    size : float, optional
+        Only for triangles: largest length of the edges; by default R/25 [length].
+    contact_size : float, optional
+        Only for triangles: length of the edges at the pole, which increases linearly to `size` at the distance R; by
+        default `size`, so that the mesh is uniform [length].
     contact_radius : float, optional
-        Triangles only: distance from the pole up to which `contact_size` holds, 0 by default [length].
+        Only for triangles: distance from the pole up to which edges have the length `contact_size`; by default 0 [length].
     arc_sizes : (float, float), optional
-        Quadrangles only: lengths of the segments of the arc at its pole C and at its end D, in geometric progression
-        between; R/250 and R/25 by default. Both are reduced by a common factor so that the number of segments is an
-        integer [length].
+        Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between these
+        points; by default R/250 and R/25 [length]. Both are reduced by a common factor, so that their number is an integer.
     segments : int, optional
-        Quadrangles only: number of segments on the sides of the square A-M, on D-B and on the radial lines M-C, N-D and
-        P-B; 15 by default.
+        Only for quadrangles: number of segments on the side A-M of the inner square, on the arc D-B, and on the radial
+        lines M-C, N-D and P-B; by default 15.
     radial_sizes : (float, float), optional
-        Quadrangles only: lengths of the segments of the radial line M-C at its ends C (the contact) and M, in geometric
-        progression between. By default there are `segments` of them, and the lengths at C and M have the same ratio as
-        those of the arc [length].
+        Only for quadrangles: lengths of the segments of the radial line M-C at C and at M, in geometric progression
+        between these points [length]. By default there are `segments` segments with the ratio of lengths of the arc.
 
     Returns
     -------
@@ -99,12 +100,12 @@ def quarter_disc(
     segments: int | None = None,
     radial_sizes: tuple[float, float] | None = None,
 ) -> Mesh:
-    """One of the two bodies of `half_spheres`, with its groups.
+    """One of the two bodies of `half_spheres`, with the groups of this body.
 
     Parameters
     ----------
     element, R, size, contact_size, contact_radius, arc_sizes, segments, radial_sizes
-        As for `half_spheres`.
+        Described for `half_spheres`.
     body : {"lower", "upper"}
         The body to generate.
 
@@ -134,7 +135,7 @@ def quarter_disc(
 
 
 def _corners(R: float) -> dict[str, tuple[float, float]]:
-    """Return the corners of the lower body; D by the same formula as the nodes of the arc."""
+    """Return the corners of the lower body by name; D follows from the formula of the nodes of the arc."""
     x, y = arc((0.0, -R), R, np.array([0.25 * math.pi]))[0]
     return {"A1": (0.0, -R), "B1": (R, -R), "C1": (0.0, 0.0), "D1": (float(x), float(y))}
 
@@ -150,7 +151,7 @@ def _spacing(R: float, size: float | None, contact_size: float | None, contact_r
 
 
 def _of_triangles(R: float, spacing: Spacing) -> Mesh:
-    """Return the lower body in tri3."""
+    """Return the lower body meshed with tri3 cells."""
     corners, right, half = _corners(R), 0.5 * math.pi, 0.25 * math.pi
     sides = [
         ("A1B1", divided(lambda s: straight(corners["A1"], corners["B1"], s), R, spacing)),
@@ -164,7 +165,7 @@ def _of_triangles(R: float, spacing: Spacing) -> Mesh:
 def _of_quadrangles(
     R: float, arc_sizes: tuple[float, float] | None, segments: int | None, radial_sizes: tuple[float, float] | None
 ) -> Mesh:
-    """Return the lower body in quad4: the square A-P-N-M and the two blocks between it and the arc."""
+    """Return the lower body meshed with quad4 cells: the square A-P-N-M, and two blocks between the square and the arc."""
     n = 15 if segments is None else count("segments", segments)
     length = 0.25 * math.pi * R
     near, far = (
@@ -182,7 +183,7 @@ def _of_quadrangles(
 
 
 def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
-    """Return the lower body for relative abscissae along C-D, along M-C and along the equally divided sides."""
+    """Return the lower body from the relative abscissae of the nodes on C-D, on M-C and on the equally divided sides."""
     places = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
     def line(start: str, end: str, relative: Array) -> Array:

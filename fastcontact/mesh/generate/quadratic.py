@@ -1,4 +1,4 @@
-"""Conversion of linear to quadratic meshes, with mid nodes on the true curves."""
+"""Convert linear to quadratic meshes, with mid-side nodes on the exact curves of the boundary."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import outer_facets
 
-# Nodes at a smaller distance from a curve than this, relative to their edge, lie on it.
+# Nodes whose distance from a curve is smaller than this fraction of the edge length are regarded as nodes on the curve.
 ON_CURVE = 1e-6
 _WITH_CENTRE = {"quad8": "quad9"}
 
 
 class Curve(Protocol):
-    """The true shape of a group of facets."""
+    """The exact shape of a group of facets."""
 
     @property
     def group(self) -> str | None:
-        """Group of facets on the curve, or None for all outer facets."""
+        """Name of the group of facets on the curve; None stands for all outer facets whose ends lie on it."""
         ...
 
     def project(self, points: Array) -> Array:
@@ -38,16 +38,16 @@ class Curve(Protocol):
 @typed(MeshError)
 @dataclass(frozen=True)
 class Circle:
-    """A circle in the plane.
+    """A circle on which facets of the boundary of a 2D mesh lie.
 
     Parameters
     ----------
     centre : (float, float)
-        Centre [length].
+        Coordinates of the centre [length].
     radius : float
-        Greater than 0 [length].
+        Radius, greater than 0 [length].
     group : str, optional
-        Group of facets that lie on it; by default all outer facets whose ends lie on it.
+        Group of facets on the circle; by default all outer facets whose ends lie on the circle.
 
     Examples
     --------
@@ -72,25 +72,26 @@ class Circle:
         """Return the points (n, 2) [length] of the circle nearest to `points` (n, 2) [length]."""
         arms = points - np.asarray(self.centre)
         length = np.hypot(arms[:, 0], arms[:, 1])
-        # The centre itself has no nearest point: it is not moved.
+        # The centre has no unique nearest point and is not moved.
         return np.asarray(self.centre) + arms * (self.radius / np.where(length > 0.0, length, 1.0))[:, None]
 
 
 @typed(MeshError)
 def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool = False) -> Mesh:
-    """Return the mesh with a mid node on every edge: tri3 to tri6, quad4 to quad8 or quad9, hex8 to hex20 ...
+    """Return the quadratic mesh, with a mid-side node on every edge, of a linear mesh.
 
-    A mid node lies half-way between the ends of its edge, or on the curve if the edge belongs to a facet of the curve's
-    group and both ends lie on the curve. Points keep their numbers; mid nodes follow, then centre nodes.
+    For example tri3 cells become tri6, quad4 quad8 or quad9, and hex8 hex20 cells. A mid-side node lies half-way between the
+    ends of its edge. If the edge belongs to a facet in the group of a curve and both ends lie on the curve, the mid-side
+    node is placed on the curve. Existing points keep their numbers, followed by mid-side nodes and centre nodes.
 
     Parameters
     ----------
     mesh : Mesh
-        Cells of linear elements.
+        Mesh with cells of linear elements.
     curves : iterable of Circle
-        Exact shapes of the boundary, or other objects with `group` and `project`.
+        Exact shapes of the boundary, or other objects with the attribute `group` and the method `project` of `Circle`.
     centre_nodes : bool
-        Whether quadrangles get a centre node (quad9); 2D only.
+        Whether quadrangles get a centre node (quad9); only for 2D meshes.
 
     Returns
     -------
@@ -99,12 +100,12 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
     Raises
     ------
     MeshError
-        If a cell is quadratic already, `centre_nodes` is given for a 3D mesh, the group of a curve has no edge on the
+        If a cell is already quadratic, `centre_nodes` is given for a 3D mesh, the group of a curve has no edge on the
         curve, or a curved side makes the Jacobian of a cell nonpositive at a quadrature point.
 
     Examples
     --------
-    Mid-side nodes on the circles that the sides of two half-spheres lie on, as mesh B of FORMA04 has them:
+    Place mid-side nodes on the circles on which the sides of two half-spheres lie, as in mesh B of FORMA04:
 
     >>> from fastcontact import generate
     >>> mesh = generate.half_spheres("tri3", size=10.0)
@@ -133,7 +134,7 @@ def to_quadratic(mesh: Mesh, curves: Iterable[Curve] = (), *, centre_nodes: bool
 
 
 def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
-    """Return a linear mesh, or the quadratic mesh on the curves if `element` is quadratic; its cells are checked."""
+    """Return the mesh, converted with `to_quadratic` if `element` is quadratic, after a check of its cells."""
     if elements.get(element).order == 1:
         check_cells(mesh)
         return mesh
@@ -141,7 +142,7 @@ def in_element(mesh: Mesh, element: str, curves: Iterable[Curve] = ()) -> Mesh:
 
 
 def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
-    """Return the quadratic element of each element of the mesh."""
+    """Return the quadratic element type for each element type of the mesh."""
     if centre_nodes and mesh.dim != 2:
         raise MeshError("centre_nodes is for 2D meshes: leave it out, and cells get mid nodes on their edges only")
     names = {}
@@ -154,7 +155,7 @@ def _quadratic_names(mesh: Mesh, centre_nodes: bool) -> dict[str, str]:
 
 
 def edge_keys(ends: AnyArray) -> AnyArray:
-    """Return a key for each edge (...), independent of its direction, from its `ends` (..., 2) of int."""
+    """Return a key (...) of int for each edge, independent of its direction, from the points `ends` (..., 2) of int."""
     return (ends.min(axis=-1).astype(np.int64) << 32) | ends.max(axis=-1)
 
 
@@ -169,13 +170,13 @@ def edges_of(name: str, cells: AnyArray) -> AnyArray:
 
 
 def _edges(cells: Mapping[str, AnyArray]) -> AnyArray:
-    """Return the sorted keys of the edges of all cells, each once."""
+    """Return the sorted, unique keys of the edges of all cells."""
     keys = [edges_of(name, block).ravel() for name, block in cells.items()]
     return np.unique(np.concatenate(keys)) if keys else np.empty(0, np.int64)
 
 
 def edges_on(mesh: Mesh, curve: Curve) -> AnyArray:
-    """Return the keys (n,) of the edges of the curve's facets that have both ends on it; MeshError if there is none."""
+    """Return the keys (n,) of the edges in the group of a curve whose ends both lie on it; MeshError if there is none."""
     edges = _edges(facets_of(mesh, curve))
     on = all_on(mesh, curve, ends_of(edges))
     if not on.any():
@@ -185,12 +186,15 @@ def edges_on(mesh: Mesh, curve: Curve) -> AnyArray:
 
 
 def facets_of(mesh: Mesh, curve: Curve) -> Mapping[str, AnyArray]:
-    """Return the facets (n, n_nodes) of the curve's group, by facet element."""
+    """Return the facets (n, n_nodes) in the group of a curve, by element type."""
     return outer_facets(mesh) if curve.group is None else mesh.cells_of(curve.group, dim=mesh.dim - 1)
 
 
 def all_on(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
-    """Return whether all nodes of each facet or edge (n,) lie on the curve; `nodes` (n, n_nodes), its ends first."""
+    """Return for each facet or edge (n,) whether all its nodes lie on a curve.
+
+    `nodes` (n, n_nodes) contains the nodes of each facet or edge, its two ends first.
+    """
     places = mesh.points[nodes]
     length = np.linalg.norm(places[:, 1] - places[:, 0], axis=1)
     flat = places.reshape(-1, mesh.dim)
@@ -199,8 +203,8 @@ def all_on(mesh: Mesh, curve: Curve, nodes: AnyArray) -> Mask:
 
 
 def centres(corners: Array, middles: Array) -> Array:
-    """Return the centres (n, dim) [length] of curved quadrangles, by the eight-node shape functions.
+    """Return the centres (n, dim) [length] of curved quadrangles, interpolated by the eight-node shape functions.
 
-    `corners` (n, 4, dim) [length] are their corners, `middles` (n, 4, dim) [length] the middles of their sides.
+    `corners` (n, 4, dim) [length] contains the corners and `middles` (n, 4, dim) [length] the mid-side nodes.
     """
     return 0.5 * middles.sum(axis=1) - 0.25 * corners.sum(axis=1)

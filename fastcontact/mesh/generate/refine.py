@@ -1,4 +1,4 @@
-"""Uniform refinement of a 2D mesh: every cell into two or four of the same kind, boundaries kept on their curves."""
+"""Uniform refinement of a 2D mesh: each cell is divided into two or four cells, and new nodes are placed on curves."""
 
 from __future__ import annotations
 
@@ -18,18 +18,20 @@ from fastcontact.mesh.generate.quadratic import ON_CURVE, Circle, Curve, all_on,
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
 
-# Quadratic elements whose nodes are the corners of the children that `RED` names, each child turned like its parent.
+# Quadratic elements whose nodes are the corners of the children in `RED`; each child has the orientation of its parent.
 _LATTICE = {"line2": "line3", "tri3": "tri6", "quad4": "quad9"}
-# A line that turns by more than this from one node to the next does not count as a circle.
+# A polygon that turns by more than this angle at a node is not regarded as a circle [radian].
 _TURN = np.pi / 5
 
 
 @dataclass(frozen=True, eq=False)
 class _Pattern:
-    """Division of the cells of one element: the points of the children, the parent's nodes first.
+    """The division of a cell of one element type, described by the points of its children.
 
-    `shape` (m, n_nodes) are the shape functions of the parent at these points, `children` (n_children, n_nodes) their
-    numbers. A new point lies on the edge `on_edge` (m,) of the parent, -1 for others, `along` (m,) quarters from its start.
+    The first of the m points are the nodes of the parent. `shape` (m, n_nodes) [-] contains the shape functions of the
+    parent at the points, and `children` (n_children, n_nodes) the points of each child. `on_edge` (m,) is the number of the
+    edge of the parent on which a new point lies, -1 for other points, and `along` (m,) its distance from the start of this
+    edge in quarters of the length.
     """
 
     shape: Array
@@ -48,7 +50,7 @@ def _pattern(name: str) -> _Pattern:
     for corners in elements.get(_LATTICE[element.linear]).nodes[RED[element.linear]]:
         places = element.corner_shape(element.nodes) @ corners
         child = []
-        for fraction_of_edge in np.round(places * 8.0).tolist():  # eighths are exact
+        for fraction_of_edge in np.round(places * 8.0).tolist():  # multiples of 1/8 are exact
             node = tuple(x / 8.0 for x in fraction_of_edge)
             if node not in points:
                 points.append(node)
@@ -67,19 +69,20 @@ def _pattern(name: str) -> _Pattern:
 
 @typed(MeshError)
 def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
-    """Return the mesh with every line divided in two and every triangle and quadrangle in four.
+    """Return the mesh with every line divided in two, and every triangle and quadrangle in four.
 
-    New points are interpolated by the shape functions of the parent cell, or lie on a curve if they belong to a facet
-    of the curve's group with all nodes on the curve. Points keep their numbers. Cell groups contain the children of
-    their cells; a new point belongs to every point group that holds all nodes of its edge (or, inside a cell, of the
-    cell).
+    New points are interpolated by the shape functions of the parent cell. If all nodes of a facet in the group of a curve
+    lie on the curve, the new points of the facet are placed on the curve. Existing points keep their numbers. A cell group
+    contains the children of its cells. A new point on an edge belongs to every point group that contains all nodes of the
+    edge, a new point inside a cell to every point group that contains all nodes of the cell.
 
     Parameters
     ----------
     mesh : Mesh
-        Two-dimensional; tri3, tri6, quad4, quad8, quad9, line2, line3.
+        Two-dimensional mesh with cells of the types tri3, tri6, quad4, quad8, quad9, line2 and line3.
     curves : iterable of Circle
-        Exact shapes of the boundary, or other objects with `group` and `project`; see also `circles`.
+        Exact shapes of the boundary, or other objects with the attribute `group` and the method `project` of `Circle`; see
+        also `circles`.
 
     Returns
     -------
@@ -88,8 +91,8 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
     Raises
     ------
     MeshError
-        If a cell is of another type, the group of a curve has no facet on the curve, or a curved side makes a child
-        invalid.
+        If a cell is of another type, the group of a curve has no facet on the curve, or a child with a curved side has a
+        nonpositive Jacobian.
 
     Examples
     --------
@@ -112,11 +115,11 @@ def refined(mesh: Mesh, curves: Iterable[Curve] = ()) -> Mesh:
 
 
 class _NewPoints(NamedTuple):
-    """The new points of a refined mesh, in the order of their keys: those on edges before others.
+    """The new points of a refined mesh, in the order of their keys; points on edges precede points inside cells.
 
-    `keys` (n,) are equal for all cells that share a point; `sources` are the name of an element, the number of a point of its
-    lattice, rows of cells, and the numbers of their points there; `lattices` (n_cells, n_lattice) are the points of
-    every cell by element type.
+    `keys` (n,) identifies the points: cells that share a point have the same key for it. Each item of `sources` consists of
+    an element type, the number of a point in its `_Pattern`, rows of cells, and the numbers of the new points in these
+    cells. `lattices` (n_cells, n_lattice) contains all points of every cell, by element type.
     """
 
     keys: AnyArray
@@ -151,20 +154,20 @@ def _new_points(mesh: Mesh) -> _NewPoints:
 
 
 def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
-    """Return a key for a point on the edge from a to b, independent of its direction."""
+    """Return a key of the point at `quarters` of the edge from a to b, independent of the direction of the edge."""
     from_least = np.where(a < b, quarters, 4 - quarters)
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
 
 
 def _edge_nodes(name: str) -> list[list[int]]:
-    """Return the local nodes of each edge, corners first."""
+    """Return the local node numbers of each edge of an element, the two corners first."""
     element = elements.get(name)
     middle = [[element.n_corners + k] if element.order == 2 else [] for k in range(len(element.edges))]
     return [[*edge, *middle[k]] for k, edge in enumerate(element.edges)]
 
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
-    """Return the facets of the curve's group, block by block, whose nodes all lie on the curve."""
+    """Return the facets in the group of a curve whose nodes all lie on the curve, as one array for each element type."""
     facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
     if not sum(map(len, facets)):
         where = "outer facet" if curve.group is None else f"facet of group '{curve.group}'"
@@ -173,14 +176,14 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
 
 
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
-    """Return the numbers of the new points on the facets that lie on the curve."""
+    """Return the numbers of the new points of the facets that lie on a curve."""
     ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
     wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
     return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
 
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
-    """Return the children of each group's cells, which are consecutive for each cell."""
+    """Return the cell groups of the refined mesh; the children of a cell have consecutive numbers."""
     pieces, start = {}, 0
     for name, first in mesh.offsets.items():
         pieces[name] = (first, start, len(_pattern(name).children))
@@ -209,9 +212,9 @@ def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
 
 @typed(MeshError)
 def linearised(mesh: Mesh) -> Mesh:
-    """Return the linear mesh on the corners: tri6 to tri3, quad8 and quad9 to quad4, line3 to line2.
+    """Return the mesh with linear instead of quadratic cells: tri3 for tri6, quad4 for quad8 and quad9, line2 for line3.
 
-    Points that no cell uses any more are removed; the others keep their order.
+    Points that no cell uses any more are removed; the other points keep their order.
 
     Examples
     --------
@@ -243,10 +246,10 @@ def linearised(mesh: Mesh) -> Mesh:
 
 @typed(MeshError)
 def circles(mesh: Mesh) -> list[Circle]:
-    """Return the circles on which groups of outer facets lie, one per group, for use in `refined`.
+    """Return the circles on which groups of outer facets lie, at most one for each group, for use in `refined`.
 
-    A circle is fitted to the nodes by least squares. It is accepted if more than three nodes lie on it up to round-off
-    and the line has no sharp corners, since the corners of a square lie on a circle, too.
+    A circle is fitted to the nodes of a group by least squares. It is accepted if more than three nodes lie on it up to
+    round-off and the facets do not meet at sharp corners, because the corners of a square also lie on a circle.
 
     Examples
     --------

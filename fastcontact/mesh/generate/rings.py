@@ -1,4 +1,4 @@
-"""Two concentric rings, one in the other: the press fit of a bush in a hub."""
+"""Mesh of two concentric rings, for example for the press fit of a bush in a hub."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ def rings(
     divisions_inner: tuple[int, int] = (6, 16),
     divisions_outer: tuple[int, int] = (8, 16),
 ) -> Mesh:
-    """Quarter of two rings that touch at the interface radius, centred at the origin, x >= 0 and y >= 0.
+    """Quarter of two concentric rings, the part x >= 0, y >= 0; the rings touch at the interface radius.
 
-    The rings fit without clearance: for an interference, give their contact a negative ``clearance``. Groups of cells:
-    INNER, OUTER, CONT_INNER, CONT_OUTER (both sides of the interface), BORE, RIM, SYMMETRY_X (x = 0 of both),
-    SYMMETRY_Y (y = 0 of both).
+    The rings fit without clearance. To model an interference, give their contact pair a negative ``clearance``. Groups of
+    cells: INNER, OUTER, CONT_INNER, CONT_OUTER (the two sides of the interface), BORE (inner side of the inner ring), RIM
+    (outer side of the outer ring), SYMMETRY_X (x = 0 of both rings), SYMMETRY_Y (y = 0 of both rings).
 
     Parameters
     ----------
     element : {"tri3", "tri6", "quad4", "quad8", "quad9"}
-        Element of both solids; mid nodes of curved sides lie on their circles.
+        Element type of both solids; mid-side nodes of curved sides lie on their circles.
     inner_radius, interface_radius, outer_radius : float
-        Increasing [length].
+        Radii of the bore, of the interface and of the rim, in ascending order [length].
     divisions_inner, divisions_outer : (int, int)
-        Cells along the radius and around the quarter; those around may differ.
+        Numbers of cells of each ring in the radial and in the circumferential direction; the latter may differ.
 
     Returns
     -------
@@ -61,7 +61,7 @@ def rings(
 
 
 def _ring(element: str, radii: tuple[float, float], divisions: list[int], name: str, sides: tuple[str, str]) -> Mesh:
-    """Return a quarter of one ring; its sides are those at the smaller and at the larger radius."""
+    """Return a quarter of one ring; `sides` are the names of the groups at the smaller and at the larger radius."""
     n, m = divisions
     r, angle = np.linspace(*radii, n + 1), np.linspace(0.0, math.pi / 2, m + 1)
     cosine, sine = np.cos(angle), np.sin(angle)

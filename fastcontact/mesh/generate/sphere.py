@@ -1,4 +1,4 @@
-"""A sphere on a block in three dimensions, a quarter of both: mapped boxes."""
+"""Mesh of a quarter of a sphere on a quarter of a block in 3D, composed of mapped boxes."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ from fastcontact.mesh.quality import check_cells
 
 Map = Callable[[Array, Array, Array], Array]
 
-# Wedges of different blocks would not match, and the apex of a pyramid in a thin curved cell would lie outside it.
+# Wedges are excluded because those of different blocks are not compatible, and pyramids because the apex of a pyramid would
+# lie outside a thin curved cell.
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
 
-# Position of the middle of the inner block's faces over the radius, and their bulge between cube (0) and ball (1).
+# Distance of the face centres of the inner block from the centre of the sphere, relative to the radius, and curvature of
+# these faces between plane (0) and spherical (1).
 INNER, BULGE = 0.45, 0.5
 
 
@@ -39,30 +41,30 @@ def sphere_on_block(
 ) -> Mesh:
     """Lower half of a sphere on a block, the quarter x >= 0, z >= 0 of both.
 
-    The sphere touches the block at the origin; its centre is (0, R, 0). The meshes do not match; both are finest at
-    the contact. Groups of cells: SPHERE, BLOCK, SYMMETRY_X, SYMMETRY_Z (x = 0 and z = 0 of both), SPHERE_TOP (y = R),
-    CONT_SPHERE (around the pole, up to 45 degrees along x and along z), SPHERE_SIDE (the rest of the sphere),
-    CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of points: POLE_SPHERE, POLE_BLOCK (two points at
-    the origin), CENTRE (of the sphere).
+    The sphere touches the block at the origin; its centre is (0, R, 0). The meshes of the two bodies are finest at the
+    contact and have different nodes there. Groups of cells: SPHERE, BLOCK, SYMMETRY_X and SYMMETRY_Z (x = 0 and z = 0 of
+    both bodies), SPHERE_TOP (y = R), CONT_SPHERE (the surface around the pole, up to 45 degrees along x and along z),
+    SPHERE_SIDE (the rest of the spherical surface), CONT_BLOCK (top of the block), BLOCK_SIDE, BLOCK_BOTTOM. Groups of
+    points: POLE_SPHERE, POLE_BLOCK (two points at the origin), CENTRE (of the sphere).
 
     Parameters
     ----------
     element : {"hex8", "hex20", "hex27", "tet4", "tet10"}
-        Element of both solids. All nodes of the surface lie on the sphere.
+        Element type of both solids. All surface nodes of the sphere, including mid-side nodes, lie on it.
     R : float
         Radius of the sphere [length].
     block_size : (float, float), optional
-        Side of the quarter of the block along x and z, and its height along y, R each by default [length].
+        Extent of the quarter of the block along x and z, and its height along y; by default both are R [length].
     size : float, optional
-        Longest edges far from the contact, R/4 by default [length].
+        Largest length of the edges far from the contact; by default R/4 [length].
     contact_size : float, optional
-        Edges at the contact, R/50 by default [length].
+        Length of the edges at the contact; by default R/50 [length].
     contact_radius : float, optional
-        Distance from the pole up to which `contact_size` holds, R/10 by default. Below the surfaces it holds to half of
-        this distance [length].
+        Distance from the pole up to which edges have the length `contact_size`; by default R/10 [length]. Below the
+        surfaces this fine region is half as deep.
     growth : float
-        Increase of the edge length per unit of distance outside this region, until it reaches `size`. It limits the
-        accuracy that a smaller `contact_size` can reach.
+        Increase of the edge length per unit distance outside this region, until `size` is reached [-]. It limits the
+        accuracy that a smaller `contact_size` alone can achieve.
 
     Returns
     -------
@@ -100,14 +102,14 @@ def sphere_octant(
     contact_radius: float | None = None,
     growth: float = 0.4,
 ) -> Mesh:
-    """Lower half of a sphere, the quarter x >= 0, z >= 0: the upper body of `sphere_on_block`, with its groups.
+    """Lower half of a sphere, the quarter x >= 0, z >= 0, with the groups that this body has in `sphere_on_block`.
 
-    The mesh has a rounded cube at the centre, and three blocks between it and the surface.
+    The mesh consists of a rounded cube at the centre, and of three blocks between the cube and the spherical surface.
 
     Parameters
     ----------
     element, R, size, contact_size, contact_radius, growth
-        As for `sphere_on_block`.
+        Described for `sphere_on_block`.
 
     Returns
     -------
@@ -128,7 +130,7 @@ def sphere_octant(
     upward = np.linspace(0.0, eighth, count("segments", segments_for(R * eighth, spacing.far)) + 1)
 
     def ball(outside: int) -> Map:
-        """Return the map of the inner block (outside = -1), or of the block beyond its face in one of the directions."""
+        """Return the map of the inner block for ``outside = -1``, otherwise of the block at its face number `outside`."""
 
         def place(*parameters: Array) -> Array:
             coordinates = np.column_stack(parameters)
@@ -160,7 +162,7 @@ def sphere_octant(
 
 
 def _ball(cube: Array) -> Array:
-    """Map the cube [-1, 1]^3 (n, 3) smoothly to the unit ball, faces to the sphere (Nowell, 2005)."""
+    """Map points (n, 3) of the cube [-1, 1]^3 smoothly to the unit ball, and its faces to the sphere (Nowell, 2005)."""
     square = cube * cube
     next_, last = np.roll(square, -1, axis=1), np.roll(square, -2, axis=1)
     return cube * np.sqrt(1.0 - next_ / 2 - last / 2 + next_ * last / 3)
@@ -176,13 +178,13 @@ def _spacing(
 
 
 def _shallow(spacing: Spacing) -> Spacing:
-    """Return the spacing below the surface: that at the contact, with half the extent of the fine part."""
+    """Return the spacing normal to the surface, whose fine region has half the extent of the region along the surface."""
     shift = 0.5 * spacing.plateau
     return Spacing(spacing.near, spacing.far, plateau=spacing.plateau - shift, reach=spacing.reach - shift)
 
 
 def _mapped(element: str, grid: Sequence[Array], place: Map, solid: str, names: Mapping[str, str]) -> Mesh:
-    """Return a mapped box with the given grid lines; its groups and outer facets are those in `names`."""
+    """Return a box with the given grid lines, mapped by `place`, whose groups are those in `names`, renamed."""
     lattice = on_lines(element, grid, solid)
     sides = {side: lattice.cells_of(side) for side in lattice.cell_groups if side in names and side != solid}
     body = Mesh(place(*lattice.points.T), lattice.solids, {solid: lattice.cell_groups[solid]})

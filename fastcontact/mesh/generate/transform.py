@@ -1,4 +1,4 @@
-"""Operations on meshes: mirror, move, unite, merge points, rename groups, add reference points and groups by position."""
+"""Operations on meshes: mirror, transform, unite, merge points, rename groups, and add reference points and groups."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
     ----------
     mesh : Mesh
     names : mapping or callable
-        New name by old name. Names that a mapping lacks are kept; None removes the group. Groups that get the same
-        name are united.
+        New names by old names. Groups whose names a mapping does not contain keep them; the new name None removes the
+        group. Groups with the same new name are united.
 
     Returns
     -------
@@ -59,17 +59,17 @@ def renamed(mesh: Mesh, names: Names) -> Mesh:
 
 @typed(MeshError)
 def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None) -> Mesh:
-    """Return the mirror image; cells and facets keep their orientation.
+    """Return the mirror image of a mesh; the orientation of cells and facets remains positive.
 
     Parameters
     ----------
     mesh : Mesh
     axis : {"x", "y", "z"}
-        Coordinate that is reflected.
+        Axis normal to the mirror plane.
     at : float
-        Position of the mirror plane on that axis [length].
+        Coordinate of the mirror plane on this axis [length].
     rename : mapping or callable, optional
-        New names of groups, as in `renamed`.
+        New names of groups, as described for `renamed`.
 
     Returns
     -------
@@ -97,17 +97,17 @@ def mirrored(mesh: Mesh, axis: str, at: float = 0.0, rename: Names | None = None
 
 @typed(MeshError)
 def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float = 1.0, rotate: float = 0.0) -> Mesh:
-    """Return the mesh scaled about the origin, then rotated about it (2D only), then translated.
+    """Return the mesh scaled about the origin, then rotated about the origin (only in 2D), then translated.
 
     Parameters
     ----------
     mesh : Mesh
     translate : array_like (dim,), optional
-        Shift [length].
+        Translation vector; by default zero [length].
     scale : float
-        Factor, greater than 0.
+        Scale factor, greater than 0 [-].
     rotate : float
-        Angle, counter-clockwise [degrees].
+        Counter-clockwise angle of rotation [degrees].
 
     Returns
     -------
@@ -121,8 +121,8 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
     Examples
     --------
     >>> from fastcontact import generate
-    >>> turned = generate.transformed(generate.block(), translate=(1.0, 0.0), rotate=90.0)
-    >>> turned.points.min(axis=0).round(9).tolist()
+    >>> moved = generate.transformed(generate.block(), translate=(1.0, 0.0), rotate=90.0)
+    >>> moved.points.min(axis=0).round(12).tolist()
     [0.0, 0.0]
     """
     if not number("scale", scale) > 0.0:
@@ -143,16 +143,16 @@ def transformed(mesh: Mesh, *, translate: ArrayLike | None = None, scale: float 
 
 @typed(MeshError)
 def union(*meshes: Mesh) -> Mesh:
-    """Return the union of several meshes: no points are merged, and groups of the same name are united.
+    """Return the union of several meshes, in which no points are merged and groups of the same name are united.
 
     Raises
     ------
     MeshError
-        If there is no mesh or the dimensions differ.
+        If no mesh is given, or the dimensions of the meshes differ.
 
     Examples
     --------
-    Two bodies in one mesh, which share no points; their groups keep their names:
+    Two bodies in one mesh share no points, and their groups keep their names:
 
     >>> from fastcontact import generate
     >>> lower = generate.block(name="LOWER")
@@ -178,7 +178,7 @@ def union(*meshes: Mesh) -> Mesh:
 
 
 def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
-    """Return the concatenated arrays of the same name."""
+    """Return the groups of several meshes, with the arrays of groups of the same name concatenated."""
     groups_of_all: dict[str, list[AnyArray]] = {}
     for groups_of_mesh in groups_of_meshes:
         for name, values in groups_of_mesh.items():
@@ -187,7 +187,7 @@ def _joined(groups_of_meshes: Iterable[Groups]) -> Groups:
 
 
 def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
-    """Return the new number of each cell of `mesh`; advances `starts` past its cells."""
+    """Return the number of each cell of `mesh` in the united mesh, and add its cells to the counts in `starts`."""
     numbers = np.empty(mesh.n_cells, np.int64)
     for name, start in mesh.offsets.items():
         n = len(mesh.cells[name])
@@ -198,15 +198,16 @@ def _renumbering(mesh: Mesh, starts: dict[str, int]) -> AnyArray:
 
 @typed(MeshError)
 def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
-    """Return the mesh with points closer than `tolerance` merged into the first of them.
+    """Return the mesh in which points at a distance of at most `tolerance` are merged.
 
-    All close points are merged, also where two bodies only touch; chains of close points become one.
+    Points of different bodies that touch are merged as well. A chain of points, each close to the next, becomes a single
+    point at the position of the one with the lowest number.
 
     Parameters
     ----------
     mesh : Mesh
     tolerance : float
-        Largest distance of points to merge, at least 0 [length].
+        Largest distance of points that are merged, at least 0 [length].
 
     Returns
     -------
@@ -215,7 +216,7 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
     Raises
     ------
     MeshError
-        If two nodes of one cell would coincide, since the tolerance exceeds the length of an edge.
+        If two nodes of one cell would be merged, because the tolerance exceeds the length of an edge.
 
     Examples
     --------
@@ -249,15 +250,15 @@ def merge_points(mesh: Mesh, tolerance: float) -> Mesh:
 
 
 def with_points_at(mesh: Mesh, places: Mapping[str, Sequence[float]]) -> Mesh:
-    """Return the mesh with a point group for the point nearest to each place [length]."""
+    """Return the mesh with point groups of one point each, the point nearest to a position in `places` [length]."""
     nearest = {name: [int(((mesh.points - np.asarray(x)) ** 2).sum(axis=1).argmin())] for name, x in places.items()}
     return mesh.with_groups(points=nearest)
 
 
 def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array], Mask]) -> Mesh:
-    """Return the mesh with a cell group `name`: the cells of `group` whose nodes are all inside.
+    """Return the mesh with a new cell group called `name`, with the cells of `group` whose nodes all lie in a region.
 
-    `inside` (n,) maps points (n, dim) [length] to booleans.
+    The function `inside` (n,) maps positions (n, dim) [length] to booleans, which are True in the region.
     """
     near = inside(mesh.points)
     rows = mesh.split(mesh.cell_groups[group])
@@ -267,7 +268,7 @@ def with_cells_inside(mesh: Mesh, name: str, group: str, inside: Callable[[Array
 
 @typed(MeshError)
 def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
-    """Return the mesh with reference points, which `Model.add_coupling` relates to groups.
+    """Return the mesh with additional reference points, to which `Model.add_coupling` couples groups.
 
     Parameters
     ----------
@@ -278,13 +279,14 @@ def with_reference_points(mesh: Mesh, places: Mapping[str, ArrayLike]) -> Mesh:
     Returns
     -------
     Mesh
-        With groups of one point each: ``"<name>"``, and ``"<name> rotation"``, whose displacement is the rotation [radian],
-        in the plane its first component.
+        For each reference point the mesh has two groups with a single point each. The group ``"<name>"`` is the reference
+        point. The displacement of the point of ``"<name> rotation"`` is the rotation vector [radian]; in 2D its first
+        component is the angle.
 
     Raises
     ------
     MeshError
-        If a name exists already, or a position has the wrong dimension or is not finite.
+        If a group with one of these names exists, or a position has a wrong dimension or is not finite.
 
     Examples
     --------

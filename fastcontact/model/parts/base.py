@@ -1,4 +1,4 @@
-"""Base of all parts of a model: mesh, kinematics, lists of added items, and the materials of the solid cells."""
+"""Base class of a model: the mesh, the kinematics, the lists of added items, and the materials of the solid cells."""
 
 from __future__ import annotations
 
@@ -37,16 +37,31 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def displacement_name(kind: str, group: str) -> str:
-    """Return the name of a prescribed displacement, ``"x"``, ``"y"``, ``"z"`` or ``"normal"``; result files depend on it."""
+    """Return the name of a displacement component of kind ``"x"``, ``"y"``, ``"z"`` or ``"normal"`` prescribed on a group.
+
+    Result files identify prescribed displacements by this name, so its text must not change.
+    """
     return f"the displacement {kind} prescribed on '{group}'"
 
 
 @dataclass(frozen=True)
 class Support:
-    """A prescribed displacement component of all nodes of a group: `value` [length] times the ramp.
+    """A displacement component prescribed at all nodes of a group.
 
-    `value` is a number or a function of position, `ramp` its history or None. A `rotation` about an axis is added, with the
-    history of its angle.
+    Attributes
+    ----------
+    group : str
+        Name of the group.
+    component : int
+        Number of the component, from 0.
+    value : float or callable
+        Displacement at multiplier 1 [length], a number or a function of position.
+    ramp : Table, optional
+        History of `value`; None stands for the history of the analysis.
+    rotation : Rotation, optional
+        Rigid rotation of the group, whose displacement is added to `value`.
+    rotation_ramp : Table, optional
+        History of the angle of rotation; None stands for `ramp`.
     """
 
     group: str
@@ -58,11 +73,11 @@ class Support:
 
     @property
     def name(self) -> str:
-        """Component and group, for messages."""
+        """Name of the component and of the group, for messages."""
         return displacement_name("xyz"[self.component], self.group)
 
     def by_history(self, points: Array) -> dict[PartHistory, Array]:
-        """Return the displacements (n,) of `points` (n, dim) at multiplier 1, by history [length]."""
+        """Return the displacements (n,) [length] of the positions `points` (n, dim) at multiplier 1, by history."""
         values: dict[PartHistory, Array] = {self.ramp: evaluated(self.value, points, self.name)}
         if self.rotation is not None:
             arms, angle = points - np.array(self.rotation.centre), self.rotation.angle
@@ -73,7 +88,7 @@ class Support:
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
-    """Return names of groups, given as one or several, as a tuple; None for all."""
+    """Return one or several names of groups as a tuple; None, which stands for all groups, is returned unchanged."""
     if groups is None:
         return None
     names = (groups,) if isinstance(groups, str) else tuple(groups)
@@ -84,7 +99,7 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
 
 @typed(ModelError)
 class ModelBase:
-    """Mesh, kinematics, lists of the added items, and materials."""
+    """A model with a mesh, kinematics and materials, and with lists of the items that its subclasses add."""
 
     def __init__(
         self,
@@ -139,16 +154,20 @@ class ModelBase:
         return self.mesh.n_points * self.mesh.dim
 
     def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
-        """Return groups of solid cells by name, None for all; ModelError that ends with `otherwise` if one is empty."""
+        """Return the names of groups of solid cells, None for all cells.
+
+        Raise a ModelError that ends with `otherwise` if a group contains no solid cell.
+        """
         names = group_names(groups)
         check_solids(self.mesh, names, otherwise)
         return names
 
     def _cells_of(self, groups: Sequence[str] | None) -> Cells:
-        """Return the solid cells of groups, or all."""
+        """Return the solid cells of the given groups, or all solid cells for None."""
         return Cells(self.mesh, solid_rows(self.mesh, groups))
 
     def _nodes(self, point: str | int) -> AnyArray:
+        """Return the numbers (n,) of the points of a group, or the given point number as an array (1,)."""
         if isinstance(point, str):
             return self.mesh.points_of(point)
         if point != int(point) or not 0 <= point < self.mesh.n_points:
@@ -158,7 +177,10 @@ class ModelBase:
     def _direction(
         self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None
     ) -> Array | None:
-        """Return the unit vector (dim,) along which a spring is axial; None for the line between its nodes, or for none."""
+        """Return the unit vector (dim,) of the axial direction of a spring.
+
+        None means that the spring has no axial or transverse stiffness, or that it acts along the line between its nodes.
+        """
         if direction is None:
             if along and not joined:
                 raise ModelError(
@@ -176,13 +198,16 @@ class ModelBase:
         return np.asarray(vector / np.linalg.norm(vector))
 
     def related_points(self) -> Mask:
-        """Return which points (n_points,) have constraints or springs."""
+        """Return for each point (n_points,) whether a multi-point constraint or a spring acts on it."""
         related = np.zeros(self.mesh.n_points, bool)
         related[self.holding_rows().indices // self.mesh.dim] = True
         return related
 
     def holding_rows(self) -> csr_array:
-        """Return rows (m, n_dofs) [unit of the caller] of constraints and springs, zero on free rigid-body modes."""
+        """Return the rows (m, n_dofs) [units of the items] of all multi-point constraints and springs.
+
+        A rigid-body mode that neither constraints nor springs prevent is in the null space of these rows.
+        """
         relations = stacked_rows(self.relations, self.n_dofs)
         return csr_array(vstack([relations, stacked(self.springs, self.n_dofs)], format="csr"))
 
@@ -191,9 +216,11 @@ class ModelBase:
 
         Parameters
         ----------
-        material : LinearElastic, Orthotropic, ...
+        material : Material or nonlinear law
+            For example `LinearElastic`, `Orthotropic` or `NeoHookean`.
         groups : str or sequence of str, optional
-            By default all solid cells; the material of a group overrides that of all cells.
+            Groups of solid cells; by default all solid cells. A material assigned to groups replaces, in these groups, the
+            material that was assigned to all cells before.
 
         Examples
         --------
@@ -210,21 +237,21 @@ class ModelBase:
 
     @property
     def cell_fields(self) -> tuple[str, ...]:
-        """Names of the `StepResult.cell_fields` in steps of this model: none for linear elasticity."""
+        """Names of the `StepResult.cell_fields` in steps of this model; empty for linear elasticity."""
         return field_names([material for material, _ in self.materials], self.strain)
 
     def bending(self) -> list[bool]:
-        """Return for each material whether its cells have incompatible modes."""
+        """Return for each material whether linear quadrangles and hexahedra of this material have incompatible modes."""
         bend = self.kinematics != "axisymmetric" and any(name in BENDING for name in self.mesh.solids)
         return [bend and material.incompatible_modes for material, _ in self.materials]
 
     @property
     def nonlinear(self) -> bool:
-        """Whether bodies have nonlinear laws or finite strains."""
+        """Whether a material is nonlinear or strains are finite."""
         return self.strain != "small" or any(isinstance(law, NonlinearElastic) for law, _ in self.materials)
 
     def nonlinear_bodies(self, field: MaterialField) -> NonlinearBodies | None:
-        """Return the solid cells as nonlinear bodies; None if they are linear."""
+        """Return the solid cells as nonlinear bodies with the materials of `field`; None if the bodies are linear elastic."""
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
@@ -235,21 +262,22 @@ class ModelBase:
             raise ModelError(f"{feature} available for linear elasticity only, not with {named}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
-        """Return moduli (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure], and by element type the row of each solid cell.
+        """Return the matrices of moduli, and by element type the number of the matrix of each solid cell.
 
-        The first rows are those of the materials; materials that vary have further rows for the centre of each cell.
+        Moduli have the shape (n_moduli, 4, 4), in 3D (n_moduli, 6, 6) [pressure]. The first matrices belong to the
+        materials, in their order; materials that vary have a further matrix for the centre of each of their cells.
         """
         field = self.material_field()
         return field.moduli, field.rows
 
     def material_field(self) -> MaterialField:
-        """Return the materials of all solid cells; ModelError if a cell has none or two."""
+        """Return the materials of all solid cells; raise ModelError if a cell has no material or two different ones."""
         return material_field(
             self.mesh, self.kinematics, [material for material, _ in self.materials], self.material_of_cells()
         )
 
     def material_of_cells(self) -> dict[str, Numbers]:
-        """Return the material of every solid cell (n_cells,), by element type."""
+        """Return the index in `materials` of the material of each solid cell (n_cells,), by element type."""
         if not self.materials:
             raise ModelError("no material: call add_material(LinearElastic(E=..., nu=...)) for the solid cells")
         numbers = {name: np.full(len(block), -1, np.int32) for name, block in self.mesh.solids.items()}
@@ -266,11 +294,14 @@ class ModelBase:
         return numbers
 
     def averaged_materials(self) -> Mask:
-        """Return which moduli (n_moduli,) have a mean dilatation; none in plane stress, which does not lock."""
+        """Return for each matrix of moduli (n_moduli,) whether its cells have a mean dilatation.
+
+        In plane stress no cell has a mean dilatation, because elements do not lock there.
+        """
         return self.material_field().averaged
 
     def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
-        """Refuse a material for cells that already have another one, unless that was assigned to all cells."""
+        """Raise ModelError if cells already have a different material, unless that one was assigned to all cells."""
         new = self.materials[index][0]
         for number in np.unique(numbers[numbers >= 0]):
             old, groups = self.materials[number]
@@ -295,13 +326,19 @@ class ModelBase:
     def internal_forces(self, displacement: Array) -> Array:
         """Return the internal nodal forces (n_points, dim) [force] of the solid cells at a displacement.
 
-        They balance the forces of loads, contact, supports, multi-point constraints, springs, thermal strains and initial
-        states (`thermal_forces_by_ramp`, `initial_forces_by_ramp`). In axisymmetry they are those over the full circle.
+        In equilibrium they balance the forces of loads, contact, supports, multi-point constraints and springs, and the
+        equivalent nodal forces of thermal strains and initial states (`thermal_forces_by_ramp`,
+        `initial_forces_by_ramp`). In axisymmetry they are integrated over the full circle.
 
         Parameters
         ----------
         displacement : ndarray (n_points, dim)
-            Displacements of a step result [length].
+            Nodal displacements, such as ``StepResult.displacement`` [length].
+
+        Raises
+        ------
+        ModelError
+            If the displacement has a wrong shape, or forces do not depend on the displacement alone.
 
         Examples
         --------

@@ -23,7 +23,7 @@ from fastcontact.model.relation_rows import NORMAL, along, directions_of, less_f
 
 @typed(ModelError)
 class ModelConnections(ModelInitialStates):
-    """A model with relations, couplings, springs and pretension."""
+    """A model with multi-point constraints, couplings, periodicity, springs and pretension sections."""
 
     def add_pretension(
         self,
@@ -37,32 +37,37 @@ class ModelConnections(ModelInitialStates):
         normal: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Tighten a bolt by a pretension section: the two sides of a cut approach each other along the bolt, without shear.
+        """Tighten a bolt by a pretension section.
 
-        The mesh must be cut at the section, see `fastcontact.generate.cut`. Results are in ``step.pretension[name]``.
+        At the section the bolt is cut. The two sides of the cut are displaced uniformly towards each other along the bolt,
+        without relative displacement normal to it. `fastcontact.generate.cut` cuts the mesh. The results are in
+        ``step.pretension[name]``.
 
         Parameters
         ----------
         name : str
+            Name of the section in the results.
         section : str
-            Group on one side of the cut.
+            Group of facets on one side of the cut.
         force : float, optional
-            Bolt force, positive in tension [force]; in axisymmetry over the full circle.
+            Bolt force at multiplier 1, positive in tension [force]; in axisymmetry integrated over the full circle.
         shortening : float, optional
-            Relative approach of the two sides, instead of a force [length].
+            Relative displacement of the two sides towards each other at multiplier 1 [length]. Give either `force` or
+            `shortening`.
         locked_from : float, optional
-            Instant, the end of a load step, after which the length of the bolt is kept and its force follows.
+            Load factor, the end of a load step, after which the shortening is kept constant and the bolt force is a
+            result [-].
         opposite : str, optional
-            Group on the other side, by default ``"<section> opposite"``.
+            Group of facets on the other side of the cut; by default ``"<section> opposite"``.
         normal : sequence of float (dim,), optional
-            Axis of the bolt [-]; by default the normal of the plane through the nodes.
+            Axis of the bolt [-]; by default the normal of the plane through the nodes of the section.
         ramp : Ramp or iterable of (float, float), optional
-            History of the force or the shortening.
+            History of the force or of the shortening; by default that of the analysis.
 
         Raises
         ------
         MeshError, ModelError
-            If the sides do not coincide or share points, or the arguments are inconsistent.
+            If the two sides share points or do not coincide, or the arguments are inconsistent.
 
         Examples
         --------
@@ -94,13 +99,14 @@ class ModelConnections(ModelInitialStates):
             self._add(PretensionForce(section_of_bolt))
 
     def couple(self, group: str, component: str) -> None:
-        """Constrain all nodes of a group to the same displacement component.
+        """Constrain all nodes of a group to have equal displacement components.
 
         Parameters
         ----------
         group : str
         component : str
-            One or several, such as ``"y"`` or ``"xy"``; or ``"normal"``, along the normals of a group of facets.
+            One or several components, such as ``"y"`` or ``"xy"``; or ``"normal"``, the component along the normal at each
+            node of a group of facets.
 
         Examples
         --------
@@ -130,23 +136,32 @@ class ModelConnections(ModelInitialStates):
         translation: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Constrain each node of a group to the coincident node of another group.
+        """Constrain the displacement of each node of a group by that of the corresponding node of another group.
 
-        By default both have the same displacement, as at the two ends of a period.
+        The constraint is ``coefficients[0] * u_first + coefficients[1] * u_second = value``, where ``u_first`` and
+        ``u_second`` are displacement components of the two nodes. With the default coefficients and value they are equal,
+        for example at the two ends of a period.
 
         Parameters
         ----------
         first, second : str
-            Groups with equally many nodes.
+            Groups with equal numbers of nodes, whose nodes coincide after a translation.
         component : str
-            ``"x"``, ``"xy"``, ... or ``"normal"``: along the outward normals of each group's own facets.
+            One or several components, such as ``"x"`` or ``"xy"``; or ``"normal"``, the components along the outward normals
+            of the facets of each group.
         coefficients : (float, float)
-            ``coefficients[0] * u_first + coefficients[1] * u_second = value``.
+            Coefficients of the two displacements.
         value : float
-            Times the ramp [length times the unit of the coefficients].
-        translation : sequence of float, optional
-            Maps the first group onto the second; by default the vector between their centroids [length].
+            Value of the linear combination at multiplier 1 [length times the unit of the coefficients].
+        translation : sequence of float (dim,), optional
+            Vector that maps the first group onto the second; by default the vector between their centroids [length].
         ramp : Ramp or iterable of (float, float), optional
+            History of the value; by default that of the analysis.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group does not exist, nodes do not coincide after the translation, or an argument is invalid.
 
         Examples
         --------
@@ -182,33 +197,36 @@ class ModelConnections(ModelInitialStates):
         translation: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Model one period of a periodic structure: both ends have the same displacement.
+        """Model one period of a periodic structure, whose two ends have equal displacements up to a uniform difference.
 
-        Rigid translations stay free and need supports. If contact is closed at the ends, two nodes that represent one point
-        share one constraint. In continuous contact only the sum of their forces follows from the gap, and the pressures of
-        neighbouring nodes may oscillate.
+        Rigid-body translations remain possible and must be prevented by supports. Where contact reaches the ends, two nodes
+        represent the same point and share one contact constraint; in the continuous formulation only the sum of their
+        forces is determined, and the pressures of neighbouring nodes may oscillate.
 
         Parameters
         ----------
         first, second : str
-            The ends: groups whose nodes coincide after a translation.
+            Groups of the two ends, whose nodes coincide after a translation.
         x, y, z : float
-            Displacement of the second end relative to the first at multiplier 1: mean strain times period [length].
+            Displacement of the second end relative to the first one at multiplier 1, that is the mean strain times the
+            length of the period [length].
         free : str
-            Components (``"x"``, ``"xy"``, ...) whose relative displacement is uniform, but follows from the loads.
+            Components, such as ``"x"`` or ``"xy"``, in which the uniform relative displacement of the ends is unknown and
+            results from the loads.
         translation : sequence of float (dim,), optional
-            From the first end to the second one; by default the vector between their centroids [length].
+            Vector from the first end to the second one; by default the vector between their centroids [length].
         ramp : Ramp or iterable of (float, float), optional
-            History of x, y, z.
+            History of x, y and z; by default that of the analysis.
 
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, or their nodes do not coincide; the message states the largest distance.
+            If a group does not exist, or nodes do not coincide after the translation; the message states the largest
+            distance.
 
         Examples
         --------
-        A cell of an endless layer, stretched by 0.1 %:
+        One period of an infinite layer, stretched by 0.1 %:
 
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
@@ -237,33 +255,34 @@ class ModelConnections(ModelInitialStates):
         origin: Sequence[float] | None = None,
         direction: Sequence[float] = (0.0, 0.0, 1.0),
     ) -> None:
-        """Model one of several identical sectors of a ring: both ends have the same displacement in cylindrical components.
+        """Model one of several identical sectors of a ring, whose two ends have equal cylindrical displacement components.
 
-        Loads are periodic, too, and forces are those of one sector. Rotation about the axis and, in 3D, translation along it
-        stay free and need supports. The ends may be curved and may meet on the axis. For contact at the ends see
-        `add_periodicity`.
+        Loads are the same on all sectors, and resultant forces are those of the modelled sector. Rotation about the axis
+        and, in 3D, translation along it remain possible and must be prevented by supports. The ends may be curved and may
+        meet on the axis. The remark on contact at the ends in `add_periodicity` also applies here.
 
         Parameters
         ----------
         first, second : str
-            The ends: groups whose nodes coincide after a rotation by the angle of a sector, in either direction. Where the
-            meshes differ, groups of facets that coincide: nodes of the finer end are then tied to facets of the coarser one.
+            Groups of the two ends, whose nodes coincide after a rotation by the angle of a sector, in either direction. If
+            the meshes of the ends differ, give groups of facets; nodes of the finer end are then tied to the facets of the
+            coarser one.
         sectors : int
             Number of sectors in the ring.
         origin : sequence of float (dim,), optional
-            A point on the axis, by default the origin [length].
+            A point on the axis; by default the origin of the coordinates [length].
         direction : sequence of float (3,)
-            Of the axis [-]; in the plane always z.
+            Direction of the axis in 3D [-]; in 2D the axis is normal to the plane of the model.
 
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, they do not coincide (the message states the largest distance), or the kinematics
-            are axisymmetric.
+            If a group does not exist, the ends do not coincide after the rotation (the message states the largest
+            distance), or the kinematics are axisymmetric.
 
         Examples
         --------
-        A quarter of a ring stands for all of it:
+        A quarter of a ring represents the entire ring:
 
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.rings(), kinematics="plane_strain")
@@ -295,14 +314,22 @@ class ModelConnections(ModelInitialStates):
         Parameters
         ----------
         terms : iterable of (str or int, str, float)
-            Group or point number, component, coefficient. A group of several nodes stands for the sum over them; long sums
-            are expensive, since they couple all displacements in them.
+            For each term the name of a group or the number of a point, the component and the coefficient. A group of several
+            nodes represents the sum over these nodes. Sums over many nodes are expensive, because they couple all
+            displacements in them.
         value : float
-            At multiplier 1 [length times the unit of the coefficients].
+            Value of the linear combination at multiplier 1 [length times the unit of the coefficients].
+        ramp : Ramp or iterable of (float, float), optional
+            History of the value; by default that of the analysis.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group or a component does not exist, or all coefficients are zero.
 
         Examples
         --------
-        One corner moves down by twice as much as another one:
+        The vertical displacement of one corner is twice that of another one:
 
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
@@ -332,34 +359,38 @@ class ModelConnections(ModelInitialStates):
         weighting: str = "uniform",
         radius: float | None = None,
     ) -> None:
-        """Couple a reference point to the nodes of a group, for small rotations.
+        """Couple a reference point to the nodes of a group.
 
-        Forces, moments and supports at the reference point are transferred to the group; see
-        `fastcontact.generate.with_reference_points`, `add_force` and `add_moment`.
+        Forces, moments and supports at the reference point are transferred to the group; see `add_force` and `add_moment`.
+        `fastcontact.generate.with_reference_points` adds reference points to a mesh. The coupling is linear, hence valid
+        for small rotations.
 
         Parameters
         ----------
         reference : str
             Name of the reference point.
         group : str
+            Group of the coupled nodes.
         kind : str
-            ``"rigid"``: the nodes move as a rigid body with the reference point (RBE2). ``"distributing"``: the reference
-            point follows the mean motion of the group, weighted by area for groups of facets, without stiffening it (RBE3).
+            With ``"rigid"`` the nodes move as a rigid body with the reference point (known as RBE2). With
+            ``"distributing"`` the reference point follows the mean motion of the group, weighted by tributary area for
+            groups of facets, and the group can deform freely (known as RBE3).
         components : str, optional
-            Displacement components of a rigid coupling, such as ``"z"``; by default all.
+            Displacement components of a rigid coupling, such as ``"z"``; by default all components.
         weighting : str
-            Of a distributing coupling, by distance from the reference point, as in `add_force`.
+            Additional weight of the nodes of a distributing coupling as a function of their distance from the reference
+            point, as described for `add_force`.
         radius : float, optional
-            As in `add_force` [length].
+            Distance from the reference point beyond which the weight is zero, as described for `add_force` [length].
 
         Raises
         ------
         MeshError, ModelError
-            If there are no such groups, or kinematics are axisymmetric.
+            If a group does not exist, or the kinematics are axisymmetric.
 
         Examples
         --------
-        A moment on the end of a block, through a reference point:
+        A moment is applied to the end of a block through a reference point:
 
         >>> import fastcontact as fc
         >>> mesh = fc.generate.with_reference_points(fc.generate.block(), {"HANDLE": (1.5, 0.5)})
@@ -386,30 +417,36 @@ class ModelConnections(ModelInitialStates):
         direction: Sequence[float] | None = None,
         translation: Sequence[float] | None = None,
     ) -> None:
-        """Connect every node of a group to the ground, two nodes, or the nodes of two groups by springs.
+        """Connect the nodes of a group by springs to the ground or to other nodes.
 
         Parameters
         ----------
         group : str or int
-            Group or point number.
+            Name of a group or number of a point.
         to : str or int, optional
-            Group or point number: springs connect each node of `group` to the coincident node of this group, after a
-            `translation` as in `relate_groups`; a single node is connected to all nodes of the other group.
+            Name of a group or number of a point; without it the springs are fixed to the ground. Each node of `group` is
+            connected to the node of this group with which it coincides after `translation`. If one of the two groups has a
+            single node, this node is connected to all nodes of the other group.
         x, y, z : float
-            Stiffness along the axes [force / length]; in axisymmetry over the full circle.
+            Stiffness of each spring along the axes [force / length]; in axisymmetry integrated over the full circle.
         axial, transverse : float
-            Stiffness along the line between the two nodes, and along every direction normal to it [force / length]. The
-            line keeps its reference direction.
-        direction : sequence of float, optional
-            Vector of any length that replaces the line between the two nodes.
+            Stiffness of each spring along the line between its two nodes, and along every direction normal to this line
+            [force / length]. The line keeps its direction in the reference configuration.
+        direction : sequence of float (dim,), optional
+            Vector of any length that replaces the direction of the line between the two nodes [-].
         translation : sequence of float (dim,), optional
-            Maps the first group onto the second; by default the vector between their centroids [length].
+            Vector that maps the first group onto the second; by default the vector between their centroids [length].
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group does not exist, nodes do not coincide after the translation, or a stiffness is not positive.
 
         Examples
         --------
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
-        >>> model.add_spring("BOTTOM", y=1000.0)  # a soft foundation, by node
+        >>> model.add_spring("BOTTOM", y=1000.0)  # an elastic foundation, with a stiffness of 1000 at every node
         >>> model.add_spring("TOP_LEFT", "BOTTOM_RIGHT", axial=50.0)
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"

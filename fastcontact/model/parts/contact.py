@@ -58,60 +58,78 @@ class ModelContact(ModelConnections):
         name : str
             Name of the pair in the results.
         secondary, primary : str
-            The side whose nodes or integration points are projected and carry the constraints, and the side
-            projected upon. Facets are oriented from the solid behind them.
+            Groups of facets of the two sides. Nodes or integration points of the secondary side carry the contact
+            constraints and are projected onto the primary side. Facets may be listed in either orientation; their normals
+            point out of the adjacent solid cells.
         formulation : str, optional
-            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``. By default mortar with dual Lagrange multipliers, which
-            suits any two surfaces; ``repr(model)`` and the log state it.
+            ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``; by default mortar with dual Lagrange multipliers, which
+            suits any two surfaces. ``repr(model)`` and the log state the formulation.
         **options
-            Options of all formulations, in addition to those of the formulation itself; None is the default:
+            The options below apply to all formulations; each formulation has further options. None stands for the default.
 
             - ``friction``: coefficient of Coulomb friction.
-            - ``kind``: ``"unilateral"`` (default): contact opens and closes. ``"bilateral"``: all gaps that have an opposite
-              side are closed from the beginning and stay so (no separation), with frictionless sliding.
-              ``"bilateral_once_closed"``: no separation of nodes that are closed at the end of a load step.
-              ``"tied"``: neither separation nor sliding; the sides are paired once, in the reference configuration,
-              and their relative displacement is zero. An initial gap is kept and acts as a rigid arm that rotates with
-              the primary facet. ``"gap_only"``: gaps are evaluated, negative where the sides penetrate, without forces.
-            - ``clearance``: added to the gap, a number or a function from reference positions (n, dim) on the secondary
-              side to lengths (n,): positive for a clearance, negative for an interference, as of a press fit [length].
-              ``clearance_primary``: the same on the primary side, at the opposite positions. ``clearance_ramp``: their
-              ramp, pairs (instant, multiplier), by default constant. ``friction_ramp``: the ramp of the coefficient of
-              friction.
+            - ``kind``: the kinematic condition.
+
+              ``"unilateral"``, the default: contact opens and closes.
+              ``"bilateral"``: all secondary points that have an opposite point are in frictionless contact from the
+              beginning and never separate.
+              ``"bilateral_once_closed"``: nodes that are closed at the end of a load step do not separate afterwards.
+              ``"tied"``: the sides neither separate nor slide. They are paired once, in the reference configuration, and
+              their relative displacement is zero. An initial gap is kept and acts as a rigid arm that rotates with the
+              primary facet.
+              ``"gap_only"``: gaps are computed, negative where the sides penetrate, but no forces act.
+            - ``clearance``: length that is added to the gap, positive for a clearance and negative for an interference,
+              for example of a press fit [length]. It is a number or a function from reference positions (n, dim) on the
+              secondary side to lengths (n,).
+            - ``clearance_primary``: the same quantity as a function of positions on the primary side.
+            - ``clearance_ramp``: history of both clearances, as pairs (instant, multiplier); by default they are constant.
+            - ``friction_ramp``: history of the coefficient of friction, as pairs (instant, multiplier).
             - ``surface_smoothing``: whether gaps are measured between the smooth surfaces that straight facets of curved
-              sides approximate; by default with mortar alone.
-            - ``excluded``: groups whose nodes carry no contact. Their tributary area carries no pressure (node-to-segment,
-              mortar with one gap per node), nor do integration points nearer to such a node than to any other. Both sides
-              may share such nodes. ``frictionless``: groups whose nodes carry no friction, likewise.
-              ``frictionless_along``: a vector (dim,) along which these nodes, or without ``frictionless`` all, have neither
-              friction nor slip; across it they keep both [-].
-            - ``penalty``: pressure per penetration [pressure / length], by default exact constraints; or a table of
-              pairs (overclosure, pressure), ascending from zero pressure [length, pressure]; or ``{"clearance": c,
-              "pressure": p}``, an exponential law with the pressure p at zero gap and p / 100 at the gap c. It does
-              not regularise friction;
-              ``tangential_penalty`` does: shear per tangential displacement of sticking nodes, a number or a function of
-              the secondary position [pressure / length].
-            - ``cohesion``: bilinear cohesive zone, a mapping of ``strength`` [pressure] and fracture ``energy`` per
-              area [pressure length], and optionally ``shear_strength``, ``shear_energy`` (by default those of opening),
-              ``stiffness`` (by default such that the strength is reached at a hundredth of the opening at break)
-              [pressure / length], ``mixed_mode``, ``"bk"`` (Benzeggagh and Kenane) or ``"power"``, with its ``exponent`` (2)
-              [-], and ``initiation``: ``"bk"``, ``"quadratic"`` or ``"maximum"``. It is stress-free in the reference
-              configuration, also across gaps, and keeps its stiffness in compression. ``adhesion``: reversible attraction,
-              a mapping of the ``work`` of adhesion per area, ``strength`` and ``stiffness``, without tangential resistance.
-            - ``slip``: ``"symmetric"`` (default): closing a gap along the mean normal of both sides is no slip;
-              ``"primary"``: all relative motion tangential to the primary side is slip, as in code_aster.
-            - ``wear``: Archard's coefficient divided by the hardness: ``coefficient * pressure * slip`` is removed from the
-              secondary side at the end of each load step [1 / pressure].
-            - ``conductance``: heat flux per temperature difference: a number, valid in contact; a function of pressures and
-              gaps (m,); pairs (pressure, conductance); or a mapping of ``"pressure"`` and ``"gap"`` to pairs. By default the
-              contact is insulated. ``friction_heat``: fraction of the work of friction that becomes heat, half of it on each
-              side, with load factors as times [-]. ``obstacle_temperature``: of a rigid obstacle [temperature].
-            - ``search_distance``: largest distance, and largest penetration, at which points have an opposite side, both now
-              and at the beginning of the load step [length].
-            - ``normals``: ``"facet"``; ``"averaged"`` over the facets that meet at a node at less than 45 degrees, which
-              conforming curved sides need; ``"secondary"``: those of the secondary side; or a vector (dim,), the outward
-              normal of the whole primary side [-]. ``projection_tolerance``: how far points may project beyond the end of
-              the primary side and still carry force, in facet lengths.
+              sides approximate; by default only with the mortar formulation.
+            - ``excluded``: groups whose nodes carry no contact pressure. In the node-to-segment formulation and in mortar
+              contact with one gap per node, the tributary areas of these nodes carry no pressure; in the other
+              formulations, integration points whose nearest node is excluded carry none. The two sides may share excluded
+              nodes.
+            - ``frictionless``: groups whose nodes, or the integration points nearest to them, carry no friction.
+            - ``frictionless_along``: vector (dim,) along which there is neither friction nor slip, at the nodes of
+              ``frictionless`` or, without that option, at all nodes; friction and slip normal to the vector remain [-].
+            - ``penalty``: pressure per unit penetration [pressure / length]; by default the constraints are enforced
+              exactly. Alternatively a table of pairs (overclosure, pressure) [length, pressure], ascending from zero
+              pressure, or ``{"clearance": c, "pressure": p}``, an exponential law with the pressure p at zero gap and
+              p / 100 at the gap c. Friction is not regularised by this option.
+            - ``tangential_penalty``: shear traction per unit tangential displacement of sticking nodes, a number or a
+              function of the secondary position [pressure / length]; by default nodes stick exactly.
+            - ``cohesion``: bilinear cohesive law, as a mapping. ``strength`` [pressure] and fracture ``energy`` per unit
+              area [pressure length] are required. ``shear_strength`` and ``shear_energy`` default to the values in opening,
+              ``stiffness`` [pressure / length] to a value with which the strength is reached at a hundredth of the opening
+              at failure. ``mixed_mode`` is ``"bk"`` (Benzeggagh and Kenane, 1996) or ``"power"``, with an ``exponent``
+              [-], by default 2; ``initiation`` is ``"bk"``, ``"quadratic"`` or ``"maximum"``. The layer is stress-free in
+              the reference configuration, also across gaps, and keeps its stiffness in compression.
+            - ``adhesion``: reversible attraction without tangential resistance, as a mapping of the ``work`` of adhesion
+              per unit area [pressure length], the ``strength`` [pressure] and the ``stiffness`` [pressure / length].
+            - ``slip``: definition of the slip. ``"symmetric"``, the default: a relative displacement that closes a gap
+              along the mean normal of both sides is no slip. ``"primary"``: any relative displacement tangential to the
+              primary side is slip, as in code_aster.
+            - ``wear``: Archard's wear coefficient divided by the hardness [1 / pressure]. At the end of each load step the
+              depth ``wear * pressure * slip`` is removed from the secondary side.
+            - ``conductance``: heat flux per unit temperature difference [power / (area temperature)]: a number, which
+              applies at closed points; a function of pressures and gaps (m,); pairs (pressure, conductance); or a mapping
+              of ``"pressure"`` and ``"gap"`` to pairs. By default the contact is insulated.
+            - ``friction_heat``: fraction of the frictional work that becomes heat, of which one half flows into each side
+              [-]. The heating power is computed with the load factor as time.
+            - ``obstacle_temperature``: temperature of a rigid obstacle [temperature].
+            - ``search_distance``: largest distance, and largest penetration, at which a point has an opposite point, both
+              in the current configuration and at the beginning of the load step [length].
+            - ``normals``: the normal field. ``"facet"``: normals of the primary facets. ``"averaged"``: averages over the
+              facets that meet at a node at less than 45 degrees, which conforming curved sides need. ``"secondary"``:
+              normals of the secondary side. A vector (dim,): the outward normal of the entire primary side [-].
+            - ``projection_tolerance``: distance, relative to the length of a facet, by which the projection of a point may
+              lie beyond the end of the primary side while the point still carries force [-].
+
+        Raises
+        ------
+        MeshError, ModelError, ContactError
+            If a group does not exist, an option is unknown or out of range, or the sides do not fit each other.
 
         Examples
         --------
@@ -136,18 +154,24 @@ class ModelContact(ModelConnections):
         formulation: str | None = None,
         **options: Unpack[ContactOptions],
     ) -> FoundContacts:
-        """Find the surfaces of different bodies that face each other, and add a contact pair for each two of them.
+        """Find the surfaces of different bodies that face each other, and add a contact pair for each two such surfaces.
 
-        Groups of their facets are added to the mesh of the model. Surfaces of pairs that were added before and pretension
-        sections are skipped.
+        Groups with the facets of these surfaces are added to the mesh of the model. Surfaces of existing pairs and of
+        pretension sections are skipped. Between two equally fine surfaces the one of the softer material becomes the
+        secondary side, if materials have been assigned.
 
         Parameters
         ----------
-        distance, angle, groups
-            As in `find_contacts`. Between equally fine sides, that of the softer material is secondary if materials have been
-            assigned.
-        formulation, **options
-            Of all pairs, as in `add_contact`: ``friction=0.2``, ``kind="tied"``.
+        distance : float, optional
+            Largest distance between surfaces that face each other; see `find_contacts` [length].
+        angle : float
+            Largest deviation of the two normals from opposite directions; see `find_contacts` [degrees].
+        groups : sequence of str, optional
+            Groups of solid cells that form the bodies; by default the connected sets of cells.
+        formulation : str, optional
+            Formulation of all pairs; see `add_contact`.
+        **options
+            Options of all pairs, such as ``friction=0.2`` or ``kind="tied"``; see `add_contact`.
 
         Returns
         -------
@@ -192,12 +216,12 @@ class ModelContact(ModelConnections):
         return FoundContacts(self.mesh, tuple(added))
 
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
-        """Let a fluid penetrate a contact pair: it acts on both sides wherever they are open and connected to its source.
+        """Apply a fluid pressure to both sides of a contact pair, wherever the fluid can penetrate from a source.
 
-        Starting at the source, the fluid advances from facet to facet where the sides are open, or where their contact
-        pressure does not exceed its own. There it acts on the secondary side along its own normals, in finite strain those
-        of the deformed surface, and on the primary side along its own (``fluid_pressure`` of the results). Its action on
-        other surfaces is a load, see `add_pressure`.
+        Starting at the source, the fluid advances from facet to facet where the sides are open, or where the contact
+        pressure does not exceed the fluid pressure. There it acts on each side along the normals of that side, in finite
+        strain the normals of the deformed surface. The pressure at each secondary node is the attribute
+        ``fluid_pressure`` of the contact result. To apply the pressure of the fluid to other surfaces, use `add_pressure`.
 
         Parameters
         ----------
@@ -206,7 +230,7 @@ class ModelContact(ModelConnections):
         pressure : float
             Fluid pressure at multiplier 1 [pressure].
         source : str
-            Group with the nodes of the secondary side where the fluid enters: its edge, or all of it.
+            Group of the nodes of the secondary side where the fluid enters: the edge of that side, or all its nodes.
         ramp : Ramp or iterable of (float, float), optional
             History of the fluid pressure.
 
@@ -245,28 +269,36 @@ class ModelContact(ModelConnections):
 
         Parameters
         ----------
-        name, secondary
-            As in `add_contact`.
+        name : str
+            Name of the contact in the results.
+        secondary : str
+            Group of the facets that may touch the obstacle.
         obstacle : Obstacle
-            A shape of `fastcontact.obstacles`, or any object with their ``distance`` method.
+            A shape of `fastcontact.obstacles`, or any object with the ``distance`` method of these shapes.
         motion : mapping of str to float, optional
-            Its displacement at multiplier 1, e.g. ``{"y": -0.1}``; by default zero [length].
+            Displacement of the obstacle at multiplier 1, such as ``{"y": -0.1}``; by default zero [length].
         force : mapping of str to float, optional
-            The force on it at multiplier 1, e.g. ``{"y": -100.0}`` [force], in axisymmetry over the full circle. In these
-            components the obstacle is a free rigid body, held by contact alone; in the others it follows `motion`. Its
-            displacement is in the results.
+            Force on the obstacle at multiplier 1, such as ``{"y": -100.0}`` [force], in axisymmetry integrated over the
+            full circle. In the given components the obstacle is a free rigid body, which only contact holds; in the other
+            components it follows `motion`. The results contain its displacement.
         rotation : mapping, optional
-            Rotation about an axis: ``angle`` at multiplier 1 [radian]; ``centre``, a point on the axis (dim,) before any
-            motion, which the axis follows [length]; in 3D ``axis``, its direction; ``ramp``, a history of its own. The
-            torque about the axis is in the results. Not in axisymmetry.
+            Rotation of the obstacle about an axis that moves with `motion`. ``angle``: angle at multiplier 1 [radian].
+            ``centre``: a point (dim,) on the axis before any motion [length]. ``axis``, in 3D: direction of the axis.
+            ``ramp``, optional: history of the angle. The results contain the torque about the axis. Axisymmetric models
+            do not support rotation.
         ramp : Ramp or iterable of (float, float), optional
-            History of motion and force, and of a rotation without its own.
+            History of motion and force, and of the rotation if it has no ``ramp``.
         formulation : str, optional
-            ``"node_to_segment"`` (node against obstacle), the default on linear triangles and, in 3D, on facets whose nodes
-            all carry pressure (tri3, quad4, quad9); ``"mortar"`` with one weighted gap per node, the default in 3D on
-            other quadratic facets with friction; or ``"continuous"``, the default elsewhere.
+            ``"node_to_segment"`` (nodes against the obstacle), ``"mortar"`` with one weighted gap per node, or
+            ``"continuous"``. The default is node-to-segment on linear triangles and, in 3D, on facets whose nodes all carry
+            pressure (tri3, quad4, quad9); mortar in 3D on other quadratic facets with friction; and otherwise continuous.
         **options
-            As in `add_contact`.
+            Options of `add_contact`.
+
+        Raises
+        ------
+        MeshError, ModelError, ContactError
+            If a group does not exist, an argument is invalid, or the obstacle has another dimension than the mesh.
 
         Examples
         --------
@@ -304,7 +336,7 @@ class ModelContact(ModelConnections):
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
-        """Return the source nodes (n_points,) of the fluid in a pair, None without a fluid."""
+        """Return for each point (n_points,) whether the fluid enters a contact pair there; None without a fluid."""
         if pair.fluid is None:
             return None
         mask = np.zeros(self.mesh.n_points, bool)
@@ -322,7 +354,7 @@ class ModelContact(ModelConnections):
         return mask
 
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
-        """Return the kinds of facets of a group, and whether all belong to linear triangles or tetrahedra."""
+        """Return the element types of the facets of a group, and whether all belong to linear triangles or tetrahedra."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
         if not facets:  # reported by `check`
             return [], False
@@ -331,7 +363,7 @@ class ModelContact(ModelConnections):
         return list(facets), of_simplices
 
     def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
-        """Return the force on obstacle `name` by component, None for prescribed ones; empty without any."""
+        """Return the force on obstacle `name` by component, None where its motion is prescribed; empty without forces."""
         if not force:
             return ()
         forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
@@ -364,10 +396,11 @@ class ModelContact(ModelConnections):
         self.contact.append(pair)
 
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
-        """Return the formulation of a contact pair on this mesh; see `add_contact` for the errors.
+        """Return the formulation of a contact pair on this mesh; it raises the errors of `add_contact`.
 
-        `held` are the nodal motions that supports and multi-point constraints prescribe, if known; `sectors_alike`
-        states whether pressures are equal at both ends of a sector.
+        `held` contains the nodal motions that supports and multi-point constraints prescribe, if they are known.
+        `sectors_alike` states whether pressures are equal at both ends of a sector, as in static analyses; in vibration
+        modes they may differ.
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)

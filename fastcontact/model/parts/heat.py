@@ -1,4 +1,4 @@
-"""Heat conduction in a model: prescribed temperatures, fluxes, films, sources, and checks.
+"""Heat conduction in a model: prescribed temperatures, heat fluxes, films and heat sources, with their checks.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -28,7 +28,7 @@ HEAT_FLUX = ("heat_flux_x", "heat_flux_y", "heat_flux_z")
 
 @typed(ModelError)
 class ModelHeat(ModelBase):
-    """A model with optional heat conduction; steps then contain temperatures and fluxes, and materials expand."""
+    """A model with optional heat conduction, which adds temperatures, heat fluxes and thermal strains to the steps."""
 
     def fix_temperature(
         self, group: str, value: Value, *, ramp: History = None, begins: float | None = None, ends: float | None = None
@@ -41,10 +41,11 @@ class ModelHeat(ModelBase):
         value : float or callable
             A number, or a function from reference positions (n, dim) [length] to temperatures (n,) [temperature].
         ramp : Ramp or iterable of (float, float), optional
-            History of the rise above `Model.reference_temperature`.
+            History of the rise above `Model.reference_temperature`; by default that of the analysis.
         begins, ends : float, optional
-            Load factors of ends of load steps between which it is prescribed, by default always [-]. A temperature
-            that begins later changes from the current values to the next point of its `ramp`.
+            Load factors between which the temperature is prescribed; both must be ends of load steps. By default it is
+            prescribed in all steps [-]. A temperature that begins later changes linearly from the current values to the
+            next point of its `ramp`.
 
         Examples
         --------
@@ -62,7 +63,8 @@ class ModelHeat(ModelBase):
         ----------
         group : str
         value : float or callable
-            Positive into the body, as in `fix_temperature` [power / area].
+            Heat flux into the body per unit area at multiplier 1: a number, or a function from reference positions
+            (n, dim) [length] to fluxes (n,) [power / area].
         ramp : Ramp or iterable of (float, float), optional
             History of the flux.
 
@@ -75,14 +77,15 @@ class ModelHeat(ModelBase):
         self._heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
 
     def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
-        """Apply a heat source to groups of solid cells.
+        """Apply a volumetric heat source to groups of solid cells.
 
         Parameters
         ----------
         value : float or callable
-            Power per volume, as in `fix_temperature` [power / length^3].
+            Power per unit volume at multiplier 1: a number, or a function from reference positions (n, dim) [length] to
+            numbers (n,) [power / length^3].
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         ramp : Ramp or iterable of (float, float), optional
             History of the source.
 
@@ -101,7 +104,8 @@ class ModelHeat(ModelBase):
         ----------
         group : str
         value : float or callable
-            As in `fix_temperature`; in axisymmetry over the full circle [power].
+            Power of each node at multiplier 1: a number, or a function from reference positions (n, dim) [length] to
+            numbers (n,). In axisymmetry it is integrated over the full circle [power].
         ramp : Ramp or iterable of (float, float), optional
             History of the source.
 
@@ -129,7 +133,7 @@ class ModelHeat(ModelBase):
         ramp : Ramp or iterable of (float, float), optional
             History of the rise of the ambient temperature above `Model.reference_temperature`.
         begins, ends : float, optional
-            Load factors of ends of load steps between which it acts, by default always [-].
+            Load factors between which the film acts; both must be ends of load steps. By default it acts in all steps [-].
 
         Examples
         --------
@@ -146,7 +150,7 @@ class ModelHeat(ModelBase):
 
     @property
     def conducts(self) -> bool:
-        """Whether heat conduction is solved: with a heat load, a prescribed temperature, or a contact with a conductance."""
+        """Whether heat conduction is solved: the model has a heat load, a fixed temperature or a contact conductance."""
         return bool(self.heat_loads) or any("conductance" in pair.options for pair in self.contact)
 
     @property
@@ -160,20 +164,24 @@ class ModelHeat(ModelBase):
         return any(material.expansion is not None for material, _ in self.materials)
 
     def conduction(self) -> Conduction:
-        """Return the conduction of the solid cells."""
+        """Return the heat conduction problem of the solid cells."""
         return Conduction(self.mesh, self.kinematics, [m for m, _ in self.materials], self.material_of_cells())
 
     def same_temperature(self) -> Indices:
-        """Return for each node (n_points,) the first node of equal temperature, at ends of periods and sides of sections."""
+        """Return for each node (n_points,) the first node that has the same temperature.
+
+        Nodes share their temperature at the ends of a period or sector and on the two sides of a pretension section.
+        """
         cuts = [(cut.nodes, cut.opposite) for cut in self.pretensions]
         representative = same_place([*self.periodic_interfaces, *cuts], self.mesh.n_points)  # type: ignore[list-item]
         return np.arange(self.mesh.n_points) if representative is None else representative
 
     def fixed_temperatures(self) -> tuple[Mask, dict[Table | None, Array]]:
-        """Return which nodes (n_points,) have a prescribed temperature, and their rises at multiplier 1 by history.
+        """Return the mask (n_points,) of nodes with a prescribed temperature, and their rises at multiplier 1, by history.
 
-        Nodes with the same temperature are represented by the first one, see `same_temperature`. ModelError if two
-        prescribed temperatures differ at a node.
+        Rises above the reference temperature have the shape (n_points,) [temperature]. Of nodes that share their
+        temperature only the first is marked, see `same_temperature`. ModelError if two prescribed temperatures differ at a
+        node.
         """
         fixed, values = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
@@ -198,7 +206,7 @@ class ModelHeat(ModelBase):
         return fixed, by_ramp
 
     def check_heat(self) -> None:
-        """Raise ModelError if the heat problem is not uniquely solvable or lacks data."""
+        """Raise ModelError if the heat conduction problem has no unique solution or lacks data."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
                 raise ModelError(
@@ -241,11 +249,11 @@ class ModelHeat(ModelBase):
             )
 
     def conductances(self) -> dict[str, Conductance]:
-        """Return the conductances by contact pair."""
+        """Return the thermal conductances of the contact pairs, by name of the pair."""
         by_pair = {pair.name: pair.options.get("conductance") for pair in self.contact}
         return {name: Conductance(name, value) for name, value in by_pair.items() if value is not None}
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
-    """Return the instants between which a load acts, always if they are not given."""
+    """Return the load factors between which a load acts; minus and plus infinity replace those that are not given."""
     return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

@@ -28,7 +28,7 @@ from fastcontact.model.ramp import History, Table, table_of
 
 @typed(ModelError)
 class ModelInitialStates(ModelLoads):
-    """A model with temperatures, initial stresses and strains."""
+    """A model with temperatures, initial stresses and initial strains."""
 
     def add_temperature(
         self,
@@ -39,10 +39,10 @@ class ModelInitialStates(ModelLoads):
         times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Prescribe the temperature of groups of solid cells, whose materials expand by their `expansion`.
+        """Prescribe the temperature of groups of solid cells, whose materials need a coefficient of thermal `expansion`.
 
-        Temperatures are nodal: cells adjacent to a group have a temperature gradient where they share nodes with it. If
-        several temperatures act, their rises above the references are added.
+        Temperatures are nodal: a cell adjacent to a group has a temperature gradient where it shares nodes with the group.
+        If several temperatures act on a node, their rises above the reference temperatures are added.
 
         Parameters
         ----------
@@ -50,13 +50,19 @@ class ModelInitialStates(ModelLoads):
             A number, a function from reference positions (n, dim) [length] to temperatures (n,), nodal values, or nodal
             values at several instants [temperature].
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         reference : float
-            Temperature without thermal strain [temperature].
+            Temperature at which the thermal strain is zero [temperature].
         times : sequence of float (n_instants,), optional
-            Load factors of the instants, between which temperatures are interpolated linearly [-].
+            Load factors of the instants, between which temperatures are interpolated linearly [-]; required for values at
+            several instants.
         ramp : Ramp or iterable of (float, float), optional
-            History of the rise, that is of the value minus the reference.
+            History of the rise ``value - reference``; by default that of the analysis.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group does not exist, the number of values is wrong, or `times` and `ramp` are both given.
 
         Examples
         --------
@@ -91,28 +97,29 @@ class ModelInitialStates(ModelLoads):
         times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
-        """Prescribe the temperature of groups of solid cells by a nodal field of one or several files.
+        """Prescribe the temperature of groups of solid cells by a nodal field that is read from one or several files.
 
-        Formats are MED, VTKHDF (such as result files) and those of meshio (such as .vtu). If the file has the points
-        of the mesh in the same order, its values are used directly; otherwise points are matched by position.
+        The file formats are MED, VTKHDF (the format of result files) and the formats of meshio, such as .vtu. If a file
+        contains the points of the mesh in the same order, its values are used directly; otherwise points are matched by
+        position.
 
         Parameters
         ----------
-        file : path-like or sequence of them
+        file : path-like or sequence of path-like
             One file with one or several instants, or one file for each instant.
         field : str
-            Name of the field.
+            Name of the nodal field.
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         reference : float
-            Temperature without thermal strain [temperature].
+            Temperature at which the thermal strain is zero [temperature].
         instant : float, optional
             Use only this time of the file.
         times : sequence of float (n_instants,), optional
             Load factors of the instants, between which temperatures are interpolated linearly [-]; by default the times of
             the file.
         ramp : Ramp or iterable of (float, float), optional
-            History of the rise of a single instant.
+            History of the rise above `reference`, if the field has a single instant.
 
         Raises
         ------
@@ -155,21 +162,28 @@ class ModelInitialStates(ModelLoads):
         axes: Axes = None,
         ramp: History = None,
     ) -> None:
-        """Prescribe an initial stress in groups of solid cells, by default all.
+        """Prescribe an initial stress in groups of solid cells.
 
-        The part of it that is not in equilibrium deforms the bodies. In axisymmetry x, y, z stand for radius, axis and
-        circumference.
+        An initial stress that is not in equilibrium deforms the bodies. In axisymmetry x, y and z denote the radial, axial
+        and circumferential directions.
 
         Parameters
         ----------
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
-            Components, by default zero; numbers, functions or arrays like E of `LinearElastic` [pressure].
+            Components of the stress at multiplier 1, by default zero: numbers, functions of position or arrays, as
+            described for the parameter E of `LinearElastic` [pressure].
         axes : sequence or callable, optional
-            Axes of the components, as in `Orthotropic`: unit vectors in rows (3, 3) [-], or a function of position.
+            Axes of the components: unit vectors in rows (3, 3) [-], or a function of position, as described for
+            `Orthotropic`; by default the axes of the mesh.
         ramp : Ramp or iterable of (float, float), optional
-            Ramp of the stress, which by default acts in full from the first step.
+            History of the stress; by default the full stress acts from the first step on.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group does not exist or contains no solid cells, or a component is invalid.
 
         Examples
         --------
@@ -193,18 +207,26 @@ class ModelInitialStates(ModelLoads):
         axes: Axes = None,
         ramp: History = None,
     ) -> None:
-        """Prescribe a stress-free strain, such as shrinkage, swelling or misfit, in groups of solid cells, by default all.
+        """Prescribe a stress-free strain, for example shrinkage, swelling or misfit, in groups of solid cells.
 
         Parameters
         ----------
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
-            Components, as in `add_initial_stress`; xy, yz and xz are engineering shears, twice those of the tensor [-].
+            Components of the strain at multiplier 1, by default zero: numbers, functions of position or arrays, as
+            described for the parameter E of `LinearElastic`. The components xy, yz and xz are engineering shear strains,
+            which are twice the components of the strain tensor [-].
         axes : sequence or callable, optional
-            Axes of the components: unit vectors in rows (3, 3) [-], or a function of position.
+            Axes of the components: unit vectors in rows (3, 3) [-], or a function of position, as described for
+            `Orthotropic`; by default the axes of the mesh.
         ramp : Ramp or iterable of (float, float), optional
-            Ramp of the strain, which by default acts in full from the first step.
+            History of the strain; by default the full strain acts from the first step on.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If a group does not exist or contains no solid cells, or a component is invalid.
 
         Examples
         --------
@@ -225,9 +247,10 @@ class ModelInitialStates(ModelLoads):
         )
 
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
-        """Return the temperature rise (n_points,) [temperature]; None without temperatures.
+        """Return the sum of the temperature rises (n_points,) [temperature]; None without temperatures.
 
-        `factors` holds a multiplier for each temperature, like ``step.iterations["temperature_factors"]`` of a step result.
+        `factors` contains the multiplier of each temperature; of a step result it is
+        ``step.iterations["temperature_factors"]``.
         """
         if not self.temperatures or not len(factors):
             return None
@@ -237,9 +260,9 @@ class ModelInitialStates(ModelLoads):
         return np.asarray(np.sum(rises, axis=0))
 
     def expanding_rise(self, temperature_factors: Sequence[float], temperature: Array | None) -> Array | None:
-        """Return the temperature rise (n_points,) that causes thermal expansion [temperature]; None without it.
+        """Return the temperature rise (n_points,) [temperature] that causes thermal strain; None without thermal strain.
 
-        `temperature_factors` and `temperature` (n_points,) [temperature] are those of `stress_offset`.
+        `temperature` (n_points,) [temperature] and `temperature_factors` are described for `stress_offset`.
         """
         if temperature is not None and self.expands:
             return np.asarray(temperature - self.reference_temperature)
@@ -249,10 +272,12 @@ class ModelInitialStates(ModelLoads):
         self, temperature_factors: Sequence[float] = (), initial_factors: Sequence[float] = (),
         field: MaterialField | None = None, temperature: Array | None = None,
     ) -> StressOffset | None:  # fmt: skip
-        """Return the stresses of temperatures and initial states, to add to those of displacements; None without any.
+        """Return the stresses of thermal strains and initial states, which add to the stresses of the displacements.
 
-        With heat conduction `temperature` (n_points,) [temperature] is that of the step result. The factors are those
-        of `StepResult.iterations`; `field` is the `material_field`, if known.
+        Return None if there are no such stresses. `temperature_factors` and `initial_factors` are the multipliers of the
+        temperatures and of the initial states, which `StepResult.iterations` contains under these names. With heat
+        conduction, `temperature` (n_points,) [temperature] is the nodal temperature of the step. `field` avoids a second
+        computation of `material_field`.
         """
         rise, states = self.expanding_rise(temperature_factors, temperature), []
         if len(initial_factors):
@@ -262,9 +287,9 @@ class ModelInitialStates(ModelLoads):
         return (field or self.material_field()).offset(rise, states, self.mesh.n_points)
 
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return the nodal forces (n_points, dim) of thermal strains at multiplier 1, by history [force].
+        """Return the nodal forces (n_points, dim) [force] of thermal strains at multiplier 1, by history.
 
-        ModelError if a heated material has no coefficient of expansion.
+        ModelError if a cell with a temperature rise has a material without a coefficient of thermal expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
         if not self.temperatures:
@@ -285,12 +310,12 @@ class ModelInitialStates(ModelLoads):
     def expansion_forces(self, field: MaterialField, rise: Array) -> Array:
         """Return the nodal forces (n_points, dim) [force] of the thermal strains of a temperature rise.
 
-        `rise` (n_points,) [temperature] is relative to the reference.
+        `rise` (n_points,) [temperature] is the temperature minus the reference temperature.
         """
         return self._forces_of(field, field.offset(rise))
 
     def initial_forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return the nodal forces (n_points, dim) of initial stresses and strains at multiplier 1, by history [force]."""
+        """Return the nodal forces (n_points, dim) [force] of initial stresses and strains at multiplier 1, by history."""
         by_ramp: dict[Table | None, Array] = {}
         field = self.material_field() if self.initial_states else None
         for state in self.initial_states:

@@ -1,4 +1,4 @@
-"""The loads of a model: forces on its surfaces, volumes and points.
+"""The loads of a model: forces on surfaces, volumes and points.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -42,10 +42,11 @@ class ModelLoads(ModelHeat):
         ----------
         group : str
         value : float or callable
-            Positive in compression, that is along the inward normal: a number, or a function from reference positions
-            (n, dim) [length] to pressures (n,) [pressure]. In finite strain it follows the deformed surface.
+            Pressure at multiplier 1, positive in compression, that is along the inward normal: a number, or a function from
+            reference positions (n, dim) [length] to pressures (n,) [pressure]. In finite strain the pressure follows the
+            deformed surface.
         ramp : Ramp or iterable of (float, float), optional
-            History of the pressure.
+            History of the pressure; by default that of the analysis.
 
         Examples
         --------
@@ -65,15 +66,16 @@ class ModelLoads(ModelHeat):
         z: Value | None = None,
         ramp: History = None,
     ) -> None:
-        """Apply a traction, force per reference area, to a group of facets.
+        """Apply a traction, that is a force per unit reference area, to a group of facets.
 
         Parameters
         ----------
         group : str
         x, y, z : float or callable
-            Components, as `value` of `add_pressure` [pressure].
+            Components of the traction at multiplier 1: numbers, or functions from reference positions (n, dim) [length] to
+            tractions (n,) [pressure].
         ramp : Ramp or iterable of (float, float), optional
-            History of the traction.
+            History of the traction; by default that of the analysis.
 
         Examples
         --------
@@ -98,11 +100,12 @@ class ModelLoads(ModelHeat):
         Parameters
         ----------
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         x, y, z : float or callable
-            Force per volume, as `value` of `add_pressure` [force / length^3].
+            Components of the force per unit volume at multiplier 1: numbers, or functions from reference positions (n, dim)
+            [length] to numbers (n,) [force / length^3].
         ramp : Ramp or iterable of (float, float), optional
-            History of the force.
+            History of the force; by default that of the analysis.
 
         Examples
         --------
@@ -129,16 +132,16 @@ class ModelLoads(ModelHeat):
         Parameters
         ----------
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         x, y, z : float
-            Gravitational acceleration [length / time^2], in units consistent with the others: -9810 with N, mm, MPa,
-            tonnes and seconds.
+            Components of the gravitational acceleration at multiplier 1, in units consistent with the other quantities: for
+            example -9810 with N, mm, MPa, tonnes and seconds [length / time^2].
         ramp : Ramp or iterable of (float, float), optional
-            History of the acceleration.
+            History of the acceleration; by default that of the analysis.
 
         Examples
         --------
-        Steel in mm, tonnes and seconds, so that forces are in N:
+        Weight of a steel block in mm, tonnes and seconds, so that forces are in N:
 
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
@@ -165,13 +168,13 @@ class ModelLoads(ModelHeat):
         speed : float
             Angular speed [radian / time].
         groups : str or sequence of str, optional
-            By default all solid cells.
+            Groups of solid cells; by default all solid cells.
         origin : sequence of 2 or 3 floats
-            A point of the axis [length].
+            A point on the axis of rotation [length].
         direction : sequence of 3 floats, optional
-            Along the axis, of any length [-]. By default (0, 0, 1), in axisymmetry the axis (0, 1, 0).
+            Vector of any length along the axis of rotation [-]; by default (0, 0, 1), and (0, 1, 0) in axisymmetry.
         ramp : Ramp or iterable of (float, float), optional
-            History of the force, which is proportional to the square of the speed.
+            History of the force; by default that of the analysis. The force is proportional to the square of the speed.
 
         Examples
         --------
@@ -197,22 +200,25 @@ class ModelLoads(ModelHeat):
     def add_hydrostatic_pressure(
         self, group: str, *, weight: float, level: float, axis: str | None = None, ramp: History = None
     ) -> None:
-        """Apply the pressure of a liquid, `weight` times the depth below its level, to a group of outer facets.
+        """Apply the pressure of a liquid at rest to a group of outer facets.
+
+        The pressure is `weight` times the depth below the free surface.
 
         Parameters
         ----------
         group : str
         weight : float
-            Weight of the liquid per volume [force / length^3].
+            Weight of the liquid per unit volume [force / length^3].
         level : float
-            Coordinate of its free surface, above which there is no pressure [length].
+            Coordinate of the free surface along `axis` [length].
         axis : str, optional
-            Vertical axis, positive upwards: by default the last one, y or z.
+            Vertical axis, ``"x"``, ``"y"`` or ``"z"``, positive upwards; by default the last axis of the mesh.
         ramp : Ramp or iterable of (float, float), optional
+            History of the pressure; by default that of the analysis.
 
         Examples
         --------
-        Water in N and mm, filled to y = 0.8:
+        Pressure of water with a free surface at y = 0.8, in N and mm:
 
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
@@ -243,28 +249,32 @@ class ModelLoads(ModelHeat):
         ----------
         group : str
         x, y, z : float or callable
-            Components: numbers, or functions of position for forces on nodes, as in `prescribe` [force]. In axisymmetry they
-            are those over the full circle; a radial force on facets is refused.
+            Components of the force at multiplier 1 [force]: numbers or, for forces on nodes, functions from reference
+            positions (n, dim) [length] to forces (n,). In axisymmetry they are integrated over the full circle, and a
+            radial force on facets raises an error.
         distribute : bool, optional
-            True: the components are the resultant, applied as a uniform traction to the facets of the group. False: they
-            act on every node of the group. By default True for a group of facets and False for a group of points.
+            If True, the components are the resultant, which is applied as a uniform traction to the facets of the group.
+            If False, the components act on every node of the group. The default is True for a group of facets and False
+            for a group of points.
         at : sequence of float (dim,), optional
-            Point through which the resultant acts [length]. It is distributed over the group in proportion to area and
-            distance from this point; linear terms balance the remaining moment.
+            Point through which the resultant acts [length]. The force on each node of the group is proportional to its
+            tributary area and to the weight of its distance from this point (see `weighting`). Additional forces that are
+            linear in the position make the moment about the point zero.
         weighting : str
-            How the force decays with the distance from `at`: ``"uniform"``, or to zero at the radius by a ``"linear"``,
-            ``"quadratic"`` or ``"cubic"`` function.
+            Weight as a function of the distance from `at`: ``"uniform"``, or ``"linear"``, ``"quadratic"`` or ``"cubic"``,
+            which decrease to zero at `radius`.
         radius : float, optional
-            Distance from `at` beyond which no force acts [length]; by default that of the farthest node.
+            Distance from `at` beyond which no force acts [length]; by default the distance of the farthest node.
         ramp : Ramp or iterable of (float, float), optional
+            History of the force; by default that of the analysis.
 
         Examples
         --------
         >>> import fastcontact as fc
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
-        >>> model.add_force("TOP", y=-100.0)  # in all, as a uniform traction
-        >>> model.add_force("TOP_RIGHT", x=1.0)  # on the node
-        >>> model.add_force("TOP", y=-100.0, at=(0.25, 1.0))  # off the centre
+        >>> model.add_force("TOP", y=-100.0)  # a resultant of 100, applied as a uniform traction
+        >>> model.add_force("TOP_RIGHT", x=1.0)  # a nodal force
+        >>> model.add_force("TOP", y=-100.0, at=(0.25, 1.0))  # an eccentric resultant
         """
         self.mesh.points_of(group)
         spread = spread_of(f"the force on '{group}'", at, weighting, radius)
@@ -306,12 +316,12 @@ class ModelLoads(ModelHeat):
         Parameters
         ----------
         group : str
-            On a group of facets the moment is distributed in proportion to area and distance from the centroid, without a
-            resultant force.
+            Name of a reference point or of a group. On a group of facets the moment is applied by forces in proportion to
+            tributary area and distance from the centroid, whose resultant is zero.
         x, y, z : float
-            Components [force times length]; in the plane z alone.
+            Components of the moment at multiplier 1 [force times length]; in 2D only z.
         ramp : Ramp or iterable of (float, float), optional
-            History of the moment.
+            History of the moment; by default that of the analysis.
 
         Examples
         --------
@@ -331,7 +341,7 @@ class ModelLoads(ModelHeat):
         self.loads.append(load)
 
     def forces_by_ramp(self) -> dict[Table | None, Array]:
-        """Return the nodal forces (n_points, dim) of all loads at multiplier 1, by history [force]."""
+        """Return the nodal forces (n_points, dim) [force] of all loads at multiplier 1, by history."""
         related = self.related_points()
         by_ramp: dict[Table | None, Array] = {}
         for load in self.loads:
@@ -341,14 +351,14 @@ class ModelLoads(ModelHeat):
         return by_ramp
 
     def following_pressures(self) -> list[tuple[FollowingPressure, Table | None]]:
-        """Return the follower pressures of finite strain with their histories."""
+        """Return the pressures that follow the deformed surface, with their histories; empty in small strain."""
         if self.strain == "small":
             return []
         pressures = [load for load in self.loads if isinstance(load, Pressure)]
         return [(FollowingPressure(self.mesh, self.kinematics, load), load.ramp) for load in pressures]
 
     def load_vector(self, load: Load) -> Array:
-        """Return the nodal forces (n_points, dim) of a load at multiplier 1 [force]."""
+        """Return the nodal forces (n_points, dim) [force] of a load at multiplier 1."""
         density = None
         if isinstance(load, InertiaLoad):
             density = Densities([m for m, _ in self.materials], self.material_of_cells())

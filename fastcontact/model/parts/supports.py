@@ -27,7 +27,7 @@ from fastcontact.model.relation_rows import NORMAL, along, normals_of
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Vectors or a function, as for materials; in the plane the first vector suffices.
+# Unit vectors or a function that returns them, as for materials; in 2D a single vector also suffices.
 SupportAxes = Axes | Sequence[float]
 
 
@@ -44,7 +44,12 @@ class ModelSupports(ModelContact):
         components : str
             ``"x"``, ``"y"``, ``"xy"``, in 3D also ``"z"``; or ``"normal"``, along the normals of a group of facets.
         axes : sequence or callable, optional
-            Directions (k, 3) [-] of the components, as in `prescribe`.
+            Directions (k, 3) [-] of x, y and z, as described for `prescribe`; by default the axes of the mesh.
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the group does not exist, or a component is unknown.
 
         Examples
         --------
@@ -79,19 +84,26 @@ class ModelSupports(ModelContact):
         ----------
         group : str
         normal : float or callable, optional
-            Outward displacement along the mean normal of the facets at each node, for groups of facets [length].
+            Outward displacement along the mean normal of the facets at each node; the group must contain facets [length].
         axes : sequence or callable, optional
-            Directions (k, 3) [-] of x, y and z, as unit vectors in rows or a function like those of materials; in the plane
-            a single vector of two numbers suffices. ``axes=fc.CylindricalAxes()``: radial, circumferential and axial.
+            Directions (k, 3) [-] of x, y and z: unit vectors in rows, or a function of position that returns them, as
+            described for `Orthotropic`. In 2D a single vector of two numbers also suffices. With
+            ``axes=fc.CylindricalAxes()`` x, y and z are the radial, circumferential and axial components.
         rotation : mapping, optional
-            Rigid rotation of the group about an axis, exact for any angle: ``angle`` at multiplier 1 [radian]; ``centre``,
-            a point of the axis (dim,) [length]; in 3D ``axis``, its direction; ``ramp``, a history of its own. All
-            components are then prescribed, and x, y and z translate the axis. Not in axisymmetry.
+            Rigid rotation of the group about an axis, exact for any angle. ``angle``: angle at multiplier 1 [radian].
+            ``centre``: a point (dim,) on the axis [length]. ``axis``, in 3D: direction of the axis. ``ramp``, optional:
+            history of the angle. All components of the group are then prescribed; x, y and z translate the axis.
+            Axisymmetric models do not support rotation.
         ramp : Ramp or iterable of (float, float), optional
             History of the displacement.
         **components : float or callable
-            ``x``, ``y``, ``z``: numbers, or functions from reference positions (n, dim) [length] to displacements (n,)
-            [length].
+            Displacements ``x``, ``y`` and ``z`` at multiplier 1: numbers, or functions from reference positions (n, dim)
+            [length] to displacements (n,) [length].
+
+        Raises
+        ------
+        MeshError, ModelError
+            If the group does not exist, or arguments are invalid or exclude each other.
 
         Examples
         --------
@@ -129,7 +141,7 @@ class ModelSupports(ModelContact):
             self._support(group, components, ramp)
 
     def _along_axes(self, group: str, components: Mapping[str, Value], axes: SupportAxes, ramp: History) -> None:
-        """Prescribe displacements along the user's axes, by multi-point constraints."""
+        """Prescribe displacements along the given axes by multi-point constraints."""
         dim, name = self.mesh.dim, f"the support of '{group}'"
         check_points(self.mesh, group, "no displacement can be prescribed on it")
         nodes = self.mesh.points_of(group).astype(np.intp)
@@ -165,12 +177,19 @@ class ModelSupports(ModelContact):
             self.supports.append(support)
 
     def prescribed(self) -> tuple[Mask, Array]:
-        """Return (fixed, values), both (n_points, dim): supported components, and their displacement at multiplier 1."""
+        """Return the mask of the prescribed components and their displacements at multiplier 1 [length].
+
+        Both arrays have the shape (n_points, dim); displacements are zero at components that are not prescribed.
+        """
         fixed, by_ramp = self.prescribed_by_ramp()
         return fixed, sum(by_ramp.values(), np.zeros(self.mesh.points.shape))
 
     def prescribed_by_ramp(self) -> tuple[Mask, dict[PartHistory, Array]]:
-        """Return supported components (n_points, dim), and their displacement at multiplier 1, by history [length]."""
+        """Return the mask (n_points, dim) of the prescribed components and their displacements at multiplier 1, by history.
+
+        Displacements have the shape (n_points, dim) [length] for each history. ModelError if two supports contradict each
+        other.
+        """
         fixed = np.zeros(self.mesh.points.shape, bool)
         by_ramp: dict[PartHistory, Array] = {}
         for number, support in enumerate(self.supports):
@@ -188,7 +207,7 @@ class ModelSupports(ModelContact):
         return fixed, by_ramp
 
     def _refuse(self, number: int, node: int) -> None:
-        """Raise ModelError, because a support contradicts an earlier one at a component of a node."""
+        """Raise a ModelError which states that support `number` contradicts an earlier support at `node`."""
         support = self.supports[number]
         for before in self.supports[:number]:
             if before.component == support.component and node in self.mesh.points_of(before.group):
@@ -214,11 +233,11 @@ class ModelSupports(ModelContact):
 
     @property
     def axis_nodes(self) -> Indices:
-        """Nodes (k,) on the axis of an axisymmetric model, where x is fixed without a support; otherwise empty."""
+        """Nodes (k,) on the axis of an axisymmetric model, where x is fixed without a support; empty for other models."""
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
     def _log_axis(self) -> None:
-        """Log the nodes held on the axis by symmetry rather than by a support."""
+        """Log the nodes whose radial displacement is fixed by the axial symmetry only, not by a support."""
         named = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
         held = np.setdiff1d(self.axis_nodes, np.concatenate(named)) if named else self.axis_nodes
         if len(held):

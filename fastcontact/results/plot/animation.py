@@ -1,4 +1,4 @@
-"""Animation of the deformed shape over the load steps."""
+"""Write animations of the deformed shape over the load steps."""
 
 from __future__ import annotations
 
@@ -25,19 +25,20 @@ from fastcontact.results.plot.shape import deformed_shape, scaled
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.step import StepResult
 
-# Suffixes of animations; all except the first are written by the program ffmpeg.
+# Suffixes of animation files; all formats except the first require the program ffmpeg.
 SUFFIXES = (".gif", ".mp4", ".mkv", ".webm")
-# Dots per inch: an animation contains many pictures.
+# Resolution of a frame [dots per inch], which is low because an animation contains many frames.
 RESOLUTION = 90
 
 
 @dataclass(frozen=True)
 class MovingPicture:
-    """An animation in a file, which notebooks show.
+    """An animation in a file, which notebooks display.
 
     Attributes
     ----------
     path : pathlib.Path
+        Path of the file.
     """
 
     path: Path
@@ -65,16 +66,18 @@ def animate(
     units: Units = UNKNOWN,
     view: tuple[float, float] = (25.0, -60.0),
 ) -> MovingPicture:
-    """Write an animation of the deformed shape over all load steps, with fixed axes and colour scale.
+    """Write an animation of the deformed shape over all load steps, with fixed axes and a fixed colour scale.
 
     Parameters
     ----------
     mesh : Mesh
+        The mesh of the steps.
     steps : sequence of StepResult
+        Steps of an analysis, one for each frame.
     path : str or path
-        File to write: ``.gif``, or ``.mp4``, ``.mkv``, ``.webm`` if the program ffmpeg is installed.
+        File to write, with the suffix ``.gif`` or, if the program ffmpeg is installed, ``.mp4``, ``.mkv`` or ``.webm``.
     field, scale, mirrored, units, view
-        As in `deformed_shape`.
+        Described for `deformed_shape`.
     pictures_per_second : int
         Frame rate [1/s].
     title : str
@@ -83,7 +86,7 @@ def animate(
     Returns
     -------
     MovingPicture
-        The animation, displayed at the end of a notebook cell.
+        The animation, which a notebook displays if it is the last value of a cell.
 
     Raises
     ------
@@ -130,7 +133,7 @@ def animate(
 
 
 def _show(axes: Any, box: tuple[Array, Array], view: tuple[float, float]) -> None:
-    """Set the limits of axes to those of all pictures."""
+    """Set the limits of the axes to the common limits of all frames."""
     if len(box[0]) == 3:
         show_box(axes, *box, view)
         settled(axes)
@@ -149,7 +152,7 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
         return PillowWriter(fps=pictures_per_second)
     if not FFMpegWriter.isAvailable():
         raise FastcontactError(f"'{path}' needs the program ffmpeg, which is not installed: write a .gif instead")
-    # An even number of dots in both directions, as most codecs require.
+    # Most codecs require an even number of dots in both directions.
     return FFMpegWriter(
         fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
     )
@@ -157,7 +160,10 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
 
 @contextlib.contextmanager
 def _failure_of_writer(path: Path) -> Iterator[None]:
-    """Convert failures of ffmpeg to one line with its last message; errors before the first frame are raised unchanged."""
+    """Convert failures of ffmpeg to a FastcontactError with its last message.
+
+    Errors before the first frame are raised unchanged.
+    """
     try:
         yield
     except subprocess.CalledProcessError as error:
@@ -173,7 +179,7 @@ def _failure_of_writer(path: Path) -> Iterator[None]:
 def _over_all(
     mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
 ) -> tuple[tuple[float, float], tuple[Array, Array]]:
-    """Return the limits of the colours, and the corners of the box around the bodies, over all steps."""
+    """Return the limits of the colour scale and the corners of the bounding box of the bodies over all steps."""
     low, high = np.full(mesh.dim, np.inf), np.full(mesh.dim, -np.inf)
     colours = (np.inf, -np.inf)
     for step in steps:

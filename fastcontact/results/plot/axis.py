@@ -1,4 +1,4 @@
-"""Stresses along the axis below a contact, compared with an analytic solution."""
+"""Plot the stresses along the axis below a contact, and those of analytic solutions for comparison."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, ne
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
-# Depth of the picture, in contact radii.
+# Depth of the plotted region, in contact radii.
 PLOTTED_DEPTH = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
 # Colours of these, and of the von Mises stress.
@@ -34,21 +34,23 @@ def axis_stress(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the stresses at the nodes on the axis of a contact over the depth below its surface.
+    """Plot the stresses at the nodes on the axis of a contact as functions of the depth below the surface.
 
-    The axis passes through the middle of the contact, along the normal there; in axisymmetry it is that of the bodies.
+    The axis passes through the middle of the contact along the normal of the surface; in axisymmetry it is the axis of
+    symmetry.
 
     Parameters
     ----------
     mesh : Mesh
-        Two-dimensional.
+        A two-dimensional mesh.
     step : StepResult
+        Results of a step.
     pair : str
-        Contact pair whose node nearest to the middle of the contact is the origin.
+        Name of the contact pair. The depth is measured from its node nearest to the middle of the contact.
     theories : mapping of str to object, optional
-        Curves by label: objects with ``stress_on_axis(depth)``, such as `analytic.hertz_point`.
+        Theories by label of the legend: objects with the method ``stress_on_axis(depth)``, such as `analytic.hertz_point`.
     title, units, ax
-        As in `pressure_profile`.
+        Described for `pressure_profile`.
 
     Returns
     -------
@@ -84,7 +86,7 @@ def axis_stress(
     for number, name in enumerate(bodies):
         here = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if here.any():  # the symbols of the second body are hollow, so that those of the first stay visible
+            if here.any():  # hollow symbols of the second body do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
                 axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     fine = np.linspace(0.0, reach, 400)
@@ -103,10 +105,10 @@ def axis_stress(
 
 
 def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, Indices, Array]:
-    """Return depth (n,) [length], side (n,) and stress (n, 4) of the nodes on the axis.
+    """Return the depth (n,) [length], the side (n,) and the stress (n, 4) [pressure] of the nodes on the axis.
 
-    The side is 1 above the surface and -1 below (right and left of it for a horizontal axis). Components are rotated: xx
-    across the axis, yy along it, xy between the two.
+    The side is 1 above the surface and -1 below it; for a horizontal axis it is 1 to the right and -1 to the left. Stress
+    components refer to rotated axes: xx is normal to the axis, yy along it, and xy the shear stress.
     """
     if mesh.dim != 2:
         raise FastcontactError("stresses along the axis need a two-dimensional mesh: in three dimensions probe points")
@@ -115,7 +117,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     height = (mesh.points[used] - pole) @ direction
     offset = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
-    # The normal of a deformed facet agrees with that of the surface to a few thousandths.
+    # The direction of the axis follows from the normal of a facet, which is accurate to a few thousandths.
     slope_tolerance = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
     on_axis = np.abs(offset) <= tolerance + slope_tolerance * np.abs(height)
     nodes, height = used[on_axis], height[on_axis]
@@ -123,7 +125,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
         raise FastcontactError(
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
-    # There are two nodes at the pole, one of each body, which are distinguished by the positions of their cells.
+    # At the pole each body has a node; the positions of the adjacent cells show to which body a node belongs.
     body_side = _sides(mesh, nodes, pole, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
@@ -131,7 +133,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
 
 
 def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
-    """Return the point at which the axis of a contact meets the surface (2,) [length], and its upward direction (2,) [-]."""
+    """Return the intersection (2,) [length] of the axis with the contact surface, and its upward direction (2,) [-]."""
     contact = contacts_of([step], pair)[0]
     nearest = int(np.argmin(np.abs(contact.place)))
     normal = contact.normal[nearest]
@@ -143,7 +145,7 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
 
 
 def _turned(stress: Array, direction: Array) -> Array:
-    """Return stress (n, 4) in axes across and along a direction (2,)."""
+    """Return the stress (n, 4) [pressure] in axes normal to and along a direction (2,) [-]."""
     along, across = direction, np.array([direction[1], -direction[0]])
     tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
     xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((across, across), (along, along), (across, along)))

@@ -1,4 +1,4 @@
-"""Maps of the pressure over a contact surface in three dimensions, and of shear or slip."""
+"""Plot maps of pressure, shear traction and slip on a contact surface in 3D."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from fastcontact.results.plot.patches import fill
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 
-# Margin of the drawn part of the surface around the closed part, relative to the half-width of the latter.
+# Margin of the plotted region around the closed part of the surface, relative to the half-width of the closed part.
 MARGIN = 0.15
-# Smallest length of the mean of the facets' normals for which a surface is drawn in projection along it.
+# Smallest magnitude of the mean unit normal for which a surface can be projected along this normal.
 LEAST_MEAN = 0.3
-# Fields next to the pressure: caption, and quantity of the unit.
+# Captions, and quantities that determine the units, of the fields that can be plotted next to the pressure.
 BESIDE = {
     "shear": ("shear traction", "pressure"),
     "slip": ("slip of the step", "length"),
@@ -42,34 +42,36 @@ def contact_map(
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot the pressure on the secondary surface of a contact and, with friction, the shear or slip beside it.
+    """Plot the pressure on the secondary surface of a contact pair in 3D and, with friction, the shear traction or the slip.
 
-    The undeformed surface is projected along its mean normal. Dots mark closed nodes; in the map of shear or slip,
-    sliding nodes are orange and arrows show the direction.
+    The surface is plotted in the reference configuration, projected along its mean normal. Dots mark closed nodes. In the
+    map of shear traction or slip, the dots of sliding nodes are orange and arrows show the direction.
 
     Parameters
     ----------
     mesh : Mesh
-        Three-dimensional.
+        A three-dimensional mesh.
     contact : ContactResult
+        Result of a contact pair.
     everything : bool
-        Draw the whole surface; by default the closed part and its surroundings.
+        Whether to plot the entire surface instead of the closed part and its surroundings.
     beside : {"shear", "slip", "slip_total"}
-        Quantity drawn beside the pressure; see `ContactResult`.
+        Quantity that is plotted next to the pressure; see `ContactResult`.
     title, units
-        As in `pressure_profile`.
-    axes : matplotlib Axes, two with friction, optional
+        Described for `pressure_profile`.
+    axes : sequence of matplotlib Axes, optional
+        Axes of the pressure and, with friction, of the other quantity; by default those of a new figure.
 
     Returns
     -------
     tuple of matplotlib Axes
-        Axes of the pressure and, with friction, of the shear or slip.
+        Axes of the pressure and, with friction, of the other quantity.
 
     Raises
     ------
     FastcontactError
-        If the mesh is not three-dimensional, does not contain the contact surface, or if the closed part of it goes
-        around a body.
+        If the mesh is not three-dimensional or does not contain the contact surface, or if the closed part of the surface
+        surrounds a body and cannot be projected.
 
     Examples
     --------
@@ -116,14 +118,14 @@ def contact_map(
 
 
 def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
-    """Return one or two axes; raises FastcontactError if too few are given."""
+    """Return one axes, or two if `both`; FastcontactError if too few are given."""
     if axes is not None:
         axes_given = list(np.atleast_1d(np.array(axes, dtype=object)))
         if len(axes_given) < 1 + both:
             raise FastcontactError(f"this contact has shear: it takes two axes, and {len(axes_given)} are given")
         return axes_given[: 1 + both]
     panels = list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
-    panels[0].figure.set_layout_engine("compressed")  # centres a narrow map, next to its colours
+    panels[0].figure.set_layout_engine("compressed")  # places the colour scale next to a narrow map
     return panels
 
 
@@ -140,9 +142,9 @@ def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
 
 
 def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Array, tuple[str, str] | None]:
-    """Return axes (2, 3) across the mean normal, and their names where they are coordinates.
+    """Return two axes (2, 3) normal to the mean normal, and their names if they are coordinate axes.
 
-    Facets are weighted by their pressure, or equally without any pressure.
+    The mean normal is weighted by the pressure of the facets; without pressure all facets have the same weight.
     """
     total, total_area = np.zeros(3), 0.0
     for facets in blocks.values():
@@ -159,7 +161,7 @@ def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
 
 
 def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
-    """Mark closed nodes, and sliding ones if there is shear."""
+    """Mark the closed nodes and, if `both`, the sliding nodes."""
     sliding = contact.active & ~contact.sticking if both else np.zeros(len(flat), bool)
     for name, here, colour in (
         ("sticking" if both else "closed", contact.active & ~sliding, "white"),
@@ -170,13 +172,13 @@ def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
 
 
 def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
-    """Draw the direction of shear or slip at nodes with at least a tenth of the largest value."""
+    """Draw the direction of shear traction or slip at nodes with at least a tenth of the largest value."""
     here = size > 0.1 * size.max()
     ax.quiver(*flat[here].T, *vectors[here].T, color="white", width=0.004, pivot="tail")
 
 
 def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
-    """Return which nodes (m,) are closed, or have a facet with pressure."""
+    """Return for each node (m,) whether it is closed or belongs to a facet with pressure."""
     carrying = contact.active.copy()
     for facets in blocks.values():
         carrying[facets[(contact.pressure[facets] != 0.0).any(axis=1)]] = True
@@ -184,9 +186,9 @@ def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
 
 
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:
-    """Show the closed part with a margin around it, or everything if nothing is closed.
+    """Set the limits of the axes to the closed part with a margin, or to the entire surface if no node is closed.
 
-    Return the height of the picture relative to that of a square, 0.55 to 1 [-].
+    Return the height of the figure relative to that of a square map, from 0.55 to 1 [-].
     """
     kept = flat[closed] if closed.any() else flat
     low, high = kept.min(axis=0), kept.max(axis=0)

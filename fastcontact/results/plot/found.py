@@ -1,4 +1,4 @@
-"""The contacts detected in a mesh: both sides of each, on pale bodies."""
+"""Plot the two sides of each contact pair that was found in a mesh."""
 
 from __future__ import annotations
 
@@ -20,15 +20,18 @@ from fastcontact.results.plot.solid import show_box
 def contacts(
     found_contacts: FoundContacts, *, view: tuple[float, float] = (25.0, -60.0), ax: Axes | None = None
 ) -> Axes:
-    """Plot the contact pairs of `find_contacts`, one colour each, with the secondary side darker than the primary one.
+    """Plot the contact pairs that `find_contacts` returns.
+
+    Each pair has a different colour, which is darker on the secondary side than on the primary side.
 
     Parameters
     ----------
     found_contacts : FoundContacts
+        The contact pairs.
     view : (float, float)
-        In 3D, elevation and azimuth of the view [degrees].
+        Elevation and azimuth of the view of a 3D mesh [degrees].
     ax : matplotlib Axes, optional
-        In 3D with ``projection="3d"``.
+        Axes of the plot, which in 3D must have ``projection="3d"``; by default those of a new figure.
 
     Returns
     -------
@@ -57,7 +60,7 @@ def contacts(
 
 
 def _sides(found_contacts: FoundContacts) -> list[tuple[str, str, Any, float]]:
-    """Return group, label, colour and opacity of each side."""
+    """Return the group, the label, the colour and the opacity of each side."""
     from matplotlib import colormaps
 
     colours = colormaps["tab10"].colors  # type: ignore[attr-defined]
@@ -77,7 +80,7 @@ def _draw_2d(axes: Any, found_contacts: FoundContacts) -> None:
             PolyCollection(list(outlines(name, mesh.points[cells])), facecolors="0.95", edgecolors="0.8", lw=0.3)
         )
     for group, label, colour, opacity in _sides(found_contacts):
-        # From end to end, through the middle node if there is one.
+        # Each line is drawn from end to end, through its mid-side node if it is quadratic.
         lines = [mesh.points[b[:, [0, 2, 1] if b.shape[1] == 3 else [0, 1]]] for b in mesh.cells_of(group, 1).values()]
         strokes = [line for block in lines for line in block]
         width = 4.0 if opacity < 1.0 else 1.5

@@ -1,4 +1,4 @@
-"""A contact pair over the load steps: force and radius; nodes that are open, stick and slide."""
+"""Plot the history of a contact pair: its force and radius, and the zones of open, sticking and sliding nodes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contact
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
-# Largest number of node counts shown side by side above the zones.
+# Largest number of steps at which the number of closed nodes is written above the zones.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
@@ -32,27 +32,31 @@ def history(
     units: Units = UNKNOWN,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
-    """Plot force and contact radius of a contact pair over the load steps.
+    """Plot the force and the contact radius of a contact pair as functions of the load factor or the approach.
 
-    If the resultant vanishes, as in a press fit, the sum of the normal forces is plotted.
+    If the normal forces balance each other, as in a press fit, their sum is plotted instead of the resultant.
 
     Parameters
     ----------
-    steps, pair
-        Steps of an analysis, name of a contact pair.
-    law : object with ``at_approach(d)``, optional
-        A theory, drawn if `approach` is given.
+    steps : sequence of StepResult
+        Steps of an analysis.
+    pair : str
+        Name of a contact pair.
+    law : object with the method ``at_approach(d)``, optional
+        A theory, such as `analytic.hertz_point`, which is plotted if `approach` is given.
     approach : float, optional
-        Approach of the bodies at load factor 1 [length]; the abscissa is then the approach.
+        Approach of the bodies at load factor 1 [length]; if it is given, the abscissa is the approach.
     share : float
-        Modelled fraction of the theory's contact [-], e.g. 0.25 for a quarter.
+        Fraction of the contact of the theory that the model represents, for example 0.25 for a quarter [-].
     title, units
-        As in `pressure_profile`.
+        Described for `pressure_profile`.
     axes : two matplotlib Axes, optional
+        Axes of the force and of the radius; by default those of a new figure.
 
     Returns
     -------
     tuple of matplotlib Axes
+        Axes of the force and of the radius.
 
     Examples
     --------
@@ -97,14 +101,14 @@ def history(
         if entries:
             ax.legend(fontsize=9, loc="upper left")
         top = float(ax.dataLim.y1)
-        room = 0.12 * (entries + 0.3) if entries else 0.05  # for the legend above the curves
+        room = 0.12 * (entries + 0.3) if entries else 0.05  # space for the legend above the curves
         ax.set_ylim(0.0, (1.0 + room) * top if 0.0 < top < np.inf else None)
         ax.set_xlim(left=min(0.0, float(x.min())))
     return axes
 
 
 def _brackets(ax: Any, x: Array, bracket: Array) -> None:
-    """Draw, at each step, a bar from the outermost closed node to the first open one; a tick if no node is open."""
+    """Draw a bar between the lower and the upper bound of the radius at each step, or a tick without an upper bound."""
     low, high = bracket.T
     known = np.isfinite(low)
     both = known & np.isfinite(high)
@@ -120,14 +124,16 @@ def _brackets(ax: Any, x: Array, bracket: Array) -> None:
 def contact_zones(
     steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNKNOWN, ax: Axes | None = None
 ) -> Axes:
-    """Plot the state of every secondary node over the load steps: open, closed (sticking, with friction) or sliding.
+    """Plot for every load step which secondary nodes are open, closed or, with friction, sticking and sliding.
 
     Parameters
     ----------
-    steps, pair
-        Steps of an analysis, name of a contact pair.
+    steps : sequence of StepResult
+        Steps of an analysis.
+    pair : str
+        Name of a contact pair.
     title, units, ax
-        As in `pressure_profile`.
+        Described for `pressure_profile`.
 
     Returns
     -------
@@ -136,7 +142,7 @@ def contact_zones(
     Raises
     ------
     FastcontactError
-        If there is no step.
+        If there are no steps.
 
     Examples
     --------

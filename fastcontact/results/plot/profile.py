@@ -1,4 +1,4 @@
-"""The pressure of a contact pair over the distance from its middle, with theory beside it."""
+"""Plot the pressure of a contact pair as a function of the distance from its middle, with theories for comparison."""
 
 from __future__ import annotations
 
@@ -28,26 +28,29 @@ def pressure_profile(
     units: Units = UNKNOWN,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the contact pressure over the distance from the middle of the contact, with theory for comparison.
+    """Plot the contact pressure as a function of the distance from the middle, with theories for comparison.
 
-    In plane problems the distance is the arc length, with a sign if nodes lie on both sides of the middle; see
-    `ContactResult.place`.
+    The distance is `ContactResult.place`, which in 2D is the arc length, with a sign if nodes lie on both sides of the
+    middle.
 
     Parameters
     ----------
     contact : ContactResult
-    theory : object of `analytic`, or one with ``pressure(r)``, ``pressure_max`` and ``radius``, optional
-        E.g. `analytic.hertz_point`.
-    other_theories : mapping of str to such an object, optional
-        Further curves by label of the legend.
+        Result of a contact pair.
+    theory : object, optional
+        A result of a function in `analytic`, such as `analytic.hertz_point`, or an object with the method ``pressure(r)``
+        and the attributes ``pressure_max`` and ``radius``.
+    other_theories : mapping of str to object, optional
+        Further theories by label of the legend.
     stress : ndarray (m,), optional
-        Normal stress at the contact nodes (compression negative), drawn with the opposite sign [pressure]; see
-        `normal_stress`.
+        Normal stress at the secondary nodes, negative in compression, which is plotted with the opposite sign [pressure];
+        see `normal_stress`.
     title : str
-    units : mapping
-        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, by default those of the model, if
-        any; see `UNITS`.
+        Title of the plot.
+    units : mapping of str to str, optional
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels; by default those of the model.
     ax : matplotlib Axes, optional
+        Axes of the plot; by default those of a new figure.
 
     Returns
     -------
@@ -102,13 +105,13 @@ def pressure_profile(
 
 
 def _largest(curve: PressureCurve, units: Units) -> str:
-    """Return the largest pressure of a theory as text, or the pressure if it is uniform."""
+    """Return a text with the largest pressure of a theory, or with its pressure if it is uniform."""
     name = "$p_0$" if np.isfinite(curve.radius) else "$p$"
     return f"{name} = {valued(curve.pressure_max, units, 'pressure')}"
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
-    """Return the curves of theories, by label of the legend."""
+    """Return the pressure curves of the theories, by label of the legend."""
     for theory_given in (theory, *others.values()):
         if theory_given is not None and not is_dataclass(theory_given) and pressure_curve(theory_given) is None:
             raise FastcontactError(
@@ -120,20 +123,23 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the limits of the abscissa: a third beyond the contact and the theories, on both sides if both exist."""
+    """Return the limits of the abscissa, which exceed the extent of the contact and of the theories by one third.
+
+    Both sides of the middle are included if the surface has nodes on both sides.
+    """
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
     farthest = float(np.abs(contact.place).max(initial=0.0))
     reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
     reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
     low, nearest = contact.place.min(initial=0.0), float(np.abs(contact.place).min(initial=np.inf))
-    if nearest > 0.2 * reach and not curves:  # a ring: there is nothing between its axis and its bore
+    if nearest > 0.2 * reach and not curves:  # a ring, where the range between axis and bore would be empty
         return nearest - 0.05 * (reach - nearest), reach
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
 def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units) -> None:
-    """Shade the edge of the contact: between the outermost closed node and the first open one."""
+    """Shade the range between the outermost closed node and the first open node."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
@@ -142,7 +148,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units)
         closed = contact.place[contact.active]
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
         ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
-    # If constraints lie between nodes, the bracket of the radius is narrower than that of the nodes.
+    # If constraints lie between nodes, the bounds of the radius are closer to each other than those two nodes.
     between = not np.allclose(half_width(contact.place, contact.active, contact.across), contact.radius, rtol=0.01)
     along = "" if contact.tangent is None else " (arc length)"
     label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}{along}"

@@ -1,4 +1,4 @@
-"""A plane section through a body in three dimensions, coloured by a field."""
+"""Plot a plane section through 3D bodies, coloured by a field."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from fastcontact.results.plot.shape import scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
-# By how much of the size of the body a plane that only touches it is moved inside.
+# Distance by which a plane that only touches a body is moved into the body, relative to the size of the body.
 INSIDE = 1e-7
-# Orders of the corners of a tetrahedron in which those on one side come first, by which of the four lie there.
+# Corners of a tetrahedron on one side of the plane, by the number whose binary digits state which corners lie there.
 _FIRST = {k: [i for i in range(4) if k >> i & 1] for k in range(16)}
 _REST = {k: [i for i in range(4) if not k >> i & 1] for k in range(16)}
 
@@ -46,20 +46,25 @@ def section(
 ) -> Axes:
     """Plot a plane section through a 3D mesh, coloured by a field, with the largest value marked.
 
-    The plane cuts the undeformed bodies; the section is drawn in its deformed position, projected along the normal.
+    The plane is defined in the reference configuration; the section is drawn in the deformed configuration, projected along
+    the normal.
 
     Parameters
     ----------
     mesh : Mesh
-        Three-dimensional.
+        A three-dimensional mesh.
     step : StepResult
-    point, normal : sequence of 3 floats
-        A point of the plane on the undeformed bodies [length]; its normal, of any length [-].
+        Results of a step.
+    point : sequence of 3 floats
+        A point of the plane in the reference configuration [length].
+    normal : sequence of 3 floats
+        Vector of any length normal to the plane [-].
     field, scale, edges, title, units
-        As in `deformed_shape`; edges are the lines along which the plane cuts facets.
+        Described for `deformed_shape`; the edges are the lines along which the plane cuts facets of cells.
     zoom : float, optional
-        Half the width of the part to draw, around the largest value [length].
+        Half the width of the plotted region around the largest value [length]; by default the entire section is plotted.
     ax : matplotlib Axes, optional
+        Axes of the plot; by default those of a new figure.
 
     Returns
     -------
@@ -68,7 +73,7 @@ def section(
     Raises
     ------
     FastcontactError
-        If the mesh is not three-dimensional, the normal is zero, or the plane does not meet the mesh.
+        If the mesh is not three-dimensional, the normal is zero, or the plane does not intersect the mesh.
 
     Examples
     --------
@@ -108,7 +113,7 @@ def section(
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
-    """Return point (3,) [length] and unit normal (3,) [-] of a plane; FastcontactError if they define none."""
+    """Return the point (3,) [length] and the unit normal (3,) [-] of a plane; FastcontactError if they are invalid."""
     if mesh.dim != 3:
         raise FastcontactError("sections are for meshes in three dimensions: draw the deformed shape of this one")
     at, direction = np.array(point, float), np.array(normal, float)
@@ -121,9 +126,10 @@ def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple
 
 
 def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tuple[Array, Array]:
-    """Return the section as triangles (n, 3, 7) and strokes (m, 2, 7): position, displacement, value at their corners.
+    """Return the section as triangles (n, 3, 7) and lines (m, 2, 7), with position, displacement and value at each corner.
 
-    A plane along the surface is moved slightly inside; raises FastcontactError if the plane does not meet the mesh.
+    A plane that coincides with a surface is moved slightly into the body. FastcontactError if the plane does not intersect
+    the mesh.
     """
     size = float(np.ptp(shown.mesh.points, axis=0).max())
     data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
@@ -139,7 +145,10 @@ def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tu
 
 
 def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
-    """Return the zero level of heights (n_points,), in tetrahedra from each cell's middle to triangles of its facets."""
+    """Return the intersection of the cells with the plane, where the heights (n_points,) of the points are zero.
+
+    Each cell is divided into tetrahedra between its centre and triangles of its facets.
+    """
     pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
     for name, block in mesh.solids.items():
         kind = elements.get(name)
@@ -160,9 +169,10 @@ def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
 
 
 def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
-    """Return the triangles (n, 3, k) of a level in tetrahedra (m, 4, k), and its strokes (n, 2, k) on their first faces.
+    """Return the intersection of tetrahedra (m, 4, k) with a plane as triangles (n, 3, k) and lines (n, 2, k).
 
-    `height` (m, 4) is that of the corners above the level; the first face is that of the first three corners.
+    The lines are the intersections with the first face of each tetrahedron, the face of the first three corners. `height`
+    (m, 4) contains the heights of the corners above the plane.
     """
     above = height >= 0.0
     pattern = above @ np.array([1, 2, 4, 8])
@@ -173,7 +183,7 @@ def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
             continue
         up, down = _FIRST[kind], _REST[kind]
         pairs = [(i, j) for i in up for j in down]
-        if len(pairs) == 4:  # around the quadrangle
+        if len(pairs) == 4:  # the intersection is a quadrangle
             pairs = [pairs[0], pairs[1], pairs[3], pairs[2]]
         points = np.stack([_between(data[here], height[here], i, j) for i, j in pairs], axis=1)
         pieces.append(points[:, :3])
@@ -186,7 +196,7 @@ def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
 
 
 def _between(data: Array, height: Array, i: int, j: int) -> Array:
-    """Return the data (n, k) interpolated to zero height between two corners."""
+    """Return the data (n, k) interpolated linearly between two corners to the point of zero height."""
     t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
     return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
 
@@ -198,6 +208,9 @@ def _stroke(axes: Any, strokes: Array) -> None:
 
 
 def _mark(axes: Any, at: Array, value: float, before: Array, points: Array, units: Units, shown: Field) -> None:
-    """Mark the largest value of the section, at (2,) in the picture, at `before` (3,) on the undeformed bodies."""
+    """Mark the largest value of the section at the position `at` (2,) of the plot.
+
+    The label contains the position `before` (3,) in the reference configuration.
+    """
     size = float(np.ptp(points, axis=0).max())
     mark(axes, at, f"{shown.described(value, units, ' on the section')}\nundeformed at {placed(before, size)}")

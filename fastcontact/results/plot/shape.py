@@ -1,4 +1,4 @@
-"""The deformed mesh coloured by a field, by default its von Mises stress."""
+"""Plot the deformed mesh, coloured by a field."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view_of_extreme
 from fastcontact.results.step import StepResult
 
-LARGEST = 1e30  # largest coordinate that can be drawn: the libraries multiply coordinates
+LARGEST = 1e30  # largest coordinate that can be plotted without overflow in products of coordinates
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
-    """Return displaced points (n, dim) [length]; FastcontactError if `scale` makes them too large to be drawn."""
+    """Return the displaced points (n, dim) [length]; FastcontactError if `scale` makes them too large to be plotted."""
     with np.errstate(all="ignore"):
         position = points + scale * displacement
         drawn = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
@@ -46,36 +46,46 @@ def deformed_shape(
     view: tuple[float, float] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    """Plot the deformed mesh (in 3D its visible surface), coloured by a field, with the largest value marked.
+    """Plot the deformed mesh, in 3D its visible surface, coloured by a field, with the largest value marked.
 
     Parameters
     ----------
-    mesh, step
-        Mesh and results of a step.
+    mesh : Mesh
+        The mesh of the step.
+    step : StepResult
+        Results of a step.
     field : str
-        ``"von_mises"``, ``"von_mises_signed"``, ``"tresca"``; ``"stress.xx"`` and so on, ``"stress.principal_max"``,
-        ``_mid``, ``_min``; ``"displacement"`` (its length), ``"displacement.x"`` and so on; names of `StepResult.cell_fields`
+        Name of the field: ``"von_mises"``, ``"von_mises_signed"`` or ``"tresca"``; a stress component such as
+        ``"stress.xx"``, or a principal stress ``"stress.principal_max"``, ``"stress.principal_mid"`` or
+        ``"stress.principal_min"``; ``"displacement"`` for its magnitude, or a component such as ``"displacement.x"``; or a
+        name in `StepResult.cell_fields`.
     scale : float
-        Factor on the displacements.
+        Factor by which displacements are multiplied [-].
     edges : bool, optional
-        Whether to draw edges; by default up to 5000 cells, or facets of the surface in 3D.
+        Whether to draw the edges of cells; by default if there are at most 5000 cells or, in 3D, facets of the surface.
     mirrored : bool
-        In 2D, also draw the mirror image at x = 0: the full section of an axisymmetric body.
+        Whether to draw also the mirror image at x = 0 of a 2D mesh, for example to show the full section of an axisymmetric
+        body.
     zoom : float, optional
-        In 2D, half the width of the part to draw, around the largest value [length]; FastcontactError in 3D.
+        Half the width of the plotted region around the largest value, only for 2D meshes [length].
     limits : (float, float), optional
         Limits of the colour scale, in the unit of the field.
     title, units
-        As in `pressure_profile`.
+        Described for `pressure_profile`.
     view : (float, float), optional
-        In 3D, elevation and azimuth of the view [degrees]; by default (25, -60), or the first of eight corners of the
-        bounding box from which the largest value is visible.
+        Elevation and azimuth of the view of a 3D mesh [degrees]. By default it is (25, -60) or, if the largest value is not
+        visible from there, the first of eight views from corners of the bounding box from which it is.
     ax : matplotlib Axes, optional
-        In 3D with ``projection="3d"``.
+        Axes of the plot, which in 3D must have ``projection="3d"``; by default those of a new figure.
 
     Returns
     -------
     matplotlib Axes
+
+    Raises
+    ------
+    FastcontactError
+        If there is no such field, or `zoom` is given for a 3D mesh.
 
     Examples
     --------
@@ -115,7 +125,7 @@ def deformed_shape(
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
-    """Mark the extreme value with its deformed and undeformed positions."""
+    """Mark the extreme value; its label contains the position in the deformed and in the reference configuration."""
     before = mesh.points[shown.node[shown.extreme]]
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     here, there = placed(at, size), placed(before, size)
@@ -126,9 +136,10 @@ def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidd
 def _draw(
     ax: Axes, shown: Field, nodes: Array, edges: bool | None, colours: tuple[float, float], box: Array
 ) -> Any:  # fmt: skip
-    """Draw the cells of a mesh in the plane at positions `nodes` (n_points, 2) in `colours` from one value to the other.
+    """Draw the cells of a 2D mesh at the positions `nodes` (n_points, 2), and return the artist with the colour scale.
 
-    By default edges are drawn if there are few cells within the box around `box` (n, 2). Return the artist with the colours.
+    `colours` contains the limits of the colour scale. By default edges are drawn if there are few cells in the bounding box
+    of the points `box` (n, 2).
     """
     from matplotlib.collections import PolyCollection
 

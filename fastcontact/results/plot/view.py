@@ -1,4 +1,4 @@
-"""Interactive view of a result in a window, by PyVista."""
+"""Show a result in an interactive window of PyVista."""
 
 from __future__ import annotations
 
@@ -12,18 +12,20 @@ from fastcontact.results.step import StepResult
 
 
 def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "", screenshot: str | None = None) -> None:
-    """Show the deformed mesh coloured by its von Mises stress in an interactive window.
+    """Show the deformed mesh, coloured by the von Mises stress, in an interactive window.
 
     Parameters
     ----------
     results : Results
         An open result file.
     step : StepResult
+        The step to show.
     scale : float
-        Factor on the displacements.
+        Factor by which displacements are multiplied [-].
     title : str
+        Title of the plot.
     screenshot : str, optional
-        Picture file to write instead of opening a window.
+        Path of an image file that is written instead of opening a window.
 
     Raises
     ------
