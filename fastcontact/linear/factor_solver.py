@@ -73,7 +73,7 @@ class KnownLoads:
         return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]
 
     def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
-        """Restore the right-hand sides of a `snapshot`, for the same matrix (n, n); `solve` is called for missing solutions."""
+        """Restore the right-hand sides of a `snapshot` for the same matrix (n, n); `solve` computes missing solutions."""
         now = list(zip(self._loads, self._solutions, strict=True))
         self._loads, self._solutions = [], []
         for entry in snapshot:
@@ -180,7 +180,7 @@ class FactorSolver(LinearSolver):
         return self._factors.solve(f)
 
     def extend(self, u: Array) -> Array:
-        """Return the displacements (n,) [length] under forces on the unknowns `last` alone, whose displacements are u (m,)."""
+        """Return the displacements (n,) [length] under forces on the unknowns `last` alone, which move by u (m,)."""
         self.counters.iterations += 1
         return self._factors.extended(u)
 
