@@ -117,7 +117,7 @@ class Continuous(PressureFieldFormulation):
         fine, w = fine_rule(block.element)
         measure = facet_measure(block.facets, block.element, self.points, fine, self.axisymmetric) * w
         areas = measure @ elements.get(block.element).shape(fine)
-        if block.element == "line3":  # on the axis the integral vanishes up to a term due to the curvature of the facet
+        if block.element == "line3":  # at the axis the integral vanishes, except for the curvature of the facet
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()
 
