@@ -27,81 +27,90 @@ HELD = 1e-2
 
 
 class ActiveDofs:
-    """All displacement components.
+    """Degrees of freedom of the contact problem: in this class all of them, without static condensation.
 
-    Below `u` and `lift` (n,) are vectors of all components, `part` (k,) of the active ones, `v` (l,) of active unknowns
-    [length].
+    In the methods, `u` (n,) are all displacement components, `lift` (n,) those that supports and multi-point constraints
+    prescribe if all unknowns are zero, `part` (k,) the active components, for which the contact problem is solved, and `v`
+    (l,) the unknowns that determine the active components [length].
 
     Parameters
     ----------
     system : System
     contact_dofs : ndarray of int
-        Components that constraints may involve.
+        Components that contact constraints may involve.
 
     Attributes
     ----------
     compared : ndarray of int
-        Active components on which contact depends.
+        Positions, among the active components, of those on which contact depends.
     """
 
     def __init__(self, system: System, contact_dofs: Indices) -> None:
         self._system, self.compared = system, contact_dofs
 
     def for_step(self, u: Array, lift: Array) -> ActiveDofs:
-        """Return the active components in a load step that begins at `u`, with prescribed displacements `lift`."""
+        """Return the object for a load step that begins at displacements `u`."""
         return self
 
     def loaded(self, loaded: Loaded) -> Loaded:
-        """Return the prepared matrix and its right-hand side for the active unknowns."""
+        """Return the prepared matrix and the right-hand side, reduced to the active unknowns."""
         return loaded
 
     def of(self, u: Array) -> Array:
-        """Return the active components of displacements."""
+        """Return the active components (k,) of `u`."""
         return u
 
     def put(self, u: Array, part: Array) -> Array:
-        """Return all displacements with the active ones replaced by `part`; may write into `u`."""
+        """Return all displacements (n,) with the active ones replaced by `part`; `u` may be modified."""
         return part
 
     def rows(self, rows: csr_array, offset: Array, lift: Array) -> tuple[csr_array, Array]:
-        """Return ``rows @ u + offset`` as rows and offset (m,) [length] for the active unknowns."""
+        """Return ``rows @ u + offset`` as an affine function of the active unknowns.
+
+        Returns
+        -------
+        rows : csr_array (m, l)
+            [-].
+        offset : ndarray (m,)
+            [length].
+        """
         return self._system.rows(rows, offset, lift)
 
     def unknowns(self, u: Array, lift: Array) -> Array:
-        """Return the active unknowns of displacements that satisfy supports and multi-point constraints."""
+        """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""
         return self._system.unknowns(u, lift)
 
     def displacement(self, v: Array, lift: Array) -> Array:
-        """Return the active components."""
+        """Return the active components (k,) for active unknowns `v`."""
         return self._system.displacement(v, lift)
 
     def varied(self, v: Array) -> Array:
-        """Return the change of the active components (k,) for a change v (l,) of the active unknowns [length]."""
+        """Return the change (k,) of the active components due to a change `v` of the active unknowns."""
         return self._system.displacement(v, np.zeros(len(self._system.free)))
 
     def reduced(self, force: Array) -> Array:
-        """Return the generalised forces (l,) of nodal forces (n,) on the active unknowns [force]."""
+        """Return the generalised forces (l,) on the active unknowns, given nodal forces (n,) [force]."""
         return self._system.reduced(force)
 
     def size(self, v: Array) -> float:
-        """Return the largest of all unknowns; condensed ones have their values from the beginning of the step."""
+        """Return the largest absolute value of all unknowns; condensed ones count with their values before the step."""
         return largest(v)
 
     def scale(self, u: Array, lift: Array) -> float:
-        """Return the sum of the largest displacement and the largest prescribed one."""
+        """Return the sum of the largest displacement and the largest prescribed displacement, as a scale [length]."""
         return largest(lift) + largest(u)
 
 
 class SurfaceDofs(ActiveDofs):
-    """The components of the contact surfaces, for solvers that condense the stiffness to them; see `ActiveDofs`.
+    """Degrees of freedom of the contact surfaces, for solvers that condense the stiffness matrix; see `ActiveDofs`.
 
     Parameters
     ----------
     system : System
     contact_dofs : ndarray of int (k,)
-        Components that constraints may involve, ascending.
+        Components that contact constraints may involve, in ascending order. They are the active components.
     unknowns : ndarray of int (l,)
-        Unknowns that they depend on, ascending; see `System.involved`.
+        Unknowns on which these components depend, in ascending order; see `System.involved`.
     """
 
     def __init__(self, system: System, contact_dofs: Indices, unknowns: Indices) -> None:
@@ -110,7 +119,7 @@ class SurfaceDofs(ActiveDofs):
         T = eye_array(len(system.free), format="csr") if system.T is None else system.T
         self._T = csr_array(T[contact_dofs][:, unknowns])
 
-    # Of one load step, see `for_step`.
+    # Prescribed displacements of the active components, and the largest condensed unknown; set by `for_step`.
     _lift: Array
     _unknown_beyond: float
 
@@ -167,7 +176,7 @@ class SurfaceDofs(ActiveDofs):
 def constraints_on_unknowns(dofs: ActiveDofs, constraints: Constraints, lift: Array, start: Array) -> Constraints:
     """Return constraints on all displacements as constraints on the active unknowns.
 
-    Rows of constraints whose two sides are held by supports are empty, see HELD.
+    Constraints whose two sides are held by supports get empty rows, see HELD.
 
     Parameters
     ----------

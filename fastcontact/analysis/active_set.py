@@ -1,18 +1,20 @@
-"""Frictionless contact by a primal-dual active set: ``K u = f + B.T multiplier``, ``0 <= multiplier _|_ gap >= 0``.
+"""Primal-dual active set method for frictionless contact.
 
-The gap is ``gap0 + B u + C multiplier``; the compliance C of the constraints themselves, symmetric and positive
-semidefinite, is absent in most formulations.
+With the stiffness matrix K, displacements u, external forces f, and the matrix B of the constraints, the problem is
+``K u = f + B.T multiplier`` with ``multiplier >= 0``, ``gap >= 0`` and ``multiplier * gap = 0`` for each constraint. The
+gap is ``gap0 + B u + C multiplier``. C is the compliance of the constraints themselves, symmetric and positive
+semidefinite; it is zero in most formulations.
 
-The primal-dual active set (Hintermueller, Ito and Kunisch, 2003) changes all wrong constraints at once and usually
-converges in a few solutions, but it can cycle. ``B K^-1 B.T + C`` is symmetric positive definite when the constraints are
-linearly independent, so the problem is a linear complementarity problem with a P-matrix; when a set recurs, the solver
-therefore continues by changing only the wrong constraint with the lowest number, which never repeats a set and so terminates
-(Murty, 1974).
+The primal-dual active set method (Hintermueller, Ito and Kunisch, 2003) changes all constraints whose signs are wrong at
+once. It usually converges in a few solutions, but it can cycle. If the constraints are linearly independent,
+``B K^-1 B.T + C`` is symmetric positive definite, so that the problem is a linear complementarity problem with a P-matrix.
+When a set recurs, the solver therefore continues with the least-index rule: it only changes the wrong constraint with the
+lowest number. No set is then repeated, and the method terminates (Murty, 1974).
 
-Iterative solvers need not finish for a set that will change anyway: they are monitored, and stopped as soon as signs beyond
-the error bound of their residual require another set. This terminates too: no iteration is stopped early to undo an earlier
-early change, since such contradicting signs are due to errors. Every constraint changes early at most once, and then the
-method above follows. Convergence is only accepted from a finished solution.
+An iterative linear solver need not converge for a set that will change anyway. It is monitored, and stopped as soon as signs
+beyond the error bound of its residual require a different set. The method still terminates: such an early change is never
+undone by a second one, because contradicting signs are due to errors, so that each constraint changes early at most once.
+Convergence is only accepted if the linear solution has converged.
 """
 
 from __future__ import annotations
@@ -33,28 +35,30 @@ from fastcontact.linear.protocol import Loaded
 def solve(
     loaded: Loaded, constraints: Constraints, active: Mask, accuracy: Accuracy, guess: Array | None = None
 ) -> Equilibrium:
-    """Find the displacement and the contact forces that satisfy every inequality.
+    """Return the displacements and the contact forces that satisfy all inequalities.
 
     Parameters
     ----------
     loaded : Loaded
-        Matrix and right-hand side, from a linear solver.
+        Prepared matrix K (n, n) with the right-hand side f (n,).
     constraints : Constraints
-        Rows for the unknowns of the solver; an empty row is a constraint that cannot become active.
+        The m constraints in the n unknowns of the solver. A constraint whose row of B is empty cannot become active.
     active : ndarray of bool (m,)
         Initial active set.
     accuracy : Accuracy
+        Tolerances of the signs, and the largest number of iterations.
     guess : ndarray (n,), optional
-        Unknowns to start iterative solvers from [length].
+        Initial guess of the unknowns, for iterative solvers [length].
 
     Returns
     -------
     Equilibrium
+        The solution. Its `settled` is False if the iteration has reached ``accuracy.max_iterations``.
     """
     signs = _Signs(constraints, accuracy)
     active = (active & signs.usable) | signs.equations
     seen: set[bytes] = set()
-    changed = np.zeros(len(active), bool)  # early
+    changed = np.zeros(len(active), bool)  # constraints that a monitored, unconverged solution has changed
     one_by_one = False
     iteration = 1
     while True:
@@ -80,7 +84,7 @@ def solve(
 
 
 def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Response:
-    """Return the response of a solution with active constraints `rows` to additional forces and gaps."""
+    """Return the linear response to additional forces and gaps, while the constraints `rows` (q,) stay active."""
     R, compliance = constraints.B[rows], constraints.normal_compliance
     F = loaded.delassus(R)[1]
     C = None if compliance is None else compliance.block(rows)
@@ -93,7 +97,7 @@ def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Respon
 
 
 def _first_changed(active: Mask, wanted: Mask) -> Mask:
-    """Return the active set with only the first of the wanted changes."""
+    """Return the active set (m,), changed only at the first constraint at which it differs from `wanted` (m,)."""
     active = active.copy()
     first = np.flatnonzero(active != wanted)[0]
     active[first] = wanted[first]
@@ -101,7 +105,15 @@ def _first_changed(active: Mask, wanted: Mask) -> Mask:
 
 
 class _Signs:
-    """The next active set of a solution: by the signs of gaps and multipliers, beyond their tolerances."""
+    """Rule for the next active set, by the signs of gaps and multipliers.
+
+    Attributes
+    ----------
+    usable : ndarray of bool (m,)
+        Constraints that can become active.
+    equations : ndarray of bool (m,)
+        Constraints that are equations, which are always active.
+    """
 
     def __init__(self, constraints: Constraints, accuracy: Accuracy) -> None:
         self._constraints, self._accuracy = constraints, accuracy
@@ -110,9 +122,20 @@ class _Signs:
         self.equations: Mask = none if constraints.equality is None else self.usable & constraints.equality
 
     def of(self, u: Array, forces: Array, active: Mask, iteration: int, error: float = 0.0) -> Equilibrium:
-        """Return the solution with unknowns (n,) and forces of the active constraints, and its next active set.
+        """Return the solution with its next active set.
 
-        Signs within the relative `error` of an unfinished solution are ignored.
+        Parameters
+        ----------
+        u : ndarray (n,)
+            Unknowns [length].
+        forces : ndarray (q,)
+            Multipliers of the q active constraints [force].
+        active : ndarray of bool (m,)
+            Active set of the solution.
+        iteration : int
+            Number of linear solutions so far.
+        error : float
+            Relative error of an unconverged solution; signs of values within this error are ignored [-].
         """
         multiplier = np.zeros(len(active))
         multiplier[active] = forces
@@ -127,12 +150,15 @@ class _Signs:
 
 
 class _Watch:
-    """Monitor that stops unfinished solutions when their signs require another active set; see `linear.protocol.Monitor`.
+    """Monitor that stops an iterative linear solver when signs require a different active set.
+
+    See `linear.protocol.Monitor`. `active` (m,) is the current active set, and `changed` (m,) are the constraints that an
+    unconverged solution has changed before.
 
     Attributes
     ----------
     wanted : ndarray of bool (m,) or None
-        The next active set by the last monitored solution; None if it equals the current one.
+        The next active set that the last monitored solution requires; None if the solver should continue.
     """
 
     def __init__(self, signs: _Signs, active: Mask, changed: Mask) -> None:
@@ -140,9 +166,9 @@ class _Watch:
         self.wanted: Mask | None = None
 
     def __call__(self, u: Array, forces: Array, error: float) -> bool:
-        """Return whether signs beyond the relative `error` require another set.
+        """Return whether signs beyond the relative `error` of the unconverged solution require a different set.
 
-        Sets that would undo changes of constraints `changed` before are ignored.
+        A set that would undo an earlier change of one of the constraints `changed` is ignored.
         """
         signs = self._signs.of(u, forces, self._active, 0, error)
         again = (signs.wanted != self._active) & self._changed

@@ -12,19 +12,20 @@ DEPTH = 5
 
 
 class Anderson:
-    """Mixing of the last iterates of ``x = G(x)`` so that their residuals ``G(x) - x`` cancel best.
+    """Anderson acceleration of the fixed-point iteration ``x = G(x)``.
 
-    Near a solution a linearly convergent fixed-point iteration behaves like a linear one, and mixing is equivalent to a
-    Krylov method (Walker and Ni, 2011). The residual only includes the components `where`, on which the iteration depends.
+    The next iterate is the affine combination of the last images G(x) for which the same combination of the residuals
+    ``G(x) - x`` has the smallest norm. Near a solution the iteration is nearly linear, and the method is equivalent to a
+    Krylov method (Walker and Ni, 2011). The residual only includes the components `where`.
 
     Parameters
     ----------
     depth : int
-        Number of earlier iterates in the mixture.
+        Number of earlier iterates in the combination.
     where : ndarray of int
         Components of x (n,) on which G depends.
     all_mixed : bool
-        Whether to mix the other components as well, as needed where they serve G as an initial guess.
+        Whether the other components are combined as well. This is required if G uses them as an initial guess.
     """
 
     def __init__(self, depth: int, where: Indices, all_mixed: bool = True) -> None:
@@ -34,12 +35,12 @@ class Anderson:
         self._images: list[Array] = []
 
     def restart(self) -> None:
-        """Discard earlier iterates, for another G."""
+        """Discard the earlier iterates, because G has changed."""
         self._residuals.clear()
         self._images.clear()
 
     def mixed(self, x: Array, image: Array) -> Array:
-        """Return the next iterate (n,) from the last one `x` and its image ``G(x)``, both (n,)."""
+        """Return the next iterate (n,), given the last iterate `x` (n,) and its `image` G(x) (n,)."""
         self._residuals.append((image - x)[self.where])
         self._images.append(image[self.mixes])
         del self._residuals[: -self.depth - 1], self._images[: -self.depth - 1]

@@ -1,4 +1,4 @@
-"""Equilibrium at the end of a load step: reactions and the residual."""
+"""Balance of forces at the end of a load step: reactions, and the residual with its bound."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.elasticity.springs import ground_force
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
-# Forces are significant above this multiple of the round-off of other rows.
+# A force is significant if it exceeds this multiple of the round-off of the internal forces in other rows.
 SIGNIFICANT = 100.0
 
 
@@ -27,19 +27,19 @@ class Balance:
     Attributes
     ----------
     reaction : ndarray (n_dofs of the mesh,)
-        Forces of supports, linear relations and springs to the ground [force].
+        Forces of supports, multi-point constraints and springs to the ground on the bodies [force].
     largest : float
-        The largest force of all steps so far [force].
+        Largest force of all steps so far [force].
     residual : float
-        The largest out-of-balance force; above the bound, less the round-off of its own row [force].
+        Largest residual force. If it exceeds `bound`, the round-off of its row has been subtracted [force].
     bound : float
-        Largest admissible residual [force].
+        Largest admissible residual force [force].
     relative : float
-        The largest out-of-balance force over the largest force of this step, zero where it is round-off.
+        Largest residual force relative to the largest force of this step; zero if all forces are round-off [-].
     noise : float
-        Forces up to this are round-off [force].
+        Level of round-off: smaller forces are not significant [force].
     energy : (float, float)
-        Strain energy, springs included, and plastic work since the beginning [energy].
+        Strain energy, including that of springs, and plastic work since the beginning of the analysis [energy].
     """
 
     reaction: Array
@@ -52,20 +52,21 @@ class Balance:
 
     @property
     def excess(self) -> float:
-        """Residual relative to its tolerance."""
+        """Ratio of the residual to its bound [-]."""
         return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
 
     @property
     def wanting(self) -> float:
-        """Factor by which the accuracy of solutions should increase.
+        """Factor by which the accuracy of linear solutions should increase [-].
 
-        With errors above round-off it is undecided whether there are any forces at all, e.g. after bodies have
-        separated: this is decided first, which takes much less than a balance of forces that may not exist.
+        If the residual exceeds the level of round-off, and this level exceeds the bound, it is unknown whether there are
+        any significant forces at all, for example after bodies have separated. The factor then only brings the residual to
+        the level of round-off, which needs far less accuracy than the bound.
         """
         return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
 
     def check(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> None:
-        """Raise ConvergenceError for step `index` if the residual is beyond its bound."""
+        """Raise a ConvergenceError for step `index` if the residual exceeds its bound."""
         if self.residual <= self.bound:
             return
         raise ConvergenceError(
@@ -76,6 +77,7 @@ class Balance:
         )
 
     def _remedy(self, iterative: bool) -> str:
+        """Return a remedy for a residual above its bound."""
         if iterative:
             return "use the direct solver"
         more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
@@ -89,7 +91,7 @@ def balance(
     problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float,
     internal: tuple[Array, tuple[float, float]],
 ) -> Balance:  # fmt: skip
-    """Return the reactions, and the residual of all other degrees of freedom.
+    """Return the reactions at supports, and the residual at all other degrees of freedom.
 
     Parameters
     ----------
@@ -99,9 +101,9 @@ def balance(
     contact_force, external : ndarray (n_dofs,)
         Nodal forces of contact and of loads [force].
     largest_so_far : float
-        The largest force of the steps so far [force].
+        Largest force of the earlier steps [force].
     internal : (ndarray (n_dofs,), (float, float))
-        Forces [force] and energies [energy] of the terms, see `Terms.residual`.
+        Nodal forces [force] and energies [energy] of all terms, see `Terms.residual`.
     """
     criteria, (force_of_terms, energy) = problem.criteria, internal
     out = force_of_terms - contact_force
@@ -113,8 +115,9 @@ def balance(
     bound = max(criteria.relative * force, criteria.absolute or 0.0)
     off, round_off, noise = residual, 0.0, 0.0
     if not 0.0 < residual <= bound:
-        # In stiff parts with large displacements round-off of their own rows may exceed the forces of soft parts.
-        # Without forces the criterion is 0/0: round-off of all rows decides. Either case costs a product with K.
+        # In stiff parts with large displacements, the round-off of internal forces may exceed the forces in soft parts. If
+        # there are no forces, the relative residual is not defined, and the round-off of internal forces is the bound. Both
+        # cases need the row sums, which cost as much as a product with K.
         row_sums = problem.system.K.row_sums(problem.accurate_to(u))
         residual = problem.system.balance(out, SUM_ROUND_OFF * row_sums)[1]
         round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
@@ -133,11 +136,26 @@ def balance(
 def _round_off(
     problem: Problem, row_sums: Array, forces: tuple[Array, ...], largest_force: float
 ) -> tuple[float, float]:
-    """Return the error bound of internal forces if all `forces` (n_dofs,) are round-off, and the level of round-off [force].
+    """Return a bound of the residual that is due to round-off, and the level of round-off.
 
-    `row_sums` (n_dofs,) is ``|K| |u|`` [force]. Forces are round-off if no degree of freedom has a force accurate to the
-    criterion, or the force itself may be round-off of other rows. Otherwise the forces define the bound: stiff parts with
-    large displacements must not hide the residual of soft ones.
+    Forces are significant if one of them exceeds the level of round-off, and if the round-off of its row is below the
+    criterion. The bound is then small, so that the round-off of stiff parts does not hide the residual of soft ones. If no
+    force is significant, the bound is the error of the internal forces.
+
+    Parameters
+    ----------
+    problem : Problem
+    row_sums : ndarray (n_dofs,)
+        ``abs(K) @ abs(u)`` [force].
+    forces : tuple of ndarray
+        Reactions, contact forces and external forces [force].
+    largest_force : float
+        Largest force of all steps so far [force].
+
+    Returns
+    -------
+    bound, level : float
+        [force].
     """
     slack = ROUND_OFF * largest_force
     noise = max(slack, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))

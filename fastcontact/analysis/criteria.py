@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fastcontact._tools.argument_types import typed
 from fastcontact.errors import ModelError
 
-# Fraction of the largest displacement or force above which errors are notable: a warning is given, and no criterion is
-# larger, because a state need not resemble the solution beyond it.
+# Relative error of displacements or forces above which a warning is given. It is also the largest admissible value of
+# criteria, because with larger ones the result need not be close to the solution.
 NOTABLE = 1e-2
 
 
@@ -21,40 +21,44 @@ class Criteria:
     Parameters
     ----------
     relative : float
-        Largest residual force divided by the largest applied force, reaction or contact force (RESI_GLOB_RELA), at most
-        0.01. If an iterative linear solver misses it, its tolerance is lowered or a factorisation takes over.
+        Largest admissible residual force, divided by the largest applied force, reaction or contact force; at most 0.01 [-]
+        (RESI_GLOB_RELA of code_aster). If an iterative linear solver does not reach it, its tolerance is reduced, or a
+        factorisation replaces it.
     absolute : float, optional
-        Largest admissible residual force [force] (RESI_GLOB_MAXI), an alternative to `relative`. By default, and if
-        there are no forces, the bound is the round-off of the internal forces.
+        Largest admissible residual force, as an alternative to `relative` [force] (RESI_GLOB_MAXI). If all forces vanish,
+        the bound is the round-off of the internal forces.
     geometry_updates : int or None
-        Number of contact detections on the deformed configuration after the first one of a step; None: until the
-        displacement changes by less than `geometry` times its largest component.
+        Number of times that the surfaces are paired on the deformed configuration after the first pairing of a step. By
+        default they are paired until the displacements change by less than `geometry` times the largest one.
     geometry : float
-        See `geometry_updates`; at most 0.01. If round-off makes the displacement scatter by more than that, the step ends
-        as soon as this is detected, and ``iterations["scatter"]`` holds the amount.
+        Relative change of the displacements at which the geometry has converged, at most 0.01 [-]. If displacements scatter
+        by more than this due to round-off, the step ends as soon as this is detected; ``iterations["scatter"]`` states the
+        scatter.
     keep_pairing : bool
-        Keep the pairing of the undeformed configuration, with its normals and projections, in all steps (REAC_GEOM =
-        'SANS'); for small motions only. Without friction the solution is then independent of the load path.
-    max_geometry_updates, max_active_set_iterations : int
-        Limits per step, and per pairing; the former also limits the exchanges between contact and heat conduction.
+        Whether to use the pairing of the undeformed configuration, with its normals and projections, in all steps
+        (REAC_GEOM = 'SANS'). This is only valid for small displacements. Without friction the solution then does not depend
+        on the load path.
+    max_geometry_updates : int
+        Largest number of pairings in a step, and of exchanges between contact and heat conduction.
+    max_active_set_iterations : int
+        Largest number of active-set iterations for a pairing.
     max_halvings : int
-        How many times a load step that does not converge is halved before the analysis stops (DECOUPE); twice as many
-        with nonlinear bodies, whose substeps double in size after each one that took few iterations. Substeps are
-        complete load steps, with friction along their path, but only the instants of the ramp yield results;
-        ``iterations["substeps"]`` lists the ends of the substeps. 0: never.
+        Number of times that a load step that does not converge is halved before the analysis stops (DECOUPE); zero means
+        never. With nonlinear bodies it is twice this number, and the size of substeps doubles after each one that took few
+        iterations. Substeps are complete load steps, so that friction follows their path, but only the instants of the ramp
+        have results; ``iterations["substeps"]`` lists the ends of the substeps.
     friction_while_touching : float, optional
-        If given, friction is solved along the path of load steps in which nodes close and slide: in increments with
-        one Delassus operator and the geometry at the end of the step. The increments are so small that in each the
-        shear of these nodes is at most this fraction of the friction capacity. Nodes then slide only from the instant
-        of contact on, and work of friction and shear are those of many steps. A value of 0.01 leaves errors of a few
-        percent; a step takes up to twice the time with the direct solver, and up to six times the iterations with
-        multigrid. With nonlinear bodies, steps are halved instead, at most
-        `max_halvings` times, while such nodes do more than this fraction of the work of friction so far. By default
-        slip is counted from the beginning of each step [-].
+        By default, slip is counted from the beginning of each load step. If this fraction is given, load steps in which
+        nodes close and slide are solved in increments, with one Delassus operator and with the geometry at the end of the
+        step, so that these nodes slide only after they have closed. The increments are so small that in each one the shear
+        of these nodes is at most this fraction of the coefficient of friction times the pressure. A value of 0.01 leaves
+        errors of a few percent in shear and frictional work; a step takes up to twice the time with the direct solver, and
+        up to six times the iterations with multigrid. With nonlinear bodies, steps are halved instead, at most
+        `max_halvings` times, as long as such nodes do more than this fraction of the frictional work so far [-].
 
     Examples
     --------
-    Contact detection three times per load step, as code_aster does by default:
+    Pair the surfaces three times per load step, as code_aster does by default:
 
     >>> import fastcontact as fc
     >>> criteria = fc.Criteria(geometry_updates=2)

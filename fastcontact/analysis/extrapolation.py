@@ -10,9 +10,9 @@ import numpy as np
 
 from fastcontact.arrays import Array, Mask
 
-# Gaps [length] and multipliers (m,) of a pair.
+# Gaps (m,) [length] and multipliers (m,) [force] of a pair.
 GapsAndForces = tuple[Array, Array]
-# No extrapolation to loads that grow by more than this multiple of the last increment.
+# Largest ratio of the current load increment to the last one at which steps are extrapolated.
 FARTHEST = 2.0
 
 
@@ -23,11 +23,11 @@ class Extrapolation:
     Attributes
     ----------
     ratio : float
-        The current load increment over the last one; zero without earlier steps.
+        Ratio of the current load increment to the last one; zero means no extrapolation [-].
     loads : tuple of tuples of ndarray
-        The loads of the current and of the last two steps: prescribed displacements [length] and forces [force].
+        The loads of the last two steps and of the current one: prescribed displacements [length] and forces [force].
     states : tuple of (ndarray (n,), dict of str to GapsAndForces)
-        Displacements [length], and gaps and multipliers by pair, of the last two converged steps.
+        Displacements [length], and gaps and multipliers of each pair, at the end of the last two steps.
     """
 
     ratio: float = 0.0
@@ -35,7 +35,10 @@ class Extrapolation:
     states: tuple[tuple[Array, Mapping[str, GapsAndForces]], ...] = ()
 
     def to(self, *parts: Array) -> Extrapolation:
-        """Return the extrapolation to the loads of the next step: prescribed displacements and forces, as separate arrays."""
+        """Return the extrapolation to the loads of the next step.
+
+        `parts` are arrays of prescribed displacements [length] and of forces [force].
+        """
         loads, ratio = (*self.loads[-2:], tuple(part.copy() for part in parts)), 0.0
         if len(self.states) == 2 and len(loads) == 3:
             growth = next((r for r in map(_ratio, *loads) if r is not None), 0.0)
@@ -43,18 +46,21 @@ class Extrapolation:
         return Extrapolation(ratio, loads, self.states)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces]) -> Extrapolation:
-        """Return a copy with the solution of the step: displacements (n,) [length], gaps and multipliers by pair."""
+        """Return a copy to which the solution of a step is added.
+
+        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair.
+        """
         return replace(self, states=(*self.states[-1:], (u.copy(), contact)))
 
     def displacement(self, u: Array) -> Array:
-        """Return initial displacements (n,) [length]; `u` (n,) are the last ones."""
+        """Return initial displacements (n,) of a step [length]; without extrapolation the last ones, `u` (n,)."""
         if not self.ratio:
             return u
         (before, _), (last, _) = self.states
         return last + self.ratio * (last - before)
 
     def active(self, name: str, last_active: Mask) -> Mask:
-        """Return an initial active set (m,) of a pair; `last_active` (m,) is the last one."""
+        """Return the initial active set (m,) of the pair `name`; without extrapolation `last_active` (m,)."""
         if not self.ratio:
             return last_active
         (_, first), (_, second) = self.states
@@ -68,7 +74,7 @@ class Extrapolation:
         return np.where(last_active, force > 0.0, gap < 0.0)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the data as plain values, without the last displacements."""
+        """Return the data as numbers, lists and arrays, without the last displacements, which are saved elsewhere."""
         return {
             "loads": [
                 [{"size": len(part), "places": np.flatnonzero(part), "values": part[part != 0.0]} for part in load]
@@ -80,23 +86,27 @@ class Extrapolation:
 
     @classmethod
     def from_dict(cls, kept: Mapping[str, Any], u: Array) -> Extrapolation:
-        """Return the extrapolation saved by `to_dict`; `u` (n,) are the last displacements [length]."""
+        """Return the extrapolation for data of `to_dict`; `u` (n,) are the last displacements [length]."""
         displacements = [u] if kept["before"] is None else [kept["before"], u]
         contacts = [{name: (both[0], both[1]) for name, both in contact.items()} for contact in kept["contact"]]
         states = tuple(zip(displacements, contacts)) if contacts else ()
-        # Earlier versions saved one array per step, of displacements or of forces, which cannot be told apart.
+        # Earlier versions saved one array per step, either of displacements or of forces, and did not save which.
         loads = tuple(tuple(map(_dense, load)) for load in kept["loads"] if isinstance(load, list))
         return cls(0.0, loads, states)
 
 
 def _ratio(first: Array, second: Array, third: Array) -> float | None:
-    """Return the last increment (n,) of a load over the one before; None where that is zero."""
+    """Return the ratio of the last increment of a load to the one before it; None if the latter is zero.
+
+    The load has the values `first`, `second` and `third` (n,) in successive steps.
+    """
     now, last = third - second, second - first
     size = float(np.sum(last * last))
     return float(np.sum(now * last)) / size if size else None
 
 
 def _dense(kept: Mapping[str, Any]) -> Array:
+    """Return the array (n,) whose nonzero entries `to_dict` has saved."""
     values = np.zeros(kept["size"])
     values[kept["places"]] = kept["values"]
     return values

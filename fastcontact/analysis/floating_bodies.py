@@ -1,10 +1,11 @@
-"""Floating bodies, held by contact alone: soft springs regularise their singular stiffness matrix.
+"""Floating bodies, which contact alone restrains: soft springs regularise their singular stiffness matrix.
 
-Each rigid-body mode gets one spring at one node, soft compared with the body there. With anchored springs the contact problem
-is regular; its solution stretches the springs, and they are anchored anew at the new position of the bodies. This is the
-proximal point method for the energy under the inequalities of contact (Rockafellar, 1976): where contact holds the bodies,
-each solution reduces the forces of the springs by about the ratio of their stiffness to that of the contact. Pairings
-begin at the last position, so that most need only one solution. At convergence the springs carry no force.
+Each rigid-body mode that supports leave free gets one spring at one node, which is soft compared with the body. The springs
+are anchored at a position of the bodies, so that the contact problem is regular. Its solution stretches the springs, and
+they are anchored again at the new position. This is the proximal point method for the minimum of the energy under the
+inequalities of contact (Rockafellar, 1976). If contact restrains the bodies, each solution reduces the forces of the
+springs by about the ratio of their stiffness to that of the contact. At convergence the springs carry no force. Each
+pairing begins at the last position, so that most pairings need only one solution.
 """
 
 from __future__ import annotations
@@ -25,36 +26,37 @@ from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
-# Stiffness of the springs over that of the body. Softer springs cost digits of factorisations (1e-6: an error of 3e-9 in a
-# wedge), stiffer ones more solutions: a stack with friction takes 4.1, 4.2 and 65 linear solutions with 1e-3, 1e-2 and
-# 1, a bolt 2.8, 5.3 and 27. Where rotated bodies under load have a negative stiffness, springs as stiff as the body
-# compensate it. The reference is the softest body: a contact with a stiff body is no stiffer than it (a layer 2e5 times
-# softer crept for 100 positions).
+# Stiffness of the springs relative to that of the softest body. Softer springs reduce the accuracy of factorisations (with
+# 1e-6, a wedge has an error of 3e-9). Stiffer ones need more solutions: with 1e-3, 1e-2 and 1, a stack with friction takes
+# 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. If rotated bodies under load have a negative stiffness,
+# springs with STIFF compensate it. The reference is the softest body, because a contact is not stiffer than the softer one
+# of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT, STIFF = 1e-3, 1.0
+# Largest number of positions for one pairing.
 MAX_POSITIONS = 100
-# Weight of displacements in the choice of springs where springs were before: a rubber block pressed on another by multigrid
-# takes 142 iterations in two steps, 157 without.
+# Weight of the displacements that springs held before, in the choice of new ones: with it, multigrid takes 142 iterations
+# in two steps of a rubber block that is pressed on another one, and 157 without.
 KEPT = 4.0
 
 
 @dataclass(frozen=True)
 class RigidPosition:
-    """A contact solution with slack springs.
+    """Result of the iteration of rigid positions.
 
     Attributes
     ----------
     state : Solution
-        The last solution, with the iterations of all positions.
+        The last solution, with the number of iterations for all positions.
     position : ndarray (k,)
-        Rigid displacement at the anchor of each spring [length].
+        Displacement at which each spring is anchored [length].
     spring_force : ndarray (k,)
         Remaining force of each spring [force].
     positions : int
-        Number of positions.
+        Number of positions, each of which takes one contact solution.
     slack : bool
-        Whether the springs are slack.
+        Whether the springs are slack: their forces are negligible.
     dofs : ndarray of int (k,)
-        The displacement that each spring holds.
+        Displacement component to which each spring is attached.
     """
 
     state: Solution
@@ -66,25 +68,26 @@ class RigidPosition:
 
 
 class FloatingBodies:
-    """Springs on the free rigid motions of a system.
+    """Springs of the floating bodies of a system, one for each of k free rigid-body modes.
 
     Parameters
     ----------
     motions : FreeMotions
+        The free rigid-body modes.
     system : System
     relative_stiffness : float
-        Stiffness of the springs over that of the body [-].
+        Stiffness of the springs relative to that of the softest body, SOFT or STIFF [-].
     before : ndarray of int, optional
-        Displacements of the springs before, which are kept unless others are much better.
+        Displacement components to which earlier springs were attached. They are kept unless others are much better.
 
     Attributes
     ----------
     names : list of str
-        Names of the free motions.
+        Names of the free rigid-body modes.
     dofs : ndarray of int (k,)
-        The displacement that each spring holds.
+        Displacement component to which each spring is attached.
     motions : FreeMotions
-        The free motions, each moving one of `dofs` by 1.
+        The free rigid-body modes, combined such that each one moves one of the components `dofs` by 1 and the others by 0.
     stiffness : float
         Stiffness of each spring [force / length].
     """
@@ -109,7 +112,7 @@ class FloatingBodies:
         self.stiffness = relative_stiffness * typical
 
     def with_springs(self, matrix: bsr_array) -> bsr_array:
-        """Return the matrix with the springs added."""
+        """Return the sum of `matrix` (n_dofs, n_dofs) and the stiffness of the springs [force / length]."""
         data, size = matrix.data.copy(), matrix.blocksize[0]
         for dof in self.dofs:
             row, component = divmod(int(dof), size)
@@ -119,15 +122,15 @@ class FloatingBodies:
         return bsr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
     def rigid(self, position: Array) -> Array:
-        """Return the displacements (n_dofs,) of the rigid position (k,)."""
+        """Return the displacements (n_dofs,) of the rigid-body motion with the values `position` (k,) at `dofs` [length]."""
         return np.asarray(self.motions.displacement @ position)
 
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
-        """Return a report of the regularisation, as plain numbers and strings.
+        """Return a report of the regularisation, as a dict of numbers and strings.
 
-        Keys: ``motions``, names of the free motions; ``springs``, their positions; ``spring_stiffness`` [force / length];
-        ``force_left``, the remaining force of each spring [force]; ``relative_to_load``, the largest one divided by the load;
-        ``positions``, number of rigid positions.
+        Its keys are ``motions``, the names of the free rigid-body modes; ``springs``, the components to which springs are
+        attached; ``spring_stiffness`` [force / length]; ``force_left``, the remaining force of each spring [force];
+        ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
         """
         left = np.abs(rigid.spring_force)
         return {
@@ -140,38 +143,39 @@ class FloatingBodies:
         }
 
     def _owner(self, motions: FreeMotions, dof: int, weightless: Mask) -> str:
-        """Return the name of the point or obstacle that a spring is attached to."""
+        """Return the name of the point or obstacle to which the spring at component `dof` is attached."""
         if not weightless[dof]:
             return f"point {dof // self._dim}"
         column = int(np.argmax(np.abs(motions.displacement[dof])))
         return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
 
     def moving(self, rigid: RigidPosition) -> list[str]:
-        """Return the names of the free motions with the largest remaining spring forces."""
+        """Return the names of the free rigid-body modes with the largest generalised forces of the springs."""
         work = np.abs(self._at_springs.T @ rigid.spring_force)
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
         self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float
     ) -> RigidPosition:
-        """Anchor the springs at the position of the last solution, until they are slack.
+        """Solve the contact problem and anchor the springs at the new position, repeatedly, until they are slack.
 
         Parameters
         ----------
         solve_at : callable
-            Solves the contact problem with the springs anchored at a position (k,).
+            Function that returns the `Solution` of the contact problem with the springs anchored at a position (k,) [length].
         start : ndarray (k,)
+            First position [length].
         load : float
-            Loads to which the forces of the springs are compared, in addition to contact forces [force].
+            Scale of the loads, to which the forces of the springs are compared, as well as to contact forces [force].
         noise : float
-            Accuracy of displacements, as a fraction of the largest one.
+            Relative accuracy of displacements, due to the tolerance of the linear solver [-].
         round_off : float
-            Accuracy of gaps [length].
+            Bound of the round-off of gaps [length].
 
         Returns
         -------
         RigidPosition
-            The last position if the springs do not become slack, or a contact problem does not converge.
+            The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
         position, before, iterations = start, np.inf, 0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
@@ -180,29 +184,38 @@ class FloatingBodies:
             elongation, iterations = state.u[self.dofs], iterations + state.iterations
             left = float(np.abs(elongation).max())
             force = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
-            # Less than round-off of the loads and of the contact forces (the only forces where prescribed displacements
-            # drive the bodies), or as little as the linear solver allows.
+            # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
+            # prescribed displacements move the bodies), or as small as the accuracy of the linear solver allows.
             slack = left <= max(ROUND_OFF * force, noise * float(np.abs(state.u).max()))
-            # Springs whose forces do not decrease any more count as slack sooner.
+            # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and left >= 0.5 * before and positions > 3:
                 slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
             if slack or not state.settled or positions == MAX_POSITIONS:
                 break
             if left > before:
                 mixing.restart()
-            # Extrapolated: parts far softer than the springs, such as a peeling layer, creep.
+            # Positions are accelerated, because parts that are much softer than the springs, such as a peeling layer,
+            # approach equilibrium slowly.
             position, before = mixing.mixed(position, position + elongation), left
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
 
 
 def _softest(diagonal: Array, solid: Mask, moving: Mask) -> float:
-    """Return the least median of `diagonal` (n,) over the `solid` unknowns of each of `moving` (n, k), and of the others."""
+    """Return the smallest median of `diagonal` (n,) over groups of unknowns.
+
+    The groups are the `solid` unknowns (n,) that each of k modes moves, marked in the columns of `moving` (n, k), and the
+    `solid` unknowns that no mode moves.
+    """
     groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
     return min(float(np.median(diagonal[group])) for group in groups if group.any())
 
 
 def _spring_dofs(motions: Array, weights: Array) -> Indices:
-    """Return k unknowns that determine the motions (n, k): unknowns of large `weights` (n,) far apart."""
+    """Return k of n unknowns whose values determine the amplitudes of the rigid-body modes `motions` (n, k).
+
+    They are chosen by a QR factorisation with column pivoting of the modes times `weights` (n,), so that they are far apart
+    and have large weights.
+    """
     _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
     return np.sort(order[: motions.shape[1]]).astype(np.intp)

@@ -1,4 +1,4 @@
-"""Contact geometry of a load step: detect, constrain, solve, accelerate, until displacements are stationary."""
+"""Iterate the contact geometry of a load step: pair the surfaces, solve, and accelerate, until displacements converge."""
 
 from __future__ import annotations
 
@@ -24,28 +24,30 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
-# One active-set iteration per pairing is cheapest near the solution but may cycle; after this many, the set converges first.
+# Number of pairings with one active-set iteration each. This is cheapest near the solution, but it may cycle; in later
+# pairings the active set therefore converges before the surfaces are paired again.
 SEMISMOOTH_UPDATES = 8
-# Pairings after which an iteration begins again from elsewhere, or with rounded edges: nodes flip between facets.
+# Number of pairings after which nodes are assumed to alternate between facets: the iteration then restarts without
+# extrapolation, or with rounded edges.
 PATIENT_UPDATES = 25
-# A solution may contract a change of the geometry less than that of the last Newton step by this factor.
+# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
 SAFETY = 3.0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """How the geometry of a load step is updated.
+    """Options of the iteration of the contact geometry in a load step.
 
     Attributes
     ----------
     until_settled : bool
-        Whether to update until the displacement converges; otherwise a fixed number of times.
+        Whether to update the geometry until the displacements converge. Otherwise the number of updates is fixed.
     limit : int
-        Largest number of updates, or that fixed number.
+        Largest number of updates, or the fixed number of updates.
     semismooth : bool
-        Whether to pair again after every active-set iteration at first.
+        Whether the first pairings take one active-set iteration each, instead of iterating the active set to convergence.
     extrapolate : bool
-        Whether to begin with displacements extrapolated along the load, and with inexact solutions.
+        Whether to begin with displacements extrapolated along the load, and with inexact linear solutions.
     newton : bool
         Whether to use Newton's method for the geometry, see `geometry_newton`.
     """
@@ -58,11 +60,11 @@ class Plan:
 
     @classmethod
     def of(cls, problem: Problem) -> Plan:
-        """Return the plan for the criteria, the formulations and the linear solver of a problem."""
+        """Return the options that suit the criteria, the formulations and the linear solver of a problem."""
         criteria, iterative = problem.criteria, problem.solver.iterative
         fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
         pairs = problem.pairs.values()
-        # Fluid pressure follows the surfaces themselves.
+        # Newton's method for the geometry is not available for pairs with fluid pressure.
         known = not any(pair.options.source is not None for pair in pairs)
         newton = known and not iterative and problem.floating_bodies is None
         return cls(
@@ -76,17 +78,18 @@ class Plan:
 
 @dataclass(frozen=True, eq=False)
 class SettledContact:
-    """The contact of a load step with converged geometry.
+    """The contact solution of a load step, with converged geometry.
 
     Attributes
     ----------
     constraints : StackedConstraints
+        Constraints of the last pairing.
     solution : Solution
     iterate : Iterate
     last_change : (int, float), optional
-        The fixed number of updates, and the relative change by the last one.
+        The number of updates, if it is fixed, and the relative change of the displacements in the last update.
     scatter : Scatter, optional
-        Scatter of the last geometries, where round-off prevented convergence to the criterion.
+        Scatter of the last iterates, if round-off prevents convergence to `Criteria.geometry`.
     """
 
     constraints: StackedConstraints
@@ -104,16 +107,17 @@ class SettledContact:
 def settle_geometry(
     step: StepContext, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
 ) -> SettledContact:
-    """Alternate between pairing and solving the contact problem until both are stationary.
+    """Alternate between pairing the surfaces and solving the contact problem until the displacements converge.
 
     Parameters
     ----------
     step : StepContext
     extrapolation : Extrapolation
     expected : float
-        Expected displacement in the first step, if only forces act [length].
+        Scale of the displacements in the first step, if only forces act [length].
     begun : Iterate, optional
-        Converged iterate of less accurate solutions; by default the step begins at the end of the last one.
+        Converged iterate of a less accurate iteration of the same step, to continue from. By default the iteration begins
+        with the displacements at the end of the previous step.
 
     Raises
     ------
@@ -133,8 +137,9 @@ def settle_geometry(
 
 
 def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
+    """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, plan = step.problem, Plan.of(step.problem)
-    if iterate.history:  # already started: no extrapolation
+    if iterate.history:  # The iterate is converged already, so that extrapolation would move it away.
         plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
     mixing, watch = _Mixing(Anderson(DEPTH, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
@@ -146,8 +151,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
         nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces)
-        solution, fraction = _solve_once(step, constraints, nodes, iterate, active, accuracy)
-        moved = _move(step, iterate, constraints, solution, fraction)
+        solution, displacement = _solve_once(step, constraints, nodes, iterate, active, accuracy)
+        moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
         if not plan.until_settled:
@@ -157,19 +162,19 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size):
             return settled
-        elif scatter := watch.seen(fraction, settled.force, moved.change, moved.size):
+        elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed, enough = None, tolerances.enough(moved.size)
         if mixing.newton(moved.change, enough) and solution.settled and nodes is None:
-            stepped = newton_step(step, constraints, solution, moved.before, fraction, enough / moved.change)
+            stepped = newton_step(step, constraints, solution, moved.before, displacement, enough / moved.change)
             mixed = None if stepped is None else mixing.stepped(*stepped)
         if mixed is None:
-            mixed = mixing.next(moved.before, fraction, solution, tolerances.inexact, constraints)
+            mixed = mixing.next(moved.before, displacement, solution, tolerances.inexact, constraints)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
-            # Whether nodes alternate between facets for ever depends on the initial guess.
+            # Whether nodes alternate between facets without end depends on the initial guess: try a different one.
             iterate.begin_again(step.state)
             mixing.restart()
             watch.forget()
@@ -179,7 +184,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             mixing.restart()
             watch.forget()
     if plan.until_settled:
-        changed = step.dofs.put(np.zeros_like(iterate.u), fraction - moved.before)
+        changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
     fixed = plan.limit and not problem.criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None)
@@ -189,7 +194,11 @@ def _solve_once(
     step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None, iterate: Iterate, active: Mask,
     accuracy: Accuracy,
 ) -> tuple[Solution, Array]:  # fmt: skip
-    """Solve the inequalities of a pairing, with one condition for `nodes` in several pairs or at both ends of a period."""
+    """Solve the inequalities of one pairing; see `solve_inequalities` for the values returned.
+
+    `nodes` are the nodes that belong to several pairs, or to both ends of a period: their constraints are merged. None
+    means that there are none.
+    """
     if nodes is None:
         return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
     once = nodes.once(constraints)
@@ -198,7 +207,17 @@ def _solve_once(
 
 @dataclass(frozen=True, eq=False)
 class _Moved:
-    """Change of the active displacements from those `before`, and the largest displacement (size) [length]."""
+    """Change of the displacements in one geometry update, in the components of `StepContext.dofs`.
+
+    Attributes
+    ----------
+    before : ndarray (k,)
+        Displacements before the update [length].
+    change : float
+        Largest change of a component [length].
+    size : float
+        Largest displacement, to which the change is compared [length].
+    """
 
     before: Array
     change: float
@@ -210,14 +229,14 @@ class _Moved:
 
 
 def _move(
-    step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, fraction: Array
+    step: StepContext, iterate: Iterate, constraints: StackedConstraints, solution: Solution, displacement: Array
 ) -> _Moved:
-    """Update the iterate by the active displacements `fraction` (k,) of a solution."""
+    """Store a solution, and its displacements (k,) of the components of `step.dofs` [length], in the iterate."""
     before = step.dofs.of(iterate.u)
-    iterate.u = step.dofs.put(iterate.u, fraction)
-    # Rigid-body motions of floating bodies are left out.
+    iterate.u = step.dofs.put(iterate.u, displacement)
+    # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
-    moved = _Moved(before, largest_difference(fraction, before), size)
+    moved = _Moved(before, largest_difference(displacement, before), size)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {
@@ -245,13 +264,15 @@ def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: 
 
 
 class _Mixing:
-    """Anderson mixing of the geometries with one active set, or Newton's method as long as it converges.
+    """Choice of the next iterate: by Newton's method while it converges, and by Anderson acceleration otherwise.
+
+    Anderson acceleration uses only iterates with the same active set, between which the geometry varies smoothly.
 
     Parameters
     ----------
     accelerated : Anderson
     newton : bool
-        Whether Newton's method is allowed.
+        Whether to use Newton's method for the geometry.
     """
 
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
@@ -262,29 +283,46 @@ class _Mixing:
     def newton(self, change: float, enough: float) -> bool:
         """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
 
-        Where nodes move to and fro between facets, changes increase, and Newton's method does not converge. Where the next
-        solution is expected to differ by no more than `enough` [length], it is cheaper.
+        Newton's method is given up once changes increase, because it does not converge if nodes alternate between facets. It
+        is also not used if the next solution alone is expected to change displacements by no more than `enough` [length],
+        because a solution without a Newton step costs less.
         """
         self._newton, self._change = self._newton and change <= self._change, change
         return self._newton and SAFETY * self._contraction * change > enough
 
     def stepped(self, next_pairing: Array, contraction: float) -> Array:
-        """Store by how much a solution contracts changes of the geometry, and return the displacements of a Newton step."""
+        """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
         self._contraction = contraction
         return next_pairing
 
     def restart(self) -> None:
-        """Discard the geometries so far."""
+        """Discard the earlier iterates."""
         self._accelerated.restart()
 
     def next(
-        self, before: Array, fraction: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
+        self, before: Array, displacement: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
     ) -> Array | None:
-        """Return the active displacements (k,) of the next pairing; None for those of the solution [length]."""
+        """Return the displacements for the next pairing by Anderson acceleration.
+
+        Parameters
+        ----------
+        before, displacement : ndarray (k,)
+            Displacements of the components of `StepContext.dofs`, at which the surfaces were paired, and of the solution
+            [length].
+        solution : Solution
+        inexact : bool
+            Whether the linear solution was inexact.
+        constraints : StackedConstraints
+
+        Returns
+        -------
+        ndarray (k,) or None
+            Displacements [length]; None means that the next pairing uses the displacements of the solution.
+        """
         state = constraints.state(solution.active)
         same = self._known is not None and np.array_equal(self._known, state)
         self._known = state if solution.settled else None
         if inexact or not same:
             self._accelerated.restart()
-        # An inexact solution may be stationary before it is accurate.
-        return None if inexact else self._accelerated.mixed(before, fraction)
+        # An inexact solution may hardly change although it is not accurate yet.
+        return None if inexact else self._accelerated.mixed(before, displacement)

@@ -1,4 +1,7 @@
-"""Contact problem with fixed geometry: active set or friction cone, and the positions of floating bodies."""
+"""Solve the contact problem with fixed geometry, by the active set method or by the solver for Coulomb friction.
+
+Floating bodies, which only contact restrains, are held by springs, whose positions are iterated; see `floating_bodies`.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 @dataclass(frozen=True, eq=False)
 class StepContext:
-    """Data that do not change between the pairings of a load step.
+    """Data that all pairings of the contact surfaces in a load step share.
 
     Attributes
     ----------
@@ -36,10 +39,12 @@ class StepContext:
         State at the beginning of the step.
     load : StepLoad
     loaded : Loaded
-        The matrix with the right-hand side of the step, for the active unknowns.
+        The prepared matrix with the right-hand side of the step, in the unknowns of `dofs`.
     dofs : ActiveDofs
+        Unknowns of the contact problem: all of them, or those of the contact surfaces after static condensation.
     path : Path or Slid, optional
-        Path along which friction is solved, or the beginning of its last increment.
+        Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
+        increment, if only this increment is solved again.
     """
 
     problem: Problem
@@ -51,21 +56,32 @@ class StepContext:
 
     @cached_property
     def prescribed_motion(self) -> Array:
-        """Displacement of all components in the step by supports and multi-point constraints alone (n_dofs,) [length]."""
+        """Increment (n_dofs,) of the displacements in the step that supports and multi-point constraints impose [length].
+
+        It is the change of the displacements if all unknowns keep their values.
+        """
         system, start, zero = self.problem.system, self.state.u, np.zeros_like(self.state.u)
         return self.load.lift - (start - system.displacement(system.unknowns(start, zero), zero))
 
     def driven(self, constraints: Constraints) -> Array:
-        """Return the slips (k, m) imposed by supports and obstacles in the step, over the largest imposed motion [-]."""
+        """Return the slips imposed by supports and obstacles in the step.
+
+        They are divided by the largest imposed displacement, so that round-off can be recognised.
+
+        Returns
+        -------
+        ndarray (k, m)
+            Imposed slip along each of k tangents of the m constraints [-].
+        """
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
-        # Without prescribed displacements, the motion is the round-off of earlier motions.
+        # Without prescribed displacements in this step, `prescribed_motion` is the round-off of earlier displacements.
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
             for name, rows in constraints.rows().items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
-                    # The slips of a motion along the normals are round-off.
+                    # If the obstacle moves along the normals, its slips are round-off of this motion.
                     moved = end.get(name, np.zeros(1)) - begin.get(name, 0.0)
                     scale = max(scale, largest(constraints.slip0[:, rows]), largest(moved))
         return np.asarray(slips / (scale or 1.0))
@@ -74,23 +90,26 @@ class StepContext:
 def solve_inequalities(
     step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy
 ) -> tuple[Solution, Array]:
-    """Solve the inequalities of a pairing.
+    """Solve the contact inequalities of one pairing of the surfaces.
 
     Parameters
     ----------
     step : StepContext
     constraints : Constraints
+        The m constraints, in terms of all displacements.
     iterate : Iterate
-        Receives the solution with friction, and the rigid position of floating bodies.
+        Its displacements are the initial guess. It receives the solution if there is friction, and the rigid position of
+        floating bodies.
     active : ndarray of bool (m,)
         Initial active set.
     accuracy : Accuracy
+        Tolerances and limits of the iteration.
 
     Returns
     -------
     solution : Solution
-    part : ndarray (k,)
-        The active displacements [length].
+    displacement : ndarray (k,)
+        Displacements of the components of `step.dofs`; with floating bodies, all displacements (n_dofs,) [length].
     """
     if step.problem.floating_bodies is not None:
         return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
@@ -101,9 +120,10 @@ def solve_inequalities(
 def _solve(
     step: StepContext, constraints: Constraints, iterate: Iterate, active: Mask, accuracy: Accuracy, lift: Array, guess: Array
 ) -> Solution:  # fmt: skip
-    """Solve in the unknowns that remain after supports and multi-point constraints.
+    """Solve in the unknowns that remain after supports and multi-point constraints are eliminated.
 
-    `lift` (n_dofs,) are the displacements that these prescribe, `guess` (n_dofs,) initial displacements [length].
+    `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero, and
+    `guess` (n_dofs,) are initial displacements [length].
     """
     condensed = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
     u = step.dofs.unknowns(guess, lift)
@@ -129,7 +149,11 @@ def _with_floating_bodies(
     active: Mask,
     accuracy: Accuracy,
 ) -> tuple[Solution, Array]:
-    """Solve for bodies held by contact alone; return the solution and all displacements (n_dofs,)."""
+    """Solve if contact alone restrains some bodies; return the solution and all displacements (n_dofs,) [length].
+
+    The springs at rigid positions hold these bodies; `FloatingBodies.settle` iterates the positions until the springs are
+    free of forces.
+    """
     problem, state, lift = step.problem, step.state, step.load.lift
     known, near = active, iterate.u
 
@@ -159,19 +183,21 @@ def _with_floating_bodies(
 
 
 def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:
-    """Return which constraints (m,) are closed by displacements u (n_dofs,) of rigid bodies in contact."""
+    """Return which constraints (m,) are closed at the displacements u (n_dofs,) [length] that `_approach` computed."""
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
-    # The linear program for rigid bodies is accurate to 1e-7.
+    # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
     return constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
 
 
 def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:
-    """Return the rigid displacements (k,) at which contact balances the loads [length].
+    """Return the amplitudes (k,) of the free rigid-body motions at which contact can balance the loads [length].
+
+    u (n_dofs,) are the displacements from which the bodies move [length].
 
     Raises
     ------
     ConvergenceError
-        If no contact stops them.
+        If no contact stops the bodies.
     """
     work = generalised(bodies.motions, step.load.force, step.state.largest_rigid_force)
     rows, gap0 = resisting(constraints)

@@ -1,4 +1,4 @@
-"""Iterate of the geometry loop: the data passed from one contact detection to the next."""
+"""Iterate of the geometry loop: the data that one pairing of the contact surfaces passes to the next."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 
 @dataclass(eq=False)
 class Iterate:
-    """Iterate of a load step between two pairings, owned and modified by the geometry loop.
+    """Iterate of a load step between two pairings of the contact surfaces; `geometry_loop` modifies it.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class Iterate:
     rigid : RigidPosition, optional
         The last position of floating bodies.
     history : list of dict
-        An entry for each pairing.
+        Convergence data of each pairing, see `StepResult.iterations`.
     rounded : bool
         Whether edges between facets are rounded, because nodes alternated between facets.
     """
@@ -53,7 +53,7 @@ class Iterate:
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
     def begin_again(self, state: State) -> None:
-        """Return to the beginning of the load step; the history is kept."""
+        """Reset the iterate to the state at the beginning of the load step; the history is kept."""
         self.u, self.active, self.pressure = state.u.copy(), dict(state.active), dict(state.pressure)
         self.frictional = self.rigid = None
 
@@ -89,6 +89,7 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
 
 
 def _start_of(name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+    """Return the initial active set of the contact pair `name`; see `initially_active`."""
     if constraints.equality is not None and constraints.equality.all():
         return constraints.equality
     if name not in iterate.active:

@@ -1,4 +1,4 @@
-"""The problem of a Newton iteration: terms of the equilibrium linearised about displacements."""
+"""The linear problem of a Newton iteration: the terms of the equilibrium are linearised about given displacements."""
 
 from __future__ import annotations
 
@@ -25,20 +25,21 @@ from fastcontact.linear.sparse_rows import sum_of_blocks
 def linearised(
     problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool
 ) -> Problem:
-    """Return the problem with the tangent of its terms at displacements u (n_dofs,) [length].
+    """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
 
     Parameters
     ----------
     problem : Problem
     K : bsr_array (n, n)
-        See `Terms.tangent`; modified in place.
+        Tangent of the terms, see `Terms.tangent`; it is modified [force / length].
     u : ndarray (n_dofs,)
+        Displacements about which the terms are linearised [length].
     rigid : RigidPosition, optional
-        The last position of floating bodies.
+        Last position of floating bodies.
     contact : csr_array (n_dofs, n_dofs), optional
-        Stiffness of contact forces that vanish or are known at u [force / length].
+        Stiffness due to contact forces, which is added to K [force / length].
     stiff : bool
-        Whether springs of floating bodies are as stiff as the bodies.
+        Whether the springs of floating bodies are as stiff as the bodies.
     """
     K = problem.force_driven.stiffness(K)
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
@@ -53,9 +54,13 @@ def linearised(
 
 
 def load_about(problem: Problem, terms: Terms, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:
-    """Return the load of the problem linearised at displacements u (n_dofs,) [length]."""
+    """Return the load of the problem that is linearised about displacements u (n_dofs,) [length].
+
+    Its forces are the external forces minus the forces of the terms at u, plus the product of the tangent and u.
+    """
     force = load.force - terms.residual(u)[0] + problem.system.K @ u
-    if problem.floating_bodies is not None and rigid is not None:  # rotated bodies under load are not free to rotate
+    if problem.floating_bodies is not None and rigid is not None:
+        # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
         force -= problem.system.K @ problem.floating_bodies.rigid(u[problem.floating_bodies.dofs])
     return replace(load, force=force)
 
@@ -63,7 +68,10 @@ def load_about(problem: Problem, terms: Terms, u: Array, load: StepLoad, rigid: 
 def _floating(
     problem: Problem, system: System, u: Array, rigid: RigidPosition | None, stiff: bool
 ) -> FloatingBodies | None:
-    """Return the floating bodies of a tangent: where they rotate, with the free motions of the deformed configuration."""
+    """Return the floating bodies for a tangent at displacements u.
+
+    In finite strain, their rigid-body modes are those of the deformed configuration.
+    """
     if problem.floating_bodies is None or problem.bodies is None or not problem.bodies.finite:
         return problem.floating_bodies
     motions = problem.floating_bodies.motions

@@ -1,8 +1,9 @@
-"""One load step: predict, solve the contact problem, check equilibrium, recover. Start reading the code here.
+"""Solve one load step: evaluate loads, iterate to equilibrium with contact, compute results. Start reading the code here.
 
-First the loads and the prescribed displacements at the end of the step are evaluated. Then the contact geometry is iterated:
-the surfaces are paired on the deformed configuration, the inequalities of contact are solved, and both are repeated until
-the displacement converges. All displacements, the force balance and the stresses follow from the contact forces.
+First the loads and the prescribed displacements at the end of the step are evaluated. Newton's method (`newton`) then solves
+the equilibrium. Each of its iterations pairs the contact surfaces on the deformed configuration, solves the inequalities of
+contact, and repeats both until the displacements converge (`geometry_loop`). The remaining displacements, the force balance
+and the stresses follow from the contact forces.
 """
 
 from __future__ import annotations
@@ -43,9 +44,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     state : State
         State at the end of the previous step; it is not modified.
     index : int
-        Number of the step, starting at 1.
+        Number of the step; the first step has the number 1.
     instant : float
-        Pseudo-time at the end of the step.
+        Pseudo-time at the end of the step, at which the load multipliers are evaluated [-].
 
     Raises
     ------
@@ -70,7 +71,23 @@ def _ended(
     problem: Problem, start: State, load: StepLoad, solution: StepEquilibrium, iterations: dict[str, Any],
     instant: tuple[int, float], heated: Heated | None,
 ) -> tuple[State, StepResult]:  # fmt: skip
-    """Return the state and the result of a load step from its equilibrium."""
+    """Return the state and the result at the end of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        State in which the step began, see `prepare_start`.
+    load : StepLoad
+    solution : StepEquilibrium
+        The converged equilibrium.
+    iterations : dict
+        Numbers of iterations, for `StepResult.iterations`; it is modified.
+    instant : (int, float)
+        Number of the step, and pseudo-time at its end.
+    heated : Heated, optional
+        The converged temperatures, in models with conduction of heat.
+    """
     settled, u, balanced = solution.settled, solution.u, solution.balance
     end = replace(
         start, u=u, largest_force=balanced.largest, obstacles=problem.obstacles_at(load, u), angles=load.angles,
@@ -99,7 +116,9 @@ def _ended(
 def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> Beginning:
     """Return the beginning of a load step.
 
-    The expected displacement matters in the first step if only forces act: it is then the only scale of the displacements.
+    Its state is the `state` at the end of the previous step, with the bounds of round-off and of forces for the new `load`.
+    If only forces act in the first step, no displacement is known. The solution without contact then provides the scale of
+    the displacements, `Beginning.expected`.
     """
     pushing = expansion_as_force(problem, load)
     loaded = with_loads(problem, pushing)
@@ -115,7 +134,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
-    # Nonlinear bodies are extrapolated along the motions of obstacles, too.
+    # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads.
     motions = [] if problem.bodies is None else load.obstacles.values()
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,

@@ -1,4 +1,4 @@
-"""The discrete problem of an analysis: built once from a model and immutable."""
+"""The discrete problem of an analysis, which is prepared from a model and is immutable."""
 
 from __future__ import annotations
 
@@ -49,26 +49,29 @@ ByRamp = Mapping[PartHistory, Array]
 class StepLoad:
     """The loads at the end of a load step.
 
+    n_dofs is the number of displacement components of all points and of the force-driven obstacles.
+
     Attributes
     ----------
     lift : ndarray (n_dofs,)
-        Displacements prescribed by supports and multi-point constraints, see `System.lift` [length].
+        Displacements that supports and multi-point constraints prescribe if all unknowns are zero, see `System.lift`
+        [length].
     force : ndarray (n_dofs,)
         External forces [force].
     obstacles : dict of str to ndarray (dim,)
         Prescribed displacement of the rigid obstacle of each contact pair [length].
     clearance_factors : dict of str to float
-        Factor on the clearances of each contact pair.
+        Factor of the clearances of each contact pair whose clearances vary [-].
     angles : dict of str to float
-        Rotation of the rigid obstacle of each contact pair, where one rotates [radian].
+        Rotation angle of each rigid obstacle that rotates, by the name of its contact pair [radian].
     following : tuple of float
-        Factors of pressures that follow the surface.
+        Factor of each pressure that follows the deformed surface [-].
     friction_factors : dict of str to float
-        Factor on the coefficient of friction of each contact pair, where it varies.
+        Factor of the coefficient of friction of each contact pair whose coefficient varies [-].
     fluids : dict of str to float
-        Fluid pressure at the source of each contact pair [pressure].
+        Fluid pressure at the source of each contact pair that fluid may enter [pressure].
     rise : ndarray (n_points,), optional
-        Temperature rise for the expansion of nonlinear bodies [temperature]; for linear ones it is part of the forces.
+        Temperature rise, which expands nonlinear bodies [temperature]. For linear bodies, `force` includes its nodal forces.
     """
 
     lift: Array
@@ -92,37 +95,38 @@ class Problem:
     ramp : Ramp
     criteria : Criteria
     solver : LinearSolver
-        Linear solver with the stiffness matrix; its snapshot is part of the state.
+        Linear solver, prepared for the stiffness matrix. Its snapshot is part of the state.
     pairs : dict of str to Formulation
-        The contact pairs.
+        The formulation of each contact pair.
     field : MaterialField
-        Materials of all solid cells.
+        Material constants of all solid cells.
     system : System
-        Stiffness, supports and multi-point constraints.
+        Stiffness matrix, supports and multi-point constraints.
     floating_bodies : FloatingBodies, optional
-        Bodies held by contact alone, if there are any.
+        Springs of bodies that contact alone restrains, if there are such bodies.
     dofs : ActiveDofs
-        The displacement components that a pairing solves for.
+        Degrees of freedom of the contact problem.
     contact_dofs : ndarray of int
-        Components that constraints may involve.
+        Displacement components that contact constraints may involve.
     sides : MaterialSides
-        Interfaces between materials, each of which has its own nodal stresses.
+        Interfaces between materials; nodal stresses are averaged separately on each side.
     force_driven : ForceDrivenObstacles
-        Rigid obstacles that forces move.
+        Rigid obstacles that are driven by forces.
     prescribed, forces : dict of ramp table to ndarray (n_points + n_driven, dim)
-        By history, displacements [length] and nodal forces [force] at multiplier 1.
+        For each ramp, the prescribed displacements [length] and the nodal forces [force] at multiplier 1.
     solver_at_rest : dict
-        The snapshot of the solver before the first step.
+        Snapshot of the solver before the first step.
     doubtful : tuple of str
-        Warnings about the stiffness.
+        Warnings about the stiffness of springs.
     bodies : NonlinearBodies, optional
-        The solid cells, where they are nonlinear; `system` and `solver` then hold their stiffness before any load.
+        The solid cells, if they are nonlinear. `system` and `solver` then hold the tangent at zero displacements, or at
+        `linearised_at`.
     following : sequence of (FollowingPressure, ramp table)
-        Pressures in finite strain; `forces` contain them in the undeformed configuration.
+        Pressures that follow the deformed surface. `forces` include their forces on the undeformed surface.
     heat : Heat, optional
-        Heat conduction, if any.
+        Heat conduction, if the model has any.
     linearised_at : ndarray (n_dofs,), optional
-        Displacements at which `system` is the tangent of bodies in finite strain [length].
+        Displacements at which `system` is the tangent, for bodies in finite strain [length].
     """
 
     model: Model
@@ -148,12 +152,12 @@ class Problem:
 
     @cached_property
     def material_of_cells(self) -> Numbers:
-        """Material number of every solid cell (n_solids,); equal materials have one number."""
+        """Number (n_solids,) of the material of each solid cell; equal materials have the same number."""
         return np.concatenate(list(self.field.distinct.values()))
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Number of points, those of driven obstacles included, and dimension."""
+        """Number of points, including one for each force-driven obstacle, and dimension."""
         return self.force_driven.n_dofs // self.model.mesh.dim, self.model.mesh.dim
 
     def load_at(self, instant: float) -> StepLoad:
@@ -188,13 +192,14 @@ class Problem:
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
-        """Return the displacements (n_points, dim) of the mesh in all displacements u (n_dofs,) [length]."""
+        """Return the displacements (n_points, dim) of the mesh, given all displacements u (n_dofs,) [length]."""
         return u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
 
     def accurate_to(self, u: Array) -> Array:
-        """Return the lengths (n_dofs,) to whose round-off displacements u (n_dofs,) are accurate [length].
+        """Return the lengths (n_dofs,) whose round-off limits the accuracy of displacements u (n_dofs,) [length].
 
-        These are the displacements themselves, or coordinates where bodies rotate and displacements are their differences.
+        These are the displacements. In finite strain the distances from the centre of the mesh are added, because
+        displacements of rotated bodies are differences of coordinates.
         """
         if self.bodies is None or not self.bodies.finite:
             return u
@@ -203,7 +208,10 @@ class Problem:
         return sizes
 
     def obstacles_at(self, load: StepLoad, u: Array) -> dict[str, Array]:
-        """Return the displacement (dim,) of the rigid obstacle of each contact pair; u holds force-driven ones."""
+        """Return the displacement (dim,) of the rigid obstacle of each contact pair [length].
+
+        Prescribed displacements are those of `load`. Displacements of force-driven obstacles are taken from u (n_dofs,).
+        """
         return {**load.obstacles, **self.force_driven.positions(u)}
 
     def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
@@ -217,9 +225,9 @@ class Problem:
             State at the beginning of the load step.
         load : StepLoad
         displacement : ndarray (n_points, dim)
-            Displacement of the mesh [length].
+            Displacements of the points at which the surfaces are paired [length].
         u : ndarray (n_dofs,)
-            All displacements, including those of force-driven obstacles [length].
+            All displacements, which include those of force-driven obstacles [length].
         """
         still, worn = np.zeros(self.model.mesh.dim), state.worn.get(name)
         return Configuration(
@@ -244,9 +252,10 @@ class Problem:
     def deformed(
         self, u: Array, start: State, rise: Array | None, *, geometric: int = WHOLE, tangent: bool = True
     ) -> DeformedBodies:
-        """Return `NonlinearBodies.at` displacements u (n_dofs,) [length], in a load step that begins at `start`.
+        """Return the nonlinear bodies at displacements u (n_dofs,) [length], see `NonlinearBodies.at`.
 
-        `rise` (n_points,) is the temperature rise at the end of the step [temperature].
+        `start` is the state at the beginning of the load step, and `rise` (n_points,) the temperature rise at its end
+        [temperature].
         """
         assert self.bodies is not None
         before = start.history or self.bodies.beginning
@@ -254,7 +263,7 @@ class Problem:
 
     def initial_state(self) -> State:
         """Return the state before the first load step."""
-        # Gaps are differences of coordinates, and no more accurate than these.
+        # Gaps are differences of coordinates, whose round-off limits their accuracy.
         round_off = 8 * np.finfo(float).eps * float(np.abs(self.model.mesh.points).max())
         return State(
             np.zeros(self.force_driven.n_dofs),
@@ -275,7 +284,10 @@ def prepare(
     linear_tolerance: float = TOLERANCE,
     linear_precision: str | None = None,
 ) -> Problem:
-    """Assemble a checked model, and prepare the linear solver; see `run.solve` for the parameters."""
+    """Return the discrete problem of a checked model: assemble the stiffness matrix, and prepare the linear solver.
+
+    For the parameters see `run.solve`.
+    """
     mesh, driven = model.mesh, model.force_driven
     supported, prescribed = model.prescribed_by_ramp()
     held = HeldMotions.of(supported, stacked_rows(model.relations, model.n_dofs))
@@ -319,7 +331,11 @@ def prepare(
 
 
 def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
-    """Return the rigid-body modes that supports and constraints leave free, at a `displacement` (n_points, dim) [length]."""
+    """Return the rigid-body modes that supports and multi-point constraints leave free.
+
+    Rotations are those of the configuration with the displacements `displacement` (n_points, dim) [length]; `supported`
+    (n_points, dim) are the components that supports hold.
+    """
     deformed = model.mesh.replace(points=model.mesh.points + displacement)
     motions = free_motions(deformed, model.kinematics, supported, model.holding_rows())
     return model.force_driven.motions(motions)
@@ -329,16 +345,20 @@ def active_dofs(
     system: System, contact_dofs: Indices, involved: Indices, pairs: Mapping[str, Formulation],
     bodies: FloatingBodies | None, solver: LinearSolver,
 ) -> ActiveDofs:  # fmt: skip
-    """Return the displacement components that a pairing solves for."""
+    """Return the degrees of freedom of the contact problem.
+
+    They are those of the contact surfaces if the solver condenses the stiffness matrix to the unknowns `involved`, and if
+    no body is floating. Otherwise they are all degrees of freedom.
+    """
     if pairs and bodies is None and solver.condenses:
         return SurfaceDofs(system, contact_dofs, involved)
     return ActiveDofs(system, contact_dofs)
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
-    """Return the nodal forces (n_points, dim) of loads, heat and initial states at multiplier 1, by history [force].
+    """Return the nodal forces (n_points, dim) at multiplier 1 for each ramp [force].
 
-    In nonlinear bodies thermal expansion enters the strains, not the forces.
+    They include loads, initial states and, for linear bodies, thermal expansion.
     """
     forces = model.forces_by_ramp()
     thermal = {} if model.nonlinear else model.thermal_forces_by_ramp()
@@ -350,11 +370,27 @@ def _forces(model: Model) -> dict[Table | None, Array]:
 def prepare_solver(
     solver: LinearSolver, system: System, bodies: FloatingBodies | None, modes: Array, involved: Indices
 ) -> Indices:
-    """Set the matrix of the linear solver, with the springs of floating bodies; return the unknowns of contact."""
+    """Prepare the linear solver for the matrix of a system, with the springs of floating bodies added.
+
+    Parameters
+    ----------
+    solver : LinearSolver
+    system : System
+    bodies : FloatingBodies or None
+    modes : ndarray (n_dofs, k)
+        Near null space for multigrid.
+    involved : ndarray of int
+        Unknowns that contact constraints may involve.
+
+    Returns
+    -------
+    ndarray of int
+        `involved`, including the unknowns at springs.
+    """
     matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
     if bodies is not None:
         involved = np.union1d(involved, bodies.dofs)
-    modes = system.unknowns_of(modes)  # releases those of all displacements
+    modes = system.unknowns_of(modes)  # frees the memory of the modes of all displacements
     kept = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.keep(kept)
@@ -370,12 +406,10 @@ def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) ->
 
 
 def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:
-    """Return the near null space (n_dofs, k) for multigrid: rigid-body modes of the mesh [-].
+    """Return the near null space (n_dofs, k) for multigrid: the rigid-body modes of the mesh [-].
 
-    Rotational modes are those at a `displacement` (n_points, dim) [length].
-
-    One set suffices for all bodies, since aggregates do not span several. In axisymmetry the in-plane motions are no
-    rigid-body modes of the ring, but away from the axis their energy is small, and aggregates of two unknowns per node need
-    them.
+    Rotations are those of the configuration with the displacements `displacement` (n_points, dim) [length]. One set of
+    modes suffices for all bodies, because aggregates do not extend over several bodies. In axisymmetric models, motions in
+    the plane are not rigid-body modes of the ring, but their energy is small away from the axis, and aggregates need them.
     """
     return rigid_modes(model.mesh.points + displacement, "plane_strain" if model.mesh.dim == 2 else model.kinematics)

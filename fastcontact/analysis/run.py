@@ -1,4 +1,4 @@
-"""Run an analysis: load steps in order, from the beginning or from a restart, each yielded as it converges."""
+"""Run an analysis: solve its load steps in order, from the undeformed state or from the last step of an earlier run."""
 
 from __future__ import annotations
 
@@ -38,45 +38,48 @@ def solve(
     resume: Sequence[StepResult] = (),
     progress: bool = False,
 ) -> Steps:
-    """Solve a model along a load ramp, from its beginning or from the last of some earlier steps.
+    """Solve a model along a load ramp, from its beginning or from the last step of an earlier analysis.
 
     Parameters
     ----------
     model : Model
     ramp : Ramp, int or array, optional
-        A number of equal steps (20 by default); the load factors (n,) at the ends of the steps; or points (instant,
-        multiplier) (n, 2) of the load function, of which all but the first end a step [-].
+        One of: the number of equal load steps (20 by default); the load factors (n,) at the ends of the steps [-]; or
+        points (instant, multiplier) (n, 2) of the load function [-], where each point but the first is the end of a step.
     linear_solver : str
         ``"direct"``, ``"cholmod"``, ``"amg"``, ``"pyamg"`` or ``"auto"``; see `linear.choice.make`.
     linear_tolerance : float
-        Relative residual of iterative linear solvers, at most 0.001; `Criteria.relative` if that is smaller.
+        Relative residual at which iterative linear solvers stop, at most 0.001. `Criteria.relative` replaces it if that
+        is smaller.
     linear_precision : {"single", "double"}, optional
         Precision inside the multigrid cycle, by default single; the solution is always in double precision.
     criteria : Criteria, optional
     on_step : callable, optional
         Called with every new `StepResult`, e.g. ``ResultWriter.write``. To keep only some steps, see `solve_steps`.
     resume : sequence of StepResult
-        Earlier steps to continue from, as if the analysis had not stopped: those that `solve` returned,
-        ``open_results(path)`` or ``ResultWriter.done``. Linear solver, tolerances, limits and the rest of the ramp may
-        differ.
+        Earlier steps of the same model, after which the analysis continues as if it had not stopped: the value that
+        `solve` returned, ``open_results(path)`` or ``ResultWriter.done``. The linear solver, tolerances, limits and the
+        remaining ramp may differ from those of the earlier analysis.
     progress : bool
         Show the progress on standard error, updated after every step, also in notebooks.
 
     Returns
     -------
     Steps
-        List of StepResult, those of `resume` and the new ones; only the last one holds its `restart`.
+        List of StepResult: the steps of `resume`, then the new ones. Only the last step holds its `restart`, the data
+        from which another analysis can continue.
 
     Raises
     ------
     MeshError, ModelError, ContactError, ConvergenceError
-        If the model is invalid or differs from that of `resume`; if a step does not converge even when halved
-        (`Criteria.max_halvings`), in which case `on_step` has received all steps before it.
+        If the model is invalid, or differs from the model of `resume`; if a step does not converge even after it has been
+        halved `Criteria.max_halvings` times. In the latter case `on_step` has received all steps before this one.
 
     Warns
     -----
     FastcontactWarning
-        If the model or, at the end, the result is doubtful; each warning states a number and is stored in the steps.
+        Before the first step if the model is doubtful, and after the last step if the result is. Each warning states a
+        number and is stored in `StepResult.warnings`.
 
     Examples
     --------
@@ -106,7 +109,7 @@ def _gathered(
     progress: Progress,
     on_step: Callable[[StepResult], None] | None,
 ) -> Steps:
-    """Return `steps` extended by the new ones; `on_step` is called after each."""
+    """Append to `steps` those that ``new()`` yields, and return `steps`; `on_step` is called with each new step."""
     with progress:
         for step in new():
             if on_step is not None:
@@ -129,16 +132,16 @@ def solve_steps(
     criteria: Criteria | None = None,
     resume: Sequence[StepResult] = (),
 ) -> Iterator[StepResult]:
-    """Solve a model step by step: each step is computed when it is requested, and none is kept.
+    """Solve a model step by step: compute each step when it is requested, and keep none in memory.
 
-    `solve` returns all steps, which take 80 bytes per point and step in 2D, 120 in 3D. Here only the steps that the
-    caller keeps stay in memory, and the analysis may be stopped after any step. Parameters, errors and warnings are those
-    of `solve`; an invalid model is refused at once.
+    `solve` keeps all steps, which take 80 bytes per point and step in 2D and 120 bytes in 3D. With `solve_steps`, only the
+    steps that the caller keeps stay in memory, and the caller may stop the analysis after any step. Parameters, errors and
+    warnings are those of `solve`. An invalid model raises its error in the call itself, before the first step is requested.
 
     Returns
     -------
     iterator of StepResult
-        The new steps, each with its `restart`.
+        The new steps. Each one has its `restart`, the data from which another analysis can continue.
 
     Examples
     --------
@@ -165,15 +168,16 @@ def solve_steps(
 
 
 def _kinds(model: Model, linear_solver: str) -> list[str]:
-    """Return the kinds of runs in the table of `_jit.ahead` whose kernels a model needs."""
+    """Return the keys of the table in `_jit.ahead` that lists the kernels to compile in advance for a model."""
     dim = model.mesh.dim
     multigrid = linear_solver == "amg" or (linear_solver == "auto" and model.mesh.n_points * dim > DIRECT_UP_TO[dim])
     return [f"{dim}d", *([f"{dim}d amg"] if multigrid else [])]
 
 
 def _touched(steps: Sequence[StepResult]) -> frozenset[str]:
-    """Return the names of the contact pairs that were closed in any of the steps; usually the last step suffices."""
+    """Return the names of the contact pairs that were closed at the end of any of the steps."""
     touched: set[str] = set()
+    # In reverse order, because in most analyses all pairs are closed in the last step.
     for step in reversed(steps):
         touched |= {name for name, contact in step.contact.items() if contact.active.any()}
         if len(touched) == len(step.contact):
@@ -185,18 +189,18 @@ def _marched(
     model: Model, ramp: Ramp, prepared: Callable[[Model], Problem], instants: list[float], case: dict[str, Any],
     last: StepResult | None, touched: frozenset[str],
 ) -> Iterator[StepResult]:  # fmt: skip
-    """Yield the steps at `instants`, the first of them after `last`; `touched` are the pairs that closed before."""
+    """Yield the steps at `instants`, which follow the step `last`; `touched` are the pairs that were closed before."""
     doubtful = model_warnings(model, ramp)
     for text in doubtful if last is None else ():
         warn(text)
     problem = prepared(stage_of(model, last, ramp.table[0][0]))
-    for text in problem.doubtful if last is None else ():  # before the steps: it may explain an error in them
+    for text in problem.doubtful if last is None else ():  # before the first step: the warning may explain its failure
         warn(text)
     doubtful += problem.doubtful
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, before = problem.ramp.table[0][0], 0
     if last is not None:
-        begin, before, last = last.load_factor, last.index, None  # releases the step
+        begin, before, last = last.load_factor, last.index, None  # frees the memory of the step
     for index, instant in enumerate(instants, start=before + 1):
         problem, state = go_on(prepared, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
@@ -205,5 +209,5 @@ def _marched(
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)
         yield replace(step, warnings=warned, restart=restart.taken(problem, state, case))
-        del step  # releases it before the next one is computed
+        del step  # frees its memory before the next step is computed
         begin = instant

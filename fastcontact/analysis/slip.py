@@ -1,6 +1,7 @@
 """Slip of the secondary nodes of a contact pair in a load step, and the wear that it causes.
 
-Wear follows Archard (J. Appl. Phys. 24, 1953): its depth is proportional to pressure times sliding distance.
+By the law of Archard (J. Appl. Phys. 24, 1953), the depth of wear is proportional to the product of pressure and sliding
+distance. In this module m is the number of secondary nodes.
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Worn:
     depth, pressure : ndarray (m,)
         Wear depth at the secondary nodes [length], and the pressure there [pressure].
     pace : float
-        The largest wear of any step over the pressure [length / pressure].
+        Largest ratio of the wear of a node in a step to its mean pressure in this step, over all steps [length / pressure].
     """
 
     depth: Array
@@ -62,7 +63,7 @@ class Worn:
         return cls(np.zeros(count), np.zeros(count))
 
     def after(self, pair: Formulation, at: Configuration, contact: ContactResult, coefficient: float) -> Worn:
-        """Return the wear after one more load step, see `worn_in_step`."""
+        """Return the wear after one more load step; for parameters see `worn_in_step`."""
         more = worn_in_step(pair, at, contact, self.pressure, coefficient)
         mean = 0.5 * np.maximum(contact.pressure + self.pressure, 0.0)
         pace = np.divide(more, mean, out=np.zeros_like(more), where=mean > 0.0)
@@ -82,9 +83,10 @@ def worn_in_step(
     contact : ContactResult
         Contact result at the end of the step.
     before : ndarray (m,) or float
-        Pressures at the beginning of the step; wear follows from the mean of both [pressure].
+        Nodal pressures at the beginning of the step [pressure]. Wear is computed with the mean of the pressures at the
+        beginning and at the end.
     coefficient : float
-        Archard's coefficient over the hardness [1 / pressure].
+        Archard's coefficient divided by the hardness [1 / pressure].
     """
     distance = np.linalg.norm(slip_of_nodes(pair, at), axis=1)
     if pair.friction:
@@ -101,12 +103,13 @@ def at_points(points: Numbers, depth: Array, n_points: int) -> Array:
 
 
 def too_fast(pair: Formulation, worn: Worn) -> float:
-    """Return the wear rate over its stability limit: above 1 pressures may oscillate from node to node.
+    """Return the ratio of the wear per step to its stability limit [-]; above 1, pressures may oscillate from node to node.
 
-    A wave of gaps with the period of two edges h causes pressures of ``pi E* / (2 h)`` times its height (Johnson, Contact
-    Mechanics, 13.2). The wear of a step follows from the mean of the pressures before and after, and affects the next
-    step: such a wave decays if the pace times this stiffness is less than two. The stiffness of pressures at integration
-    points is up to twice as large.
+    Let h be the length of a facet edge, and E* the contact modulus. A wave of the gap with the wavelength 2 h causes
+    pressures of ``pi E* / (2 h)`` times its amplitude (Johnson, Contact Mechanics, 1985, section 13.2). The wear of a step
+    is computed with the mean of the pressures at its beginning and end, and changes the gaps in the next step. The wave
+    decays if the product of `Worn.pace` and this stiffness is less than two. For pressures at integration points the
+    stiffness is up to twice as large, so that the limit used here is one.
     """
     edge = np.inf
     for block in pair.secondary.blocks:

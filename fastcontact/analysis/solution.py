@@ -15,20 +15,21 @@ from fastcontact.linear.protocol import Loaded
 
 @dataclass(frozen=True)
 class Accuracy:
-    """Tolerances and limits of one solution of the inequalities of contact.
+    """Tolerances and limits of one solution of the contact inequalities.
 
     Attributes
     ----------
     gap : float
-        A gap above minus this counts as open or closed, not as penetration [length].
+        Tolerance of the gap: only a gap less than ``-gap`` counts as penetration [length].
     multiplier : float
-        A multiplier above minus this fraction of the largest one counts as compression [-].
+        Tolerance of multipliers: only a multiplier less than ``-multiplier`` times the largest one counts as tension [-].
     residual : float, optional
-        Relative residual of iterative linear solvers where it may exceed their own tolerance [-].
+        Relative residual at which iterative linear solvers stop, if it is larger than their tolerance [-].
     max_iterations : int
-        Largest number of linear solutions without friction; the result may then not be converged.
+        Largest number of linear solutions without friction. The iteration stops at this number even if it has not converged.
     max_newton_steps : int, optional
-        Number of Newton steps with friction after which an unconverged state is accepted; None where it is not.
+        Number of Newton steps with friction after which the iteration stops, and its result is accepted even if it has not
+        converged. None means that only converged results are accepted.
     """
 
     gap: float
@@ -38,21 +39,25 @@ class Accuracy:
     max_newton_steps: int | None = None
 
 
-# Response of the unknowns (n,) [length] to forces (n,) [force], and to gaps and slips (1 + k, m) [length].
+# Linear map to the change of the unknowns (n,) [length] from additional forces (n,) [force] on them, and from additional
+# gaps and slips (1 + k, m) of all constraints [length].
 Response = Callable[[Array, Array], Array]
 
 
 def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[Array], Array]) -> Response:
-    """Return the `Response` of constraints `rows` (q,), in contact.
+    """Return the `Response` of a contact problem with q closed constraints.
 
     Parameters
     ----------
     loaded : Loaded
+        Prepared matrix (n, n) with a right-hand side, which does not matter.
     R : csr_array ((1 + k) q, n)
-        Rows of their gaps, and of their slips along k tangents.
+        Derivatives of the gaps of the closed constraints, and of their slips along k tangents [-].
     rows : ndarray of int (q,)
+        Numbers of the closed constraints.
     forces_of : callable
-        Returns the change of their forces ((1 + k) q,) due to a change of gaps and slips.
+        Function that returns the change ((1 + k) q,) of their normal and tangential forces [force], given a change
+        ((1 + k) q,) of their gaps and slips [length].
     """
     at_rest = loaded.involved_solution(np.zeros(R.shape[1]), None)
 
@@ -65,24 +70,24 @@ def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[A
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A solution under a set of active constraints.
+    """Solution of the frictionless contact problem for one active set.
 
     Attributes
     ----------
     u : ndarray (n,)
         Unknowns [length].
     multiplier : ndarray (m,)
-        Multipliers of all constraints, zero for inactive ones [force].
+        Lagrange multipliers of all constraints, which are zero for inactive constraints [force].
     gap : ndarray (m,)
         Gaps of all constraints [length].
     active : ndarray of bool (m,)
         Active set of this solution.
     wanted : ndarray of bool (m,)
-        Next active set by the signs of this solution; equal to `active` when every inequality holds.
+        Next active set, which follows from the signs of gaps and multipliers; it equals `active` if all inequalities hold.
     iterations : int
         Number of linear solutions.
     response : callable, optional
-        Returns the `Response` of this solution with its active set.
+        Function without arguments that returns the `Response` of this solution, for a constant active set.
     """
 
     u: Array
@@ -92,7 +97,7 @@ class Equilibrium:
     wanted: Mask
     iterations: int
     response: Callable[[], Response] | None = field(default=None, repr=False)
-    # The active set is solved exactly, and there are no tangential forces without friction.
+    # Both as in `FrictionalEquilibrium`: each active set is solved exactly, and there are no tangential forces.
     residual: ClassVar[float] = 0.0
     tangential: ClassVar[None] = None
 
@@ -104,18 +109,20 @@ class Equilibrium:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """Constraints at the beginning of a load step.
+    """Data of the constraints at the beginning of a load step, for friction along the load path in increments.
 
     Attributes
     ----------
-    gap, normal : ndarray (m,)
-        Gaps [length], zero where forces act, and normal forces [force].
+    gap : ndarray (m,)
+        Gaps, zero at constraints with contact forces [length].
+    normal : ndarray (m,)
+        Normal forces [force].
     traction : ndarray (m, dim)
-        Tangential forces [force].
+        Vectors of the tangential forces [force].
     closing : ndarray (m, dim)
-        Slip that closing the whole gap would add, and that does not count [length].
+        Tangential relative displacement while the whole gap closes, which is no slip [length].
     parts : int
-        Number of increments.
+        Number of increments of the load step.
     """
 
     gap: Array
@@ -126,34 +133,50 @@ class Path:
 
     @property
     def loaded(self) -> Mask:
-        """Constraints (m,) that carry forces at the beginning."""
+        """Constraints (m,) with normal forces at the beginning of the step."""
         return self.normal != 0.0
 
     def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
-        """Return the forces (1 + k, r) of constraints `rows` (r,) along tangents (m, dim)."""
+        """Return the normal forces of the constraints `rows` (q,), and their components along each of k tangents (m, dim).
+
+        Returns
+        -------
+        ndarray (1 + k, q)
+            [force].
+        """
         return _components(self.normal, self.traction, directions, rows)
 
     def closed(self, directions: tuple[Array, ...], rows: Indices) -> Array:
-        """Return gaps and `closing` (1 + k, r) of constraints `rows` (r,) along tangents (m, dim) [length]."""
+        """Return the gaps of the constraints `rows` (q,), and the components of `closing` along each of k tangents (m, dim).
+
+        Returns
+        -------
+        ndarray (1 + k, q)
+            [length].
+        """
         return _components(self.gap, self.closing, directions, rows)
 
 
 def _components(normal: Array, vectors: Array, directions: tuple[Array, ...], rows: Indices) -> Array:
-    """Return the values `normal` (m,) of some rows (r,), and the components of vectors (m, dim), as (1 + k, r)."""
+    """Return values `normal` (m,), and components of `vectors` (m, dim) along k directions (m, dim), at `rows` (q,).
+
+    The result is an array (1 + k, q).
+    """
     along = [(vectors[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
     return np.vstack([normal[rows], *along])
 
 
 @dataclass(frozen=True, eq=False)
 class Slid:
-    """Constraints at the beginning of the last increment of a load step.
+    """Data of the constraints at the beginning of the last increment of a load step.
 
     Attributes
     ----------
     slip : ndarray (m, dim)
-        Slip since the beginning of the step [length].
+        Slip vectors since the beginning of the step [length].
     work : ndarray (2, m)
-        Frictional work since then, and the part of it done by constraints while they closed [energy].
+        Frictional work since the beginning of the step, and the part of it in the increment in which a constraint closed
+        [energy].
     normal : ndarray (m,)
         Normal forces [force].
     """
@@ -165,7 +188,7 @@ class Slid:
 
 @dataclass(frozen=True, eq=False)
 class FrictionalEquilibrium:
-    """A solution with friction; the normal part as in `Equilibrium`.
+    """Solution of the contact problem with friction.
 
     Attributes
     ----------
@@ -174,26 +197,28 @@ class FrictionalEquilibrium:
     multiplier : ndarray (m,)
         Normal forces [force].
     gap : ndarray (m,)
-        [length].
+        Gaps [length].
     tangential : ndarray (m, k)
-        Tangential forces on the secondary side, along the k tangents [force].
+        Tangential forces on the secondary side, along each of k tangents [force].
     slip : ndarray (m, k)
-        Slip of the step along the k tangents [length].
+        Slips of the load step along each tangent [length].
     active, sticking : ndarray of bool (m,)
+        Constraints that are closed, and closed constraints that stick.
     settled : bool
         Whether all inequalities hold.
     residual : float
-        Violation of the inequalities over the largest force.
+        Residual of the complementarity function, relative to the largest force [-].
     iterations : int
-        Newton iterations.
-    directions : tuple of ndarray (m, dim)
-        The k tangents.
+        Number of Newton iterations.
+    directions : tuple of k ndarray (m, dim)
+        Unit tangents.
     work : ndarray (2, m), optional
-        Frictional work in the step, and the part of it done by constraints while they close, from increments [energy].
+        Frictional work in the step, and the part of it in the increment in which a constraint closes [energy]; only if the
+        step is solved in increments.
     slid : Slid, optional
-        Beginning of the last increment.
+        Data at the beginning of the last increment; only if the step is solved in increments.
     response : callable, optional
-        As in `Equilibrium`.
+        Function without arguments that returns the `Response` of this solution, for a constant contact state.
     """
 
     u: Array
@@ -212,9 +237,10 @@ class FrictionalEquilibrium:
     response: Callable[[], Response] | None = field(default=None, repr=False)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
-        """Return normal and tangential forces (1 + k, m) along other tangents (m, dim); None for other constraints.
+        """Return normal and tangential forces (1 + k, m) in components along different tangents (m, dim) [force].
 
-        Tangents of different pairings may differ by any angle: only their plane is defined by the contact.
+        Tangents of different pairings may differ by any angle in the tangent plane. The result is None if the solution does
+        not have `m` constraints.
         """
         if self.tangential.shape != (m, len(directions)):
             return None
@@ -223,7 +249,7 @@ class FrictionalEquilibrium:
 
     @property
     def wanted(self) -> Mask:
-        """Initial active set of the next solution."""
+        """Initial active set (m,) of the next solution."""
         return self.active
 
 

@@ -1,4 +1,8 @@
-"""The model in one load step: with locked pretension sections, and the constraints, temperatures and films of that step."""
+"""The model of a load step, if parts of it are temporary.
+
+Pretension sections are locked from an instant on, and constraints, prescribed temperatures and convection films may act
+only in some load steps. The model of a step contains those that act in this step.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +25,10 @@ from fastcontact.results.step import StepResult
 
 
 def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model:
-    """Return the model of the `last` step; before all steps that of the first one, which begins at the instant `begin`."""
+    """Return the model of the load step whose result is `last`.
+
+    Without a last step, return the model of the first load step, which begins at the instant `begin`.
+    """
     if last is None:
         return _stage(model, begin, np.zeros(model.mesh.points.shape), None, {})[0]
     before = float(np.nextafter(last.load_factor, -np.inf))
@@ -31,19 +38,20 @@ def stage_of(model: Model, last: StepResult | None, begin: float = 0.0) -> Model
 def go_on(
     prepared: Callable[[Model], Problem], model: Model, problem: Problem, state: State, begin: float
 ) -> tuple[Problem, State]:
-    """Return problem and state of the step that begins at an instant.
+    """Return the problem and the state of the load step that begins at an instant.
 
     Parameters
     ----------
     prepared : callable
-        Prepares the problem of a model.
+        Function that returns the `Problem` of a model.
     model : Model
-        Model with everything temporary, and without locked sections.
+        The complete model of the user.
     problem : Problem
         Problem of the previous step.
     state : State
         State at the beginning of the step.
     begin : float
+        Pseudo-time at the beginning of the step.
     """
     stage, kept = _stage(model, begin, problem.displacement(state.u), state.rise, state.locked)
     if _names(stage) == _names(problem.model):
@@ -60,7 +68,7 @@ def at_present_length(model: Model) -> list[MultiPointConstraint]:
 
 
 def _names(model: Model) -> list[str]:
-    """Return the names of constraints, temperatures and films."""
+    """Return the names of the constraints, and of the temporary temperatures and films, of a model."""
     temporary = [load for load in model.heat_loads if isinstance(load, TemporaryHeat)]
     return [*(relation.name for relation in model.relations), *(load.label for load in temporary)]
 
@@ -68,11 +76,26 @@ def _names(model: Model) -> list[str]:
 def _stage(
     model: Model, begin: float, displacement: Array, rise: Array | None, kept: Mapping[str, Any]
 ) -> tuple[Model, dict[str, float | Array]]:
-    """Return the model in the step that begins at an instant, and the initial values of locks and temporary items.
+    """Return the model of the load step that begins at an instant, and the initial values of its temporary parts.
 
-    Values of earlier locks and items are `kept`; those of new ones follow from the displacements (n_points, dim) [length] and
-    the temperature rise (n_points,) [temperature]: lengths by the names of sections, values (m,) by those of constraints,
-    temperatures by their labels.
+    Parameters
+    ----------
+    model : Model
+        The complete model of the user.
+    begin : float
+        Pseudo-time at the beginning of the step.
+    displacement : ndarray (n_points, dim)
+        Displacements at this instant [length].
+    rise : ndarray (n_points,) or None
+        Temperature rise at this instant, with conduction of heat [temperature].
+    kept : mapping
+        Initial values of parts that acted in earlier steps.
+
+    Returns
+    -------
+    model : Model
+    values : dict
+        For each part, by its name, the value at the instant at which it became active; see `State.locked`.
     """
     lengths = locked_lengths(model.pretensions, begin, displacement, kept)
     locks = [

@@ -1,4 +1,4 @@
-"""State of an analysis: everything that a load step changes."""
+"""State of an analysis: all data that a load step changes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
 
-# Key and attribute of the data of each contact pair, and of the numbers, in a restart.
+# Keys of restart data, each with the attribute of `State` that is stored under it: data of each contact pair, and numbers.
 OF_PAIRS = {
     "closed": "never_opening", "now": "obstacles", "first_contact": "first_contact", "elastic_slip": "elastic_slip",
     "angle": "angles", "slipped": "slipped", "worn": "worn",
@@ -28,23 +28,28 @@ NUMBERS = {"largest_force": "largest_force", "largest_work": "largest_rigid_forc
 class State:
     """The state at the end of a load step, or before the first one.
 
-    A load step returns a new state and does not modify this one: arrays are replaced, never written into. A state is
-    therefore its own snapshot, and its `to_dict` the content of a restart.
+    A load step returns a new state and does not modify the old one: arrays are replaced, never written into. The old state
+    therefore remains valid, and the step can be repeated from it. `to_dict` returns the data of a restart.
+
+    Below, m is the number of constraints and n_nodes the number of secondary nodes of a contact pair, n_q is the number of
+    quadrature points of an element, and n_points the number of points of the mesh.
 
     Attributes
     ----------
     u : ndarray (n_dofs,)
-        Displacements of all points, then of the force-driven obstacles [length].
+        Displacements of all points, and then of the force-driven obstacles [length].
+    gap_round_off : float
+        Bound of the round-off of gaps: coordinates and displacements limit their accuracy [length].
     active : dict of str to ndarray of bool (m,)
-        Initial active set of each contact pair.
+        Active set of each contact pair, from which the next step begins.
     pressure : dict of str to ndarray (n_nodes,)
-        Last nodal pressures of each contact pair [pressure].
+        Nodal pressures of each contact pair at the end of the step [pressure].
     obstacles : dict of str to ndarray (dim,)
         Displacement of the rigid obstacle of each contact pair [length].
     angles : dict of str to float
-        Rotation of the rigid obstacle of each contact pair, where one rotates [radian].
+        Rotation angle of each rigid obstacle that rotates, by the name of its contact pair [radian].
     worn : dict of str to Worn
-        Wear of each contact pair that wears.
+        Wear of each contact pair with a law of wear.
     slipped : dict of str to ndarray (m, dim)
         Accumulated slip of the secondary nodes of each contact pair [length].
     never_opening : dict of str to (ndarray (m, dim), ndarray of bool (m,))
@@ -53,36 +58,37 @@ class State:
         For each contact pair with tangential compliance, the positions of constraints and their elastic slips under the
         current forces [length].
     first_contact : dict of str to (ndarray (dim,), ndarray (dim,))
-        For each contact pair in three dimensions, the point of first contact [length] and the normal there [-].
+        For each contact pair in three dimensions, the point of first contact [length] and the unit normal there [-].
     bonds : dict of str to Bond
-        State of the cohesive layer of each contact pair with one.
-    locked : dict of str to float or ndarray (m,)
-        Shortening at locking of each locked pretension section [length]; initial values of each temporary constraint; initial
-        temperature rise (n_points,) of each temperature that began later [temperature].
+        State of the cohesive layer, for each contact pair that has one.
+    locked : dict of str to float or ndarray
+        Values that were stored when a part of the model became active. For a locked pretension section it is its shortening
+        at that time [length]; for a temporary constraint, the initial values (m,) of its m equations [length]; for a
+        temperature that begins after the first step, the temperature rise (n_points,) at its beginning [temperature].
     extrapolation : Extrapolation
-        The last two converged steps.
-    gap_round_off : float
-        Gaps are no more accurate than this [length].
+        The last two converged steps, from which the displacements of the next one are extrapolated.
     largest_force, largest_rigid_force : float
-        The largest force of all steps so far, and the largest force of loads on a free rigid motion [force].
+        The largest nodal force of all steps so far, and the largest generalised force of the loads on a rigid-body motion
+        that is free [force].
     touched : frozenset of str
         Contact pairs that were closed at the end of a step.
     work : Work, optional
-        Work of all steps so far; None after steps of a version that did not compute it.
+        Work of all steps so far; None if an earlier version, which did not compute it, wrote the restart.
     forces : dict of str to ContactForces
-        Contact forces of each pair, for the work of the next step.
+        Contact forces of each pair at the end of the step, from which the next step computes work.
     last_change : (int, float), optional
-        The fixed number of geometry updates of the last step, and the relative change by the last one.
+        The number of geometry updates in the last step, if it was prescribed, and the relative change of the displacements
+        in the last of these updates.
     rigid : RigidPosition, optional
         Rigid position of floating bodies in the last step.
     history : dict of str to ndarray (n_cells, n_q, 9)
-        History of each solid element of nonlinear bodies, see `constitutive_kernels`; empty before the first step.
+        History variables of nonlinear bodies, by element type, see `constitutive_kernels`; empty before the first step.
     rise : ndarray (n_points,), optional
-        Temperature rise over the reference, where heat is conducted [temperature].
+        Temperature rise above the reference temperature, in models with conduction of heat [temperature].
     instant : float
-        Pseudo-time.
+        Pseudo-time at the end of the step [-].
     halved : int
-        Number of times that load steps of nonlinear bodies are halved before they are tried.
+        Number of times that a load step of nonlinear bodies is halved before its first attempt.
     solver : dict
         Snapshot of the linear solver, see `LinearSolver.snapshot`.
     """
@@ -115,13 +121,19 @@ class State:
     solver: Mapping[str, Any] = field(default_factory=dict)
 
     def after_touching(self, pairs: Iterable[str]) -> State:
-        """Return the state with these contact pairs marked as touched; pairs that touched before keep their first contact."""
+        """Return the state in which the contact `pairs` are also marked as touched.
+
+        Points of first contact are kept only for pairs that have touched in this or in an earlier step.
+        """
         touched = self.touched.union(pairs)
         met = {name: positions for name, positions in self.first_contact.items() if name in touched}
         return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
-        """Return the restart data, without the displacements of the `n_dofs` components of the mesh."""
+        """Return the data of a restart.
+
+        They do not include the displacements of the `n_dofs` components of the mesh, which the step result stores.
+        """
         return {
             "numbers": {**{key: float(getattr(self, name)) for key, name in NUMBERS.items()}, "halved": self.halved},
             "obstacles": self.u[n_dofs:].copy(),
@@ -144,11 +156,12 @@ class State:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], displacement: Array, touched: frozenset[str]) -> State:
-        """Return the state saved by `to_dict`.
+        """Return the state from restart data.
 
         Parameters
         ----------
         data : mapping
+            The value that `to_dict` returned.
         displacement : ndarray (n_points, dim)
             Displacement at the end of the last step [length].
         touched : frozenset of str
@@ -182,14 +195,14 @@ class State:
 
 
 def _listed(value: Any) -> Any:
-    """Return the value of an attribute as lists, arrays and numbers."""
+    """Return the value of an attribute as a list if it is a tuple or a `Worn`, and unchanged otherwise."""
     if isinstance(value, Worn):
         return [value.depth, value.pressure, value.pace]
     return list(value) if isinstance(value, tuple) else value
 
 
 def _from_list(key: str, value: Any) -> Any:
-    """Return the value that `_listed` converted."""
+    """Return the value of an attribute, given what `_listed` returned for it and its key in `OF_PAIRS`."""
     if key == "worn":
         return Worn(*value)
     return tuple(value) if isinstance(value, list) else value

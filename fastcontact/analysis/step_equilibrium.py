@@ -1,4 +1,4 @@
-"""The equilibrium at the end of a load step, and its displacements for known contact forces."""
+"""The equilibrium at the end of a load step, and the solution for all displacements with known contact forces."""
 
 from __future__ import annotations
 
@@ -24,13 +24,15 @@ class StepEquilibrium:
     Attributes
     ----------
     settled : SettledContact, optional
-        None without contact.
+        The contact solution; None without contact.
     u : ndarray (n_dofs,)
-        [length]
+        Displacements of all points, and then of the force-driven obstacles [length].
     balance : Balance
+        Reactions and residual.
     terms : Terms
+        Terms of the equilibrium.
     newton : list of dict
-        An entry for each iteration, if tangents vary.
+        Convergence data of each Newton iteration; empty if all bodies are linear.
     """
 
     settled: SettledContact | None
@@ -41,18 +43,18 @@ class StepEquilibrium:
 
     @property
     def bodies(self) -> DeformedBodies | None:
-        """The bodies, if they are nonlinear."""
+        """The nonlinear bodies at the displacements u; None if bodies are linear."""
         return None if self.terms.bodies is None else self.terms.bodies.at(self.u)
 
     @property
     def history(self) -> list[dict[str, Any]]:
-        """An entry for each geometry update of the contact."""
+        """Convergence data of each pairing of the contact surfaces."""
         return self.settled.iterate.history if self.settled is not None else []
 
     def counts(self, linear_iterations: int) -> dict[str, Any]:
-        """Return the work of the step, see `StepResult.iterations`.
+        """Return the numbers of iterations of the step, see `StepResult.iterations`.
 
-        For nonlinear bodies the history is that of Newton's iterations, with the pairings and active-set iterations of all.
+        For nonlinear bodies the history is that of Newton's method, and the numbers are sums over all Newton iterations.
         """
         history, scatter = self.history, None if self.settled is None else self.settled.scatter
         counts: dict[str, Any] = {
@@ -70,16 +72,17 @@ class StepEquilibrium:
 
 
 def with_loads(problem: Problem, load: StepLoad) -> Loaded:
-    """Return the equations of the step: the prepared matrix with the right-hand side of its loads."""
+    """Return the prepared matrix of the problem with the right-hand side of a load."""
     return problem.solver.load(problem.system.right(load.force, load.lift))
 
 
 def solve_displacements(
     problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array
 ) -> tuple[Array, Array]:
-    """Return all displacements [length] and the contact forces [force], both (n_dofs,).
+    """Return all displacements (n_dofs,) [length] and the nodal contact forces (n_dofs,) [force].
 
-    Without contact, iterative solvers begin at the displacements `guess` (n_dofs,) [length].
+    `settled` is the contact solution, None without contact. Iterative solvers then begin with the displacements `guess`
+    (n_dofs,) [length].
     """
     system, lift = problem.system, load.lift
     if settled is None:

@@ -1,8 +1,7 @@
-"""Bisection of load steps that do not converge, or whose nodes slide too far while they touch.
+"""Bisection of load steps that do not converge, or in which nodes slide too far while they close.
 
-A step that is halved leaves the state unchanged.
-
-Parts of steps of nonlinear bodies keep the size of the last one, and double after one that took few iterations.
+A load step that fails leaves the state unchanged, so that it can be divided into two substeps. With nonlinear bodies, later
+substeps have the size of the last one, which doubles after a substep that took few iterations.
 """
 
 from __future__ import annotations
@@ -21,17 +20,18 @@ from fastcontact.errors import ConvergenceError
 from fastcontact.results.step import StepResult
 
 log = logging.getLogger("fastcontact")
-# Called with the number of a step, and the instants between which it does not converge and is halved.
+# Functions that are called when a step is halved, with its number and the instants of its beginning and end.
 listeners: list[Callable[[int, float, float], None]] = []
 # Number of Newton iterations up to which the next substep is twice as large.
 FEW = 6
 
 
 def advance(problem: Problem, state: State, index: int, begin: float, end: float) -> tuple[State, StepResult]:
-    """Compute the step `index` from instant `begin` to `end`, recursively halved where necessary.
+    """Solve the load step `index` from the instant `begin` to `end`, and halve it recursively if necessary.
 
-    Substeps are complete load steps: friction slides along their path. The result is that at `end`, with the iterations
-    and the dissipation of all substeps; if there are several, ``iterations["substeps"]`` lists the instants of their ends.
+    Substeps are complete load steps, so that friction follows their path. The result is that at the instant `end`, with the
+    numbers of iterations, the slip and the dissipation of all substeps. If there are several, ``iterations["substeps"]``
+    lists the instants of their ends.
 
     Raises
     ------
@@ -45,6 +45,10 @@ def advance(problem: Problem, state: State, index: int, begin: float, end: float
 def _parts(
     problem: Problem, state: State, index: int, span: tuple[float, float], halved: int
 ) -> tuple[State, list[StepResult]]:
+    """Return the state at the end of a span of pseudo-time, and the results of its substeps.
+
+    `span` is (begin, end), and `halved` the number of halvings by which it results from the step.
+    """
     begin, end = span
     middle = 0.5 * (begin + end)
     if halved < state.halved and begin < middle < end:
@@ -63,7 +67,7 @@ def _parts(
             )
             limit = limit_load(problem, state)
             final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
-            # As raised where it was found: the same words twice, in two tracebacks, would tell nothing more.
+            # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
             raise final.with_traceback(error.__traceback__) from None
         reason = str(error).split(". ")[0]
         for listener in listeners:
@@ -75,7 +79,7 @@ def _parts(
 def _both(
     problem: Problem, state: State, index: int, span: tuple[float, float, float], halved: int
 ) -> tuple[State, list[StepResult]]:
-    """Compute both halves of a span."""
+    """Solve both halves of the span (begin, middle, end); see `_parts`."""
     begin, middle, end = span
     state, first = _parts(problem, state, index, (begin, middle), halved + 1)
     state, second = _parts(problem, state, index, (middle, end), halved + 1)
@@ -83,7 +87,10 @@ def _both(
 
 
 def _slides_while_touching(problem: Problem, state: State, after: State) -> bool:
-    """Return whether nodes of nonlinear bodies that close in a step do too large a part of the frictional work."""
+    """Return whether nodes that close in the step do more of the frictional work than the criterion allows.
+
+    See `Criteria.friction_while_touching`; the result is False for linear bodies.
+    """
     allowed = problem.criteria.friction_while_touching
     if allowed is None or problem.bodies is None or state.work is None or after.work is None:
         return False
@@ -91,7 +98,7 @@ def _slides_while_touching(problem: Problem, state: State, after: State) -> bool
 
 
 def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> State:
-    """Return the state with the minimum number of halvings of the next step."""
+    """Return the state with the number of times that the next step is halved before its first attempt."""
     if problem.bodies is None:
         return state
     few = len(result.iterations["history"]) <= FEW
@@ -99,7 +106,7 @@ def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> S
 
 
 def _joined(parts: list[StepResult]) -> StepResult:
-    """Return the last substep with the sums over all substeps."""
+    """Return the result of the last substep, with iterations, slip and dissipation summed over all substeps."""
     end = parts[-1]
     if len(parts) == 1:
         return end

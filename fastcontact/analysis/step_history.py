@@ -1,4 +1,4 @@
-"""Save contact history for the next load step."""
+"""Data of the contact at the end of a load step that later steps need."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ from fastcontact.results.step import ContactResult
 
 
 def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
-    """Return the state at the end of a step with its contact.
+    """Return the state `end` with the contact data that later steps need.
+
+    These are active sets, pressures, bonds, elastic slips, points of first contact, and the data for extrapolation.
 
     Parameters
     ----------
@@ -28,6 +30,7 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
         State at the beginning of the step.
     load : StepLoad
     settled : SettledContact
+        Contact solution of the step.
     end : State
         State at the end of the step, with its displacements.
     """
@@ -45,9 +48,10 @@ def keep_path(
     problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
     energy: tuple[float, float],
 ) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
-    """Return the state at the end of a step with accumulated slip, wear and work, and the contact results with these.
+    """Return the state `end` and the contact results with accumulated slip, wear and work added.
 
-    `energy` are the elastic strain energy and the plastic work [energy].
+    `start`, `load`, `settled` and `end` are those of `save_contact_history`; `results` are the contact results of each
+    pair, and `energy` the elastic strain energy and the plastic work [energy].
     """
     displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
@@ -75,9 +79,10 @@ def keep_path(
 
 
 def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
-    """Return the point of first contact [length] of each contact pair in three dimensions, and the normal there.
+    """Return the point of first contact (dim,) [length] of each contact pair in 3D, and the unit normal (dim,) there [-].
 
-    It is fixed once the bodies have met; before, it is the closest point for the current obstacles and clearances.
+    The point is constant after the bodies have touched. Before that it is the node with the smallest gap at the current
+    positions of obstacles and clearances.
     """
     if problem.model.mesh.dim == 2:
         return {}
@@ -90,19 +95,19 @@ def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> 
 
 
 def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
-    """Return, for pairs without separation, the positions of their constraints and which of them have closed."""
+    """Return, for each pair without separation, the positions (m, dim) of its constraints and which (m,) have closed."""
     positions = dict(start.never_opening)
     for name, rows in settled.constraints.rows().items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
             constraints, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
-            if constraints.equality is not None:  # points beside the other side may return to it
+            if constraints.equality is not None:  # points that have slid beyond the other side may return to it
                 closed |= constraints.equality
             positions[name] = constraints.positions, closed
     return positions
 
 
 def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return the positions and elastic slips of pairs with tangential compliance, see `State.elastic_slip`."""
+    """Return the positions and elastic slips of each pair with tangential compliance, see `State.elastic_slip`."""
     given, solution = {}, settled.solution
     for name, rows in settled.constraints.rows().items():
         constraints = settled.constraints.parts[name]
@@ -114,6 +119,6 @@ def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
 
 
 def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:
-    """Return the state of the cohesive layer of each contact pair at displacements u (n_dofs,) [length]."""
+    """Return the state of the cohesive layer, for each contact pair that has one, at displacements u (n_dofs,) [length]."""
     parts = settled.constraints.parts.items()
     return {name: part.tied.after(part, u) for name, part in parts if isinstance(part.tied, Layer)}

@@ -1,4 +1,4 @@
-"""Recover the result of a load step."""
+"""Compute the result of a load step: nodal stresses, and all data for the user."""
 
 from __future__ import annotations
 
@@ -28,14 +28,15 @@ def recover(
     end : State
         State at the end of the step.
     contact : dict of str to ContactResult
+        Results of each contact pair.
     reaction : ndarray (n_dofs of the mesh,)
-        [force]
+        Reactions [force].
     iterations : dict
-        See `StepResult`.
+        Numbers of iterations, see `StepResult`.
     instant : (int, float)
-        Number of the step, and its pseudo-time.
+        Number of the step, and pseudo-time at its end.
     bodies : DeformedBodies, optional
-        The bodies, if they are nonlinear.
+        The nonlinear bodies at the end of the step; None if bodies are linear.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
     temperature, initial = (

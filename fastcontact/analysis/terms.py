@@ -1,11 +1,12 @@
 r"""Terms of the equilibrium: nodal forces that depend on the displacements, each with its tangent and history.
 
-With the nodal forces :math:`f_i` of the terms, external forces and contact, a load step solves
+Let :math:`f_i(u)` be the nodal forces of term i at the displacements u, :math:`f_{ext}` the external forces, B the matrix of
+the contact constraints, and :math:`\lambda` their Lagrange multipliers. A load step solves
 
 .. math:: \sum_i f_i(u) = f_{ext} + B(u)^T \lambda
 
-by the iterations of `newton`, in which a constant tangent costs nothing. Contact is linearised with its inequalities, see
-`geometry_loop`; fluid pressure that follows the surface adds the term `Fluid`.
+by Newton's method, see `newton`. Contact is not a term: it is linearised together with its inequalities in `geometry_loop`.
+Only fluid pressure between the contact surfaces is one, `Fluid`.
 """
 
 from __future__ import annotations
@@ -27,31 +28,39 @@ from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, spring_force, spring_stiffness
 from fastcontact.linear.sparse_rows import sum_of_blocks
 
-# Elastic energy and plastic work [energy].
+# Elastic energy and plastic work of a term [energy].
 Energies = tuple[float, float]
 
 
 class Term(Protocol):
-    """A part of the equilibrium of a load step; u (n_dofs,) are the displacements of all components [length]."""
+    """Term of the equilibrium of a load step.
+
+    In all methods u (n_dofs,) are the displacements of all points, and then of the force-driven obstacles [length].
+    """
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
         ...
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
-        """Return the derivative of the forces (n, n), for components of the mesh [force / length]; None: as prepared.
+        """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
 
-        The caller may modify it. For the part of the `geometric` stiffness see `NonlinearBodies.at`.
+        The caller may modify the matrix. None means that the derivative is constant, and part of the matrix that `prepare`
+        passed to the linear solver. `geometric` selects how much of the geometric stiffness is included, see
+        `NonlinearBodies.at`.
         """
         ...
 
     def commit(self, u: Array, state: State) -> State:
-        """Return the state with the history of the term at the end of the load step; most terms have none."""
+        """Return `state` with the history variables of the term at u, the end of the load step.
+
+        By default a term has no history variables, and the state is returned as it is.
+        """
         return state
 
 
 class LinearBodies(Term):
-    """Linear bodies and springs, whose stiffness is that of the prepared problem."""
+    """Linear bodies and springs, with the constant stiffness matrix K (n_dofs, n_dofs) of the problem [force / length]."""
 
     def __init__(self, K: Stiffness) -> None:
         self._K = K
@@ -66,9 +75,9 @@ class LinearBodies(Term):
 
 
 class Bodies(Term):
-    """Nonlinear bodies in a load step that begins at `start`.
+    """Nonlinear bodies in a load step that begins with the state `start`.
 
-    Forces and tangent are computed in one loop over the cells, and cached for the last two displacements.
+    Forces and tangent are computed in one loop over the cells, and cached for the last two displacement vectors.
     """
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
@@ -77,7 +86,9 @@ class Bodies(Term):
         self._taken: Array | None = None
 
     def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
-        """Return the bodies at u; `tangent` is False if their tangent will probably not be needed.
+        """Return forces, energies, history variables and tangent of the bodies at u (n_dofs,) [length].
+
+        With ``tangent=False`` the tangent is not computed in advance, because it will probably not be needed.
 
         Raises
         ------
@@ -110,7 +121,7 @@ class Bodies(Term):
 
 
 class SpringForces(Term):
-    """Springs beside nonlinear bodies, of `n` components."""
+    """Springs in a model with nonlinear bodies; `n` is the number of displacement components of the mesh."""
 
     def __init__(self, springs: Sequence[Springs], n: int) -> None:
         self._springs, self._n = springs, n
@@ -128,7 +139,11 @@ class SpringForces(Term):
 
 
 class FollowerLoad(Term):
-    """Force of a pressure on the undeformed surface, which is in the external forces, minus that on the deformed one."""
+    """Pressure load that follows the deformed surface.
+
+    The external forces of the step include the force of the pressure on the undeformed surface. The term therefore is this
+    force minus the force on the deformed surface. `factor` is the load multiplier [-].
+    """
 
     def __init__(self, problem: Problem, pressure: FollowingPressure, factor: float) -> None:
         self._problem, self._pressure, self._factor = problem, pressure, factor
@@ -146,7 +161,11 @@ class FollowerLoad(Term):
 
 
 class Fluid(Term):
-    """Fluid force at the displacements `at` (n_dofs,), where contact was linearised, minus the current one."""
+    """Pressure of a fluid between the contact surfaces.
+
+    The linearised contact problem includes the fluid force at the displacements `at` (n_dofs,) [length], about which it was
+    linearised. The term therefore is this force minus the force at the current displacements.
+    """
 
     def __init__(self, problem: Problem, wetted: Wetted, at: Array) -> None:
         self._problem, self._wetted = problem, wetted
@@ -176,7 +195,7 @@ class Terms:
     Attributes
     ----------
     bodies : Bodies, optional
-        The bodies, if they are nonlinear.
+        The term of the nonlinear bodies; None if all bodies are linear.
     """
 
     def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
@@ -190,11 +209,11 @@ class Terms:
 
     @property
     def prepared(self) -> bool:
-        """Whether all tangents are the prepared ones at any displacement."""
+        """Whether the tangents of all terms are constant and included in the prepared matrix of the linear solver."""
         return self.bodies is None
 
     def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
-        """See `Term`, with `more` terms."""
+        """Return the sums of the nodal forces and of the energies of all terms, including the terms `more`; see `Term`."""
         force, energy = self._parts[0].residual(u)
         for term in (*self._parts[1:], *more):
             added, stored = term.residual(u)
@@ -202,7 +221,7 @@ class Terms:
         return force, energy
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
-        """See `Term`; only if tangents vary."""
+        """Return the sum of the tangents; see `Term`. It may only be called if the bodies are nonlinear."""
         assert self.bodies is not None
         K = self.bodies.tangent(u, geometric)
         for term in self._parts[1:]:

@@ -1,8 +1,8 @@
-"""Staggered solution of heat conduction and contact, coupled by thermal expansion and contact conductance.
+"""Staggered solution of heat conduction and contact, which are coupled by thermal expansion and contact conductance.
 
-Each exchange solves the equilibrium at given temperatures, then the temperatures with the conductances of its contact; the
-temperatures are accelerated (Anderson). Where they depend neither on the contact nor on finite strains, they are solved once,
-before the contact.
+Each exchange computes the equilibrium at given temperatures, and then the temperatures with the conductances of this
+equilibrium. Anderson acceleration is applied to the temperatures. If they depend neither on the contact nor on finite
+deformations, they are computed only once, before the contact.
 """
 
 from __future__ import annotations
@@ -38,12 +38,18 @@ Solve = Callable[[StepLoad, StepEquilibrium | None], StepEquilibrium]
 
 @dataclass(frozen=True, eq=False)
 class Heated(Temperatures):
-    """Temperatures with the heat flux (m,) of contact pairs by name [power / area]."""
+    """Temperatures with the heat flux through contacts.
+
+    Attributes
+    ----------
+    fluxes : dict of str to ndarray (m,)
+        Heat flux at the secondary nodes of each contact pair that conducts heat [power / area].
+    """
 
     fluxes: dict[str, Array]
 
     def completed(self, problem: Problem, step: StepResult) -> StepResult:
-        """Return the result of a load step with its heat."""
+        """Return the result of a load step with heat fluxes and heat reactions added."""
         assert problem.heat is not None
         flux = problem.heat.conductors(step.displacement).flux(self.rise)
         contact = {
@@ -57,7 +63,7 @@ class Heated(Temperatures):
 
 
 def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
-    """Return the initial temperature rise (n_points,) of a load step [temperature]; None without heat."""
+    """Return the initial temperature rise (n_points,) of a load step [temperature]; None without conduction of heat."""
     if problem.heat is None:
         return None
     if not (problem.heat.depends_on_contact or problem.heat.finite):
@@ -77,15 +83,15 @@ def settle_heat(
     start : State
         State at the beginning of the step.
     load : StepLoad
-        Load at its end, without thermal expansion.
+        Load at the end of the step, without thermal expansion.
     instant : float
-        Instant of its end.
+        Pseudo-time at the end of the step.
     rise : ndarray (n_points,)
         Initial temperature rise [temperature].
     equilibrium : StepEquilibrium
-        Equilibrium at that temperature.
+        Equilibrium at the initial temperature rise.
     solve : callable
-        Function of a load and the last equilibrium that returns the next one.
+        Function that returns the equilibrium, given a load and the last equilibrium.
 
     Raises
     ------
@@ -113,13 +119,19 @@ def settle_heat(
 
 
 def _pushes_little(problem: Problem, rise: Array, balance: Balance, enough: float) -> bool:
-    """Return whether the thermal forces of a temperature rise (n_points,) [temperature] are negligible."""
+    """Return whether the nodal forces of a temperature rise (n_points,) [temperature] are negligible.
+
+    They are compared with the largest force of the balance, times the relative tolerance `enough`.
+    """
     forces = problem.model.expansion_forces(problem.field, rise)
     return largest(forces.ravel()) <= max(enough * balance.largest, balance.noise)
 
 
 def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
-    """Return a load with a temperature rise (n_points,) [temperature]; for linear bodies including its forces."""
+    """Return the load with thermal expansion by a temperature rise (n_points,) [temperature].
+
+    For linear bodies its nodal forces are added to the forces of the load.
+    """
     if rise is None or not problem.model.expands:
         return load
     load = replace(load, rise=rise)
@@ -127,7 +139,7 @@ def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
 
 
 def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
-    """Return a load in which the temperature rise is replaced by the forces of thermal expansion of linear bodies."""
+    """Return the load in which the nodal forces of thermal expansion replace the temperature rise."""
     if load.rise is None:
         return load
     forces = problem.model.expansion_forces(problem.field, load.rise).ravel()
@@ -135,7 +147,7 @@ def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
 
 
 def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, equilibrium: StepEquilibrium) -> Heated:
-    """Return the temperatures with the conductances of the contact."""
+    """Return the temperatures for the contact conductances and the frictional heat of an equilibrium."""
     settled, u = equilibrium.settled, equilibrium.u
     heat, displacement = problem.heat, problem.displacement(u)
     assert heat is not None
@@ -153,7 +165,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
         constraints, force, gap = _pressed(problem, settled, name, rows, at)
         assert constraints.nodal is not None
         link = crossing(constraints, pair.secondary, pair.primary, pair.points.shape)
-        grown = np.ones(n)  # area ratio of the deformed surface and of the constraints
+        grown = np.ones(n)  # ratio of deformed to undeformed area at each node
         if heat.finite:
             before, after = areas(pair, displacement)
             grown[pair.secondary.points] = after / before
@@ -184,7 +196,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
 def _pressed(
     problem: Problem, settled: SettledContact, name: str, rows: slice, at: Configuration
 ) -> tuple[Constraints, Array, Array]:
-    """Return the constraints of a pair, their normal forces (m,) [force] and gaps (m,), zero where closed [length]."""
+    """Return the constraints of a pair, their normal forces (m,) [force], and their gaps (m,), zero if closed [length]."""
     pair, constraints, solution = problem.pairs[name], settled.constraints.parts[name], settled.solution
     touching = LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
     forces = np.maximum(constraints.normal_forces(constraints.contact_forces(solution.multiplier[rows])), 0.0)

@@ -1,10 +1,13 @@
-"""Accuracy of the solutions of a load step, and the accuracy of its geometry that round-off allows.
+"""Tolerances of the solutions of a load step, and detection of round-off in its geometry loop.
 
-Forcing terms of inexact solutions are loose at first with an iterative solver, tight at the end. The geometry loop also ends
-where further changes are round-off. The size of round-off depends on the condition of the stiffness and of the constraints,
-which is not known beforehand; it shows in the last displacements. An iteration that still converges, however slowly, goes on
-in one direction: over a window of iterations its displacements lie as far apart as all changes together. Round-off
-oscillates, as do the errors of iterative linear solutions: displacements lie hardly farther apart than one change.
+With an iterative linear solver, the tolerances of the first solutions of a step are large. They decrease with the changes
+of the displacements, like the forcing terms of an inexact Newton method.
+
+The geometry loop also ends if further changes are round-off. The size of round-off depends on the condition numbers of the
+stiffness matrix and of the constraints, which are not known in advance, but it can be seen in the last displacements. If an
+iteration converges slowly, it moves in one direction: the first and the last displacements of a window of iterations differ
+by the sum of all changes. Round-off oscillates, as do the errors of iterative linear solutions: the displacements of the
+window then differ by hardly more than one change.
 """
 
 from __future__ import annotations
@@ -20,20 +23,22 @@ from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Relative residual of the first solution of a step by an iterative solver, and of later ones relative to the last change of
-# the displacement and to the last residual: more accuracy than that of the pairing is useless.
+# Relative residual of the first solution of a step by an iterative solver. The relative residual of later solutions is
+# RESIDUAL times the last relative change of the displacements or the last residual, whichever is smaller: the pairing is no
+# more accurate.
 FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
-# With friction the tolerance falls at least to this fraction of the last one: inaccurate linear solutions may be what
-# keeps the residual of the friction law from decreasing.
+# With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
+# residual of the friction law from decreasing.
 LEAST_FALL = 0.2
-# Largest number of Newton iterations with friction while linear solutions are still inexact: their errors reverse
-# slips.
+# Largest number of Newton iterations with friction while linear solutions are inexact, because their errors reverse slips.
 INEXACT_NEWTON_STEPS = 3
-# Number of updates in the window, and largest distance of their displacements over the typical change (WINDOW if collinear).
+# Number of updates in the window, and largest difference of their displacements relative to the median change. The ratio is
+# about WINDOW if the displacements move in one direction.
 WINDOW, APART = 8, 4.0
-# What nodal contact forces may scatter at most, relative to the largest one.
+# Largest admissible scatter of nodal contact forces, relative to the largest one.
 FORCE = 1e-5
-# Changes below this fraction of those at the beginning of the window still converge.
+# The iteration counts as converging if the changes in the second half of the window are below this fraction of those in the
+# first.
 DECLINE = 0.5
 
 
@@ -45,11 +50,11 @@ class Tolerances:
     solver : LinearSolver
     criteria : Criteria
     begin_inexact : bool
-        Whether the first solutions may have a larger residual than the last one.
+        Whether the tolerance of the first solutions is larger than that of the last one.
     round_off : float
-        Accuracy of gaps [length].
+        Bound of the round-off of gaps [length].
     expected : float
-        Expected displacement in the first step, if only forces act [length].
+        Scale of the displacements in the first step, if only forces act [length].
     """
 
     def __init__(
@@ -60,14 +65,14 @@ class Tolerances:
 
     @property
     def inexact(self) -> bool:
-        """Whether a solution to the current residual cannot be the last one of a step."""
+        """Whether the current tolerance is larger than that of the solver, so that the step cannot end yet."""
         return self._solver.iterative and self._residual > self._solver.tolerance
 
     def tighten(self, relative_change: float, law_residual: float = 0.0) -> None:
-        """Lower the residual to the forcing term of the last relative change of the displacement.
+        """Reduce the tolerance of linear solutions according to the last relative change of the displacements.
 
-        Where the friction law is off by more (`law_residual`, over the largest force), to what that is worth: the next step
-        of Newton's method is no more accurate.
+        `law_residual` is the residual of the friction law, relative to the largest force. If it is larger than the change, it
+        determines the tolerance, because the next step of Newton's method is no more accurate.
         """
         worth = RESIDUAL * min(self._residual, relative_change)
         if RESIDUAL * law_residual > worth:
@@ -75,14 +80,14 @@ class Tolerances:
         self._residual = max(self._solver.tolerance, worth)
 
     def accuracy(self, scale: float, single_iteration: bool) -> Accuracy:
-        """Return the accuracy of a solution.
+        """Return the tolerances and limits of the next contact solution.
 
         Parameters
         ----------
         scale : float
-            Size of the displacements [length].
+            Scale of the displacements [length].
         single_iteration : bool
-            Whether the surfaces are paired again after every active-set iteration.
+            Whether the surfaces are paired again after each active-set iteration.
         """
         noise = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
         limit = 1 if single_iteration else self._criteria.max_active_set_iterations
@@ -95,22 +100,26 @@ class Tolerances:
         )
 
     def enough(self, size: float) -> float:
-        """Return the change of the displacement, whose size is given, below which the geometry has settled [length]."""
-        # Iterative solvers leave a noise of their tolerance, times the contrast of cells; asking for less would never end.
+        """Return the change of the displacements below which the geometry has converged [length].
+
+        `size` is the largest displacement [length].
+        """
+        # The errors of iterative solutions are about the tolerance times the contrast of cells; smaller changes are not
+        # reached.
         least = self._solver.tolerance * (self._solver.contrast if self._solver.iterative else 1.0)
         return max(max(self._criteria.geometry, least) * size, self._round_off)
 
 
 @dataclass(frozen=True)
 class Scatter:
-    """Scatter of the last geometries of a load step.
+    """Scatter of the last iterates of a geometry loop.
 
     Attributes
     ----------
     displacement : float
-        Scatter of displacements over the largest one [-].
+        Scatter of displacements, relative to the largest one [-].
     force : float
-        Scatter of nodal contact forces over the largest one [-].
+        Scatter of nodal contact forces, relative to the largest one [-].
     """
 
     displacement: float
@@ -118,7 +127,7 @@ class Scatter:
 
 
 class Watch:
-    """Monitor of the last displacements and contact forces that detects when they only scatter."""
+    """Window of the last displacements and contact forces, to detect whether they only scatter by round-off."""
 
     def __init__(self) -> None:
         self._parts: list[Array] = []
@@ -126,20 +135,23 @@ class Watch:
         self._changes: list[float] = []
 
     def seen(self, unknowns: Array, force: Array, change: float, size: float) -> Scatter | None:
-        """Take the displacements `unknowns` (k,) [length] and contact forces (n,) [force] of an update; return their scatter.
+        """Add an update to the window, and return the scatter of the window.
 
         Parameters
         ----------
-        unknowns, force : ndarray
+        unknowns : ndarray (k,)
+            Displacements [length].
+        force : ndarray (n,)
+            Nodal contact forces [force].
         change : float
-            Change of the displacements from the previous ones [length].
+            Largest change of the displacements in this update [length].
         size : float
             Largest displacement [length].
 
         Returns
         -------
         Scatter or None
-            None while the updates may still converge, or scatter by more than is acceptable.
+            None if the updates may still converge, or if they scatter by more than is acceptable.
         """
         if not change <= SINGLE_PRECISION * size:
             self.forget()
@@ -158,12 +170,12 @@ class Watch:
         return scatter if scatter.displacement <= SINGLE_PRECISION and scatter.force <= FORCE else None
 
     def forget(self) -> None:
-        """Discard the window."""
+        """Discard the updates in the window."""
         self._parts.clear()
         self._forces.clear()
         self._changes.clear()
 
 
 def _last_change(vectors: list[Array]) -> float:
-    """Return the largest difference of the last of some vectors from the others."""
+    """Return the largest difference, in any component, between the last vector and the others."""
     return max(float(largest_difference(vectors[-1], other)) for other in vectors[:-1])

@@ -1,9 +1,11 @@
-"""Energy balance of a load step: strain energy, external work, frictional work, penalties, imbalance.
+"""Energy balance of a load step: strain energy, external work, frictional work, energy of penalties, and imbalance.
 
-The work of a force over a step is the mean of the forces at both ends times the displacement between (trapezoidal rule), with
-two corrections: a normal force acts only on closed gaps, and friction slides with its traction at the limit, whatever it was
-at the beginning of the step. The strain energy and these works add up to the external work, except for the work of contact
-forces where gaps stay closed or sides stick: an error of long steps, in which normals rotate.
+The work of a force in a step is integrated by the trapezoidal rule: it is the mean of the forces at the beginning and at
+the end, times the displacement. There are two exceptions. A normal force does no work on a gap that is open at one of the
+ends, and sliding friction has its limit traction in the complete step, whatever it was at the beginning.
+
+The external work is the sum of the strain energy, these works, and the imbalance. The imbalance is the work of contact
+forces at constraints that stay closed or stick. It is an error of long steps, in which normals rotate.
 """
 
 from __future__ import annotations
@@ -27,24 +29,25 @@ from fastcontact.results.step import ContactResult
 
 @dataclass(frozen=True, eq=False)
 class ContactForces:
-    """Contact forces at the end of a load step, from which the work of the next one is integrated.
+    """Contact forces of a pair at the end of a load step, from which the work of the next step is integrated.
 
     Attributes
     ----------
     positions : ndarray (m, dim)
-        Reference positions of the constraints [length].
+        Reference positions of the m constraints [length].
     pressure, traction : ndarray (m,), ndarray (m, dim)
-        Contact pressure and tangential traction there [pressure].
+        Contact pressure and tangential traction at the constraints [pressure].
     energy : ndarray (m,)
         Twice the energy of penalties along the normals [energy].
     rows : sequence of ndarray
-        Rows of the gaps times the normal forces: data, indices and offsets of a sparse matrix (m, n_dofs) [force].
+        Data, indices and offsets of a sparse matrix (m, n_dofs): the derivatives of the gaps with respect to the
+        displacements, times the normal forces [force].
     tangential : ndarray (n_points, dim)
-        Tangential forces on the nodes [force].
+        Nodal forces of the tangential contact forces [force].
     pressing, added : ndarray (n_nodes,)
         Normal forces on the secondary nodes [force], and the contribution of clearances and wear to their gaps [length].
     stored : float
-        Energy of penalties [energy].
+        Energy of penalties, normal and tangential [energy].
     """
 
     positions: Array
@@ -58,7 +61,7 @@ class ContactForces:
     stored: float
 
     def at(self, positions: Array) -> tuple[Array, Array]:
-        """Return pressure (m,) and traction (m, dim) at the constraints nearest to `positions` (m, dim) [pressure]."""
+        """Return the pressures (q,) and tractions (q, dim) of the constraints nearest to `positions` (q, dim) [pressure]."""
         if np.array_equal(positions, self.positions):
             return self.pressure, self.traction
         if not len(self.positions):
@@ -67,10 +70,10 @@ class ContactForces:
         return self.pressure[rows], self.traction[rows]
 
     def kept(self, other: ContactForces, moved: Array) -> float:
-        """Return half the work of normal forces that also act at the `other` end of the step [energy].
+        """Return half the work of normal forces at constraints that are closed at both ends of the step [energy].
 
-        The relative displacements are `moved` (n_points, dim) [length]. Gaps that open or close are left out: although
-        the mean force of both ends is not zero, no force acts on them.
+        `other` are the forces at the other end of the step, and `moved` (n_points, dim) the displacements in the step
+        [length]. Gaps that open or close in the step are left out, because no force acts on an open gap.
         """
         shut = other.at(self.positions)[0] != 0.0
         data, indices, start = self.rows
@@ -78,7 +81,7 @@ class ContactForces:
         return -0.5 * float(opening[shut].sum())
 
     def alone(self, other: ContactForces) -> float:
-        """Return the energy of penalties along the normals where no force acts at the other end of the step [energy]."""
+        """Return the energy of normal penalties at constraints without a force at the other end of the step [energy]."""
         return 0.5 * float(self.energy[other.at(self.positions)[0] == 0.0].sum())
 
 
@@ -90,14 +93,18 @@ class Work:
     ----------
     strain_energy : float
         Strain energy of bodies and springs.
-    friction, touching, imbalance : float
-        `touching` is the part of friction at constraints that closed in their step.
+    friction : float
+        Frictional work.
+    touching : float
+        Part of the frictional work that is done in the step in which a constraint closes.
+    imbalance : float
+        External work that the other terms do not account for.
     stored : float
-        Energy of penalties, and of cohesive layers and adhesion.
+        Energy of penalties, of cohesive layers and of adhesion.
     released : float
         Energy dissipated by the damage of cohesive layers.
     largest : float
-        The largest of these energies and works so far.
+        The largest of these energies and works in all steps so far.
     plastic : float
         Plastic work.
     """
@@ -113,11 +120,23 @@ class Work:
 
     @property
     def external(self) -> float:
-        """Work of loads, supports and obstacles."""
+        """External work, done by loads, supports and obstacles [energy]."""
         return self.strain_energy + self.plastic + self.friction + self.imbalance + self.stored + self.released
 
     def after(self, energy: tuple[float, float], stored: float, works: Sequence[float], released: float = 0.0) -> Work:
-        """Return the work after another step, from its elastic energy, plastic work and the works of `contact_work`."""
+        """Return the work after another load step.
+
+        Parameters
+        ----------
+        energy : (float, float)
+            Strain energy and plastic work at the end of the step [energy].
+        stored : float
+            Energy of penalties, cohesive layers and adhesion at the end of the step [energy].
+        works : sequence of three float
+            Sums of the works of `contact_work` over all pairs [energy].
+        released : float
+            Energy dissipated by cohesive layers so far [energy].
+        """
         friction, touching, imbalance = works
         more = self.friction + friction, self.touching + touching, self.imbalance + imbalance
         work = Work(energy[0], *more, stored, plastic=energy[1], released=released)
@@ -125,7 +144,7 @@ class Work:
         return replace(work, largest=max(terms))
 
     def as_dict(self) -> dict[str, float]:
-        """Return the reported quantities, see `StepResult.work`."""
+        """Return the energies and works under the names of `StepResult.work` [energy]."""
         return {
             "strain_energy": self.strain_energy, "plastic_work": self.plastic,
             "external_work": self.external, "friction_work": self.friction,
@@ -138,21 +157,29 @@ def contact_work(
     pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
     before: ContactForces | None,
 ) -> tuple[ContactForces, tuple[float, float, float]]:  # fmt: skip
-    """Return the contact forces of a pair at the end of a step, and friction, touching, imbalance of `Work` in it [energy].
+    """Return the contact forces of a pair at the end of a load step, and the works of contact in this step.
 
     Parameters
     ----------
     pair : Formulation
     constraints : Constraints
+        Constraints of the pair.
     solution : Solution
-        Solution of all pairs; this pair has the `rows` of it.
+        Contact solution of all pairs.
     rows : slice
+        Rows of the pair in the solution.
     at : Configuration
         Configuration at the end of the step.
     contact : ContactResult
         Contact result at the end of the step.
     before : ContactForces, optional
-        Contact forces at its beginning; None before the first step.
+        Contact forces at the beginning of the step; None before the first step.
+
+    Returns
+    -------
+    forces : ContactForces
+    works : (float, float, float)
+        Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
     """
     normal, tangents = constraints.contact_forces(solution.multiplier[rows]), np.zeros((len(constraints), 0))
     slip, directions = tangents, np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
@@ -186,9 +213,21 @@ def _forces(
     pair: Formulation, constraints: Constraints, normal: Array, tangents: Array, force: Array, contact: ContactResult,
     added: Array,
 ) -> ContactForces:  # fmt: skip
-    """Return the contact forces of normal forces (m,), tangential ones along tangents (m, k) and as vectors (m, dim).
+    """Return the contact forces of a pair at the end of a step.
 
-    `added` (n_nodes,) are clearances [length].
+    Parameters
+    ----------
+    pair : Formulation
+    constraints : Constraints
+    normal : ndarray (m,)
+        Normal forces [force].
+    tangents : ndarray (m, k)
+        Tangential forces along each tangent [force].
+    force : ndarray (m, dim)
+        Tangential forces as vectors [force].
+    contact : ContactResult
+    added : ndarray (n_nodes,)
+        See `ContactForces.added`.
     """
     size, dim = pair.points.size, contact.coordinates.shape[1]
     rows = csr_array(diags_array(normal) @ constraints.B)[:, :size]
@@ -204,7 +243,7 @@ def _forces(
         if constraints.normal_compliance is None
         else constraints.normal_compliance.apply(normal)
     )
-    if constraints.law is not None:  # replaces the energy of a linear spring
+    if constraints.law is not None:  # The energy of the law is not that of a linear spring.
         energy = 2.0 * constraints.finite_areas * constraints.law.energy(normal * share)
         give = np.divide(energy, normal, out=np.zeros_like(normal), where=normal != 0.0)
     return ContactForces(
@@ -214,7 +253,11 @@ def _forces(
 
 
 def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Array) -> float:
-    """Return the energy stored in penalties under normal forces (m,) and tangential forces (m, k)."""
+    """Return the energy stored in penalties [energy].
+
+    `normal` (m,) and `tangents` (m, k) are normal and tangential forces [force], and `give` (m,) the penetrations under the
+    normal forces [length].
+    """
     total = float(normal @ give)
     if constraints.tangential_softness is not None:
         total += float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
@@ -227,7 +270,7 @@ def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Arra
 
 
 def _relative(pair: Formulation, at: Configuration) -> Array:
-    """Return the displacement (n_points, dim) of the nodes in the step, relative to an obstacle if there is one [length]."""
+    """Return the displacements (n_points, dim) in the step; at secondary nodes relative to a rigid obstacle [length]."""
     moved = at.displacement - at.start
     if isinstance(pair.primary, RigidSide):
         points = pair.secondary.points
@@ -237,7 +280,7 @@ def _relative(pair: Formulation, at: Configuration) -> Array:
 
 
 def _nothing(now: ContactForces) -> ContactForces:
-    """Return the initial state, without forces."""
+    """Return contact forces that are zero, with the sizes of `now`, as the state before the first step."""
     dim = now.positions.shape[1]
     rows = np.empty(0), np.empty(0, np.int32), np.zeros(1, np.int32)
     return ContactForces(

@@ -1,10 +1,11 @@
-r"""Non-negative nodal pressures that vanish at open nodes and integrate to the contact force.
+r"""Nodal pressures that are not negative, vanish at open nodes, and have the contact force as their integral.
 
-A pressure field obtained by projection undershoots beyond the edge of the contact, and its values at open nodes contribute to
-the force: :math:`\int p_h\,dA = \sum_j A_j p_j` holds for all nodes together. The share :math:`A_j p_j` of an open node is
-therefore not dropped but distributed over the closed nodes nearby, those of its facets and of the adjacent facets, all of
-which change by the same pressure. This is the smallest change over this set of nodes; fewer nodes would produce a kink, and
-more would lie farther from the error. A closed node in tension becomes an open one.
+A pressure field :math:`p_h` with the nodal values :math:`p_j`, which is obtained by projection, is not zero beyond the edge
+of the contact. Its values at open nodes contribute to the contact force :math:`\int p_h\,dA = \sum_j A_j p_j`, where
+:math:`A_j` are the integrals of the shape functions. The share :math:`A_j p_j` of an open node is therefore moved to the
+closed nodes of its facets and of the adjacent facets. The pressures of all these nodes change by the same amount, which is
+the smallest change for this set of nodes. A smaller set would cause a kink of the pressure, and a larger one would change
+pressures far from the error. A closed node with a negative pressure becomes open.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import SUM_ROUND_OFF
 
-# Less than this fraction of an area counts as none: a node would have any pressure, a multiplier next to no equation.
+# Areas below this fraction of the typical area count as zero: the pressure of such a node would be nearly arbitrary.
 NO_AREA = 1e-3
 
 
 def carried(
     closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface, may_pull: bool = False
 ) -> tuple[Mask, Array]:
-    """Return the nodes that are closed without tension, and the pressures (m,) with which they carry all shares.
+    """Return the closed nodes (m,) without tension, and pressures (m,) at these nodes that carry the contact force.
 
     Parameters
     ----------
@@ -31,12 +32,12 @@ def carried(
     nodal : ndarray (m,)
         Pressures of all nodes [pressure].
     shares : ndarray (m,)
-        Shares of all nodes in the resultant: their pressures times their areas, except at nodes without area [force].
+        Shares of all nodes in the contact force: their pressures times their areas, except at nodes without area [force].
     areas : ndarray (m,)
-        Integrals of the nodes' shape functions over the whole side [area].
+        Integrals of the shape functions of the nodes over the side [area].
     side : Surface
     may_pull : bool
-        Whether closed nodes may be in tension.
+        Whether pressures of closed nodes may be negative.
     """
     while True:
         if not may_pull:
@@ -51,13 +52,13 @@ def carried(
 
 
 def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface) -> Array:
-    """Return the pressures (m,) that closed nodes take from others; arguments as of `carried`."""
+    """Return the changes (m,) of pressures at closed nodes by the shares of other nodes; for parameters see `carried`."""
     takers = _takers(closed, areas)
     moving = np.where(closed, shares - nodal * areas, shares)
     moving[takers | (np.abs(moving) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
     if not moving.any():
         return np.zeros_like(moving)
-    # From ring to ring towards the receiving nodes, the farthest first.
+    # Shares move from ring to ring towards the receiving nodes, beginning with the ring that is farthest away.
     rings = _rings(takers, moving, side)
     for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
         room = np.where(inner, areas if inner is takers else 1.0, 0.0)
@@ -67,18 +68,19 @@ def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Sur
 
 
 def _takers(closed: Mask, areas: Array) -> Mask:
+    """Return the closed nodes (m,) with an area, which may receive shares of other nodes."""
     return closed & (areas > NO_AREA * np.abs(areas).mean())
 
 
 def _alone(shares: Array, areas: Array) -> tuple[Mask, Array]:
-    """Return the node with the largest share as the only closed one, and pressures (m,) with which it carries all shares."""
+    """Return the node with the largest share as the only closed one (m,), with the pressure (m,) for the complete force."""
     most = np.argmax(np.where(_takers(np.ones(len(areas), bool), areas), shares, -np.inf))
     closed = np.arange(len(areas)) == most
     return closed, np.where(closed, shares.sum() / areas[most], 0.0)
 
 
 def _rings(takers: Mask, moving: Array, side: Surface) -> list[Mask]:
-    """Return the receiving nodes, their neighbours, and so on, until all nodes with shares to move are included."""
+    """Return masks (m,) of the receiving nodes, of their neighbours, and so on, until all nodes with shares are included."""
     rings, reached = [takers], takers.copy()
     while (moving[~reached] != 0.0).any():
         ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~reached

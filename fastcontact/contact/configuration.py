@@ -1,4 +1,4 @@
-"""Configuration of a contact pair: current, and at the beginning of the load step."""
+"""Configuration of a contact pair: positions of both sides, and data from the beginning of the load step."""
 
 from __future__ import annotations
 
@@ -13,40 +13,40 @@ from fastcontact.contact.obstacles.rigid_side import Pose
 
 @dataclass(frozen=True, eq=False)
 class Configuration:
-    """The configuration in which a contact pair is paired.
+    """The configuration in which the two sides of a contact pair are paired.
 
     Attributes
     ----------
     displacement : ndarray (n_points, dim)
-        Displacement of all points of the mesh [length].
+        Current displacements of all points of the mesh [length].
     start : ndarray (n_points, dim)
-        The same at the beginning of the load step, from where slip is measured [length].
+        Displacements at the beginning of the load step, from which slip is measured [length].
     obstacle, obstacle_start : ndarray (dim,)
-        Displacement of a rigid obstacle, now and at the beginning of the load step [length].
+        Current displacement of a rigid obstacle, and its displacement at the beginning of the load step [length].
     clearance_factor : float
-        Factor on the clearances of the pair.
+        Factor of the clearances of the pair [-].
     never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
-        Reference positions of the constraints at the end of the previous load step [length], and which of them cannot
-        separate any more; None where all may open.
+        Reference positions of the k constraints at the end of the previous load step [length], and which of them can no
+        longer open; None if all can open.
     elastic_slip : (ndarray (k, dim), ndarray (k, dim)), optional
-        Reference positions of the constraints at the end of the previous load step, and their elastic slips there [length];
-        None without tangential compliance.
+        Reference positions of the k constraints at the end of the previous load step, and their elastic slips [length]; None
+        without tangential compliance.
     angle, angle_start : float
-        Rotation of a rigid obstacle, now and at the beginning of the load step [radian].
+        Current rotation angle of a rigid obstacle, and its angle at the beginning of the load step [radian].
     worn : ndarray (n_points,), optional
-        Wear depth at the secondary nodes before the load step [length]; None for no wear.
+        Wear depth at the secondary nodes at the beginning of the load step [length]; None without wear.
     bond : Bond, optional
-        The cohesive layer at the end of the previous load step; None where there is none, or none yet.
+        State of the cohesive layer at the end of the previous load step; None without a layer, and before the first step.
     fluid_pressure : float
         Pressure of the fluid at its source [pressure].
     pressure : ndarray (n_nodes,), optional
-        Pressure at the secondary nodes in the last pairing, fluid included [pressure]; None before the first one.
+        Pressure at the secondary nodes in the last pairing, including that of fluid [pressure]; None before the first one.
     rounded : bool
-        Whether facet normals vary at rounded edges, see `pairing.pair`.
+        Whether the normals of facets vary continuously across edges, see `pairing.pair`.
     linearised : ndarray (n_points, dim), optional
-        Displacement at which the tangent of bodies is taken in finite strain [length]; None for small strains.
+        Displacements at which the tangent of bodies in finite strain is computed [length]; None for small strains.
     friction_factor : float
-        Factor on the coefficient of friction [-].
+        Factor of the coefficient of friction [-].
     """
 
     displacement: Array
@@ -68,21 +68,21 @@ class Configuration:
 
     @property
     def pose(self) -> Pose:
-        """Current position of a rigid obstacle."""
+        """Current position and rotation of a rigid obstacle."""
         return Pose(self.obstacle, self.angle)
 
     @property
     def pose_start(self) -> Pose:
-        """Position of a rigid obstacle at the beginning of the load step."""
+        """Position and rotation of a rigid obstacle at the beginning of the load step."""
         return Pose(self.obstacle_start, self.angle_start)
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:
-        """Return the configuration displaced by `displacement` (n_points, dim) [length] in one step from rest."""
+        """Return the configuration with displacements (n_points, dim) [length] that begins with the undeformed state."""
         still = np.zeros(displacement.shape[1])
         return cls(displacement, np.zeros_like(displacement), still, still)
 
     @classmethod
     def undeformed(cls, points: Array) -> Configuration:
-        """Return the configuration before any load, of a mesh with `points` (n_points, dim) [length]."""
+        """Return the undeformed configuration of a mesh with `points` (n_points, dim) [length]."""
         return cls.displaced(np.zeros_like(points))

@@ -1,4 +1,8 @@
-"""Contact constraints: ``gap >= 0``, ``multiplier >= 0``, ``gap * multiplier = 0`` row by row."""
+"""Contact constraints: ``gap >= 0``, ``multiplier >= 0`` and ``gap * multiplier = 0`` for each row of a matrix B.
+
+In this module m is the number of constraints, n_dofs the number of displacement components of the mesh, n_nodes the number of
+secondary nodes, and k the number of tangents: one in 2D, two in 3D, none without friction.
+"""
 
 from __future__ import annotations
 
@@ -19,89 +23,116 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 class Compliance(Protocol):
-    """A symmetric positive semidefinite matrix C (m, m) over all constraints."""
+    """A symmetric positive semidefinite matrix C (m, m) for all constraints [length / force]."""
 
     def block(self, rows: Indices) -> Array:
-        """Return the dense rows and columns `rows` of C, or, where C is diagonal, its diagonal there."""
+        """Return the submatrix (q, q) of C for the constraints `rows` (q,); if C is diagonal, only the diagonal (q,)."""
         ...
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
-        """Return the same, or an equivalent form that a linear solver can use without forming the block."""
+        """Return the value of `block`, or an equivalent object that linear solvers can use without forming the submatrix."""
         ...
 
     def apply(self, multiplier: Array) -> Array:
-        """Return ``C multiplier`` (m,)."""
+        """Return ``C @ multiplier`` (m,) [length] for multipliers (m,) [force]."""
         ...
 
 
 class NodalField(Protocol):
-    """Nodal interpretation of the forces of constraints.
+    """Map from the forces of constraints to pressures at the secondary nodes.
 
     Attributes
     ----------
     nodal_areas : ndarray (n_nodes,)
-        Integrals of the nodes' shape functions over the whole secondary side [area].
+        Integrals of the shape functions of the nodes over the secondary side [area].
     covered : ndarray (n_nodes,) or float
-        Fraction of each node's area that faces the primary side, or takes part in contact at all [-].
+        Fraction of the area of each node in which contact is possible: parts of facets without an opposite facet, and parts
+        that options of the pair exclude, do not count [-].
     """
 
     nodal_areas: Array
 
     @property
     def covered(self) -> Array | float:
-        """See the class: 1, unless a formulation integrates over parts of facets."""
+        """Covered fraction of nodal areas, see `NodalField`; 1 unless a formulation integrates over parts of facets."""
         return 1.0
 
     def pressure(self, force: Array) -> Array:
-        """Return nodal pressures (n_nodes,) per reference area [pressure] from normal forces (m,) [force]."""
+        """Return nodal pressures (n_nodes,) per unit reference area [pressure] for normal forces (m,) [force].
+
+        In partly covered facets the pressure refers to the covered part of the area.
+        """
         ...
 
     def traction(self, force: Array) -> Array:
-        """Return nodal tractions (n_nodes, dim) per reference area [pressure] from forces (m, dim) [force]."""
+        """Return nodal tractions (n_nodes, dim) per unit reference area [pressure] for forces (m, dim) [force]."""
         return np.column_stack([self.pressure(component) for component in force.T])
 
     def over_whole_side(self, force: Array) -> Array:
-        """Return nodal pressures (n_nodes,) per area of the whole secondary side, whether or not it faces the primary side.
+        """Return nodal pressures (n_nodes,) [pressure] whose integral over the complete secondary side is the sum of `force`.
 
-        The integral of this field over the side is the sum of the forces.
+        They refer to the complete area of each node, including parts without an opposite facet.
         """
         return self.pressure(force) * self.covered
 
     def shares(self, force: Array) -> Array:
-        """Return the shares (n_nodes,) of the nodes in the sum of the forces [force].
+        """Return the distribution (n_nodes,) of the sum of normal forces (m,) to the nodes [force].
 
-        The pressures over the whole side times the areas, except at nodes whose areas vanish.
+        It is the product of `over_whole_side` and the nodal areas, except at nodes whose areas vanish.
         """
         return self.over_whole_side(force) * self.nodal_areas
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
-        """Return the nodal gaps (n_nodes,) from those (m,) of constraints, and the node nearest to each constraint (m,).
+        """Return nodal gaps and the node of each constraint.
 
-        Infinite where a node faces nothing [length].
+        Parameters
+        ----------
+        gaps : ndarray (m,)
+            Gaps of the constraints, infinite if unpaired [length].
+
+        Returns
+        -------
+        nodal : ndarray (n_nodes,)
+            Gaps at the nodes, infinite for nodes without an opposite facet [length].
+        nearest : ndarray of int (m,)
+            Number, on the secondary side, of the node nearest to each constraint.
         """
         return gaps, np.arange(len(gaps))
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the nodes in contact (n_nodes,) for active constraints (m,), nodal gaps [length], pressures [pressure].
+        """Return the nodes in contact.
 
-        These are the nodes of active constraints, unless a formulation does not have one constraint per node.
+        If a formulation has one constraint per node, these are the nodes of active constraints.
+
+        Parameters
+        ----------
+        active : ndarray of bool (m,)
+            Active set.
+        gap : ndarray (n_nodes,)
+            Nodal gaps [length].
+        pressure : ndarray (n_nodes,)
+            Nodal pressures [pressure].
+
+        Returns
+        -------
+        ndarray of bool (n_nodes,)
         """
         return active
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
-        """Return an initial active set (m,) from gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
+        """Return an initial active set (m,) for gaps (m,) [length] and the last nodal pressures (n_nodes,) [pressure].
 
-        None where the constraints are the same in every pairing: then the last active set is the better guess.
+        None means that each constraint exists in every pairing: the last active set then is a better initial guess.
         """
         return None
 
 
 class Wetted(Protocol):
-    """Region reached by fluid; see `fluid_pressure.Wetted`."""
+    """Part of a contact that fluid fills; see `fluid_pressure.Wetted`."""
 
     @property
     def rows(self) -> Mask:
-        """Constraints in that region (m,)."""
+        """Constraints (m,) in the part that fluid fills."""
         ...
 
     @property
@@ -110,16 +141,19 @@ class Wetted(Protocol):
         ...
 
     def force(self, displacement: Array) -> Array:
-        """Return the forces (n_points, dim) on the secondary side at a `displacement` (n_points, dim) [length] [force]."""
+        """Return the nodal forces (n_points, dim) of the fluid on the secondary side [force].
+
+        `displacement` (n_points, dim) are the displacements of all points [length].
+        """
         ...
 
     def stiffness(self, displacement: Array) -> csr_array:
-        """Return the symmetric part (n_dofs, n_dofs) of minus the derivative of `force` [force / length]."""
+        """Return the symmetric part (n_dofs, n_dofs) of the negative derivative of `force` [force / length]."""
         ...
 
 
 class Tied(Protocol):
-    """Linear equations that replace contact; see `tied.TiedPair`."""
+    """Linear equations instead of contact inequalities, see `tied.TiedPair`; multipliers belong to these equations."""
 
     @property
     def directions(self) -> tuple[Array, ...]:
@@ -127,64 +161,72 @@ class Tied(Protocol):
         ...
 
     def forces(self, multiplier: Array) -> tuple[Array, Array]:
-        """Return normal (m,) and tangential (m, k) forces at the constraints of the formulation [force]."""
+        """Return the normal (m,) and tangential (m, k) forces at the constraints of the formulation [force].
+
+        `multiplier` are the multipliers of the equations [force].
+        """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0``, each with a multiplier >= 0.
+    """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0`` with multipliers that are not negative.
+
+    An optional attribute that is None stands for zero, or means that the constraints do not have the feature.
 
     Attributes
     ----------
     B : csr_array (m, n_dofs)
-        Rows [-]; an empty row is a constraint that cannot close now.
+        Derivatives of the gaps with respect to the displacements u [-]. A constraint with an empty row cannot close.
     gap0 : ndarray (m,)
-        Gap at u = 0 [length].
+        Gaps at u = 0 without contact forces [length].
     positions : ndarray (m, dim)
-        Where the gap is measured, on the reference surface [length].
+        Points of the undeformed secondary surface at which the gaps are measured [length].
     compliance : Compliance, optional
-        C [length / force]; None stands for zero.
-    tangents : tuple of csr_array (m, n_dofs)
-        Rows of the tangential displacement relative to the primary side, a matrix for each tangent [-]; empty without
-        friction.
-    directions : tuple of ndarray (m, dim)
+        Compliance C of the constraints themselves [length / force].
+    tangents : tuple of k csr_array (m, n_dofs)
+        For each tangent, derivatives of the tangential displacement relative to the primary side with respect to the
+        displacements [-]; empty without friction.
+    directions : tuple of k ndarray (m, dim)
         Unit tangents [-].
-    coupled_directions : tuple of ndarray (m, dim)
-        The same in the axes in which C couples the components of forces, where these are not those of the mesh [-].
-    slip0 : ndarray (len(tangents), m), optional
-        Slip of the step due to the motion of a rigid primary side [length]; None stands for zero.
+    coupled_directions : tuple of k ndarray (m, dim)
+        Unit tangents in the axes in which C couples the components of force vectors; empty if these are the axes of the mesh
+        [-].
+    slip0 : ndarray (k, m), optional
+        Part of the slips of the load step that does not depend on its displacements: that due to the motion of a rigid
+        primary side, or minus that due to closing gaps [length].
     friction : ndarray (m,), optional
-        Coefficient of friction of each constraint [-]; None stands for zero.
+        Coefficients of friction [-].
     equality : ndarray of bool (m,), optional
-        Constraints that are equations, with multipliers of either sign; None stands for none.
+        Constraints that are equations, with multipliers of either sign.
     softness : ndarray (m,), optional
-        Compliance of each constraint along its normal alone, beside C [length / force]; None stands for zero.
+        Compliance of each constraint along its normal, in addition to C [length / force].
     tangential_softness : ndarray (m,), optional
-        Compliance of each constraint along its tangents [length / force]; None stands for zero.
-    elastic_slip : ndarray (len(tangents), m), optional
-        Elastic slip of the tangential compliance under the forces at the beginning of the step, which the slip of the step
-        is reduced by: only the change of the forces since then adds elastic slip [length].
-    low_rank_compliance : ndarray (1 + len(tangents), m, h), optional
-        Z of a compliance ``Z Z.T`` beside C, of normal forces and then of tangential ones; None stands for zero.
-    driven : ndarray (len(tangents), m), optional
-        Slips imposed by supports and obstacles, over the largest imposed displacement [-]; None stands for none.
+        Compliance of each constraint along its tangents [length / force].
+    elastic_slip : ndarray (k, m), optional
+        Minus the elastic slip of the tangential compliance under the forces at the beginning of the load step. It is added to
+        the slip of the step, so that only the change of the forces since then causes elastic slip [length].
+    low_rank_compliance : ndarray (1 + k, m, h), optional
+        Factor Z of a compliance ``Z @ Z.T`` in addition to C. Its rows belong to the normal forces, then to the forces along
+        each tangent.
+    driven : ndarray (k, m), optional
+        Slips that supports and obstacles impose, relative to the largest imposed displacement [-].
     law : OverclosureLaw, optional
-        Law whose linearisation `gap0` and `softness` are.
+        Law of pressure and overclosure, if `gap0` and `softness` are its linearisation.
     branches : ndarray of int, optional
-        Branch of its law at each point of a cohesive layer.
+        Branch of the cohesive law at each point of a cohesive layer.
     wetted : Wetted, optional
-        Region reached by fluid between the sides.
+        Part of the contact that fluid fills.
     areas : ndarray (m,), optional
-        Area of each constraint [area]; infinite where it takes no part.
+        Area of each constraint, infinite for constraints that cannot carry forces [area].
     nodes : ndarray of int (m,), optional
-        The secondary node of each constraint, where each has one.
+        The secondary node of each constraint, for formulations with one constraint per node.
     nodal : NodalField, optional
-        Interpretation of normal forces at the secondary nodes.
+        Map from normal forces to pressures at the secondary nodes.
     tied : Tied, optional
-        Given where the constraints are the equations of a tied pair, or of a cohesive layer.
+        Data of a tied pair or a cohesive layer, if the constraints are its equations.
     geometry : Geometry, optional
-        Derivatives of rows and gaps with respect to the displacements; None where they are zero or not available.
+        Derivatives of B and of the gaps with respect to the displacements; None if they are zero or not available.
     """
 
     B: csr_array
@@ -216,31 +258,34 @@ class Constraints:
 
     @property
     def usable(self) -> Mask:
-        """Constraints (m,) that may close at all."""
+        """Constraints (m,) that can close."""
         return np.asarray(np.diff(self.B.indptr) > 0)
 
     @property
     def normal_compliance(self) -> Compliance | None:
-        """Total compliance along the normals: C and `softness`."""
+        """Total compliance along the normals, the sum of C and `softness`; None if it is zero."""
         return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
 
     @property
     def coupled(self) -> bool:
-        """Whether a compliance couples constraints."""
+        """Whether a compliance couples different constraints."""
         return self.compliance is not None or self.low_rank_compliance is not None
 
     @property
     def coefficients(self) -> Array:
-        """Coefficients of friction (m,), zero where there are none [-]."""
+        """Coefficients of friction (m,); zero without friction [-]."""
         return np.zeros(len(self)) if self.friction is None else self.friction
 
     @property
     def finite_areas(self) -> Array:
-        """Areas (m,), zero where a constraint takes no part or has none [area]."""
+        """Areas (m,), zero for constraints that have no area or cannot carry forces [area]."""
         return np.zeros(len(self)) if self.areas is None else np.where(np.isfinite(self.areas), self.areas, 0.0)
 
     def moved_past(self, rows: Indices, Q: csr_array | None) -> Mask:
-        """Return for which tangents (k, q) of constraints (q,), rotated by Q, supports and obstacles impose a slip."""
+        """Return along which tangents (k, q) of the constraints `rows` (q,) supports and obstacles impose a slip.
+
+        The tangents are rotated by Q ((1 + k) q, (1 + k) q) if it is given, see `slip_directions.aligning`.
+        """
         if self.driven is None:
             return np.zeros((len(self.tangents), len(rows)), bool)
         slips = np.vstack([np.zeros(len(rows)), self.driven[:, rows]])
@@ -248,7 +293,7 @@ class Constraints:
         return np.asarray(np.abs(turned[1:]) > LENGTH_ROUND_OFF)
 
     def gaps(self, displacement: Array) -> Array:
-        """Return the gaps (m,) [length] for displacements (n_points, dim) [length], without the compliance."""
+        """Return ``gap0 + B u`` (m,) for displacements (n_points, dim), which does not include the compliance [length]."""
         return np.asarray(self.gap0 + self.B @ displacement.ravel())
 
     def without(self, open_for_now: Mask) -> Constraints:
@@ -262,29 +307,32 @@ class Constraints:
         return replace(self, B=rows[0], tangents=tuple(rows[1:]))
 
     def gaps_at_rest(self) -> Array:
-        """Return gaps and slips (1 + k, m) at u = 0 [length]."""
+        """Return the gaps, then the slips along each tangent, at u = 0 without contact forces (1 + k, m) [length]."""
         slip0 = np.zeros((len(self.tangents), len(self))) if self.slip0 is None else self.slip0
         return np.vstack([self.gap0, slip0 if self.elastic_slip is None else slip0 + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
-        """Return the nodal contact forces (n_dofs,) of normal forces (m,) and tangential ones (m, k) [force]."""
+        """Return the nodal contact forces (n_dofs,) for multipliers (m,) and tangential forces (m, k) [force]."""
         total: Array = self.B.T @ multiplier
         for tangent, along in zip(self.tangents, () if tangential is None else tangential.T, strict=True):
             total += tangent.T @ along
         return total
 
     def normal_forces(self, multiplier: Array) -> Array:
-        """Return the normal forces (m,) at the constraints of the formulation [force]."""
+        """Return the normal forces (m,) at the constraints of the formulation [force].
+
+        These are the multipliers, except in tied pairs and cohesive layers, see `Tied.forces`.
+        """
         return multiplier if self.tied is None else self.tied.forces(multiplier)[0]
 
     def contact_forces(self, multiplier: Array) -> Array:
-        """Return the multipliers (m,) without those of the fluid [force]."""
+        """Return the multipliers (m,), set to zero at constraints where fluid separates the surfaces [force]."""
         return multiplier if self.wetted is None else np.where(self.wetted.rows, 0.0, multiplier)
 
     def elastic_slips(self, multiplier: Array, tangential: Array) -> Array:
-        """Return the elastic slips (m, dim) under normal forces (m,) and tangential ones (m, k) [length].
+        """Return the vectors of elastic slip (m, dim) under multipliers (m,) and tangential forces (m, k) [length].
 
-        These are the products of the constraints' compliance and the forces, along the tangents.
+        Elastic slips are the tangential components of the product of compliance and forces.
         """
         slips = np.zeros_like(tangential)
         if self.tangential_softness is not None:
@@ -297,12 +345,15 @@ class Constraints:
         return np.einsum("mk,kmd->md", slips, np.stack(self.directions))
 
     def pressure(self, multiplier: Array) -> Array:
-        """Return nodal pressures (n_nodes,) per reference area from the multipliers (m,) [pressure]."""
+        """Return nodal pressures (n_nodes,) per unit reference area for multipliers (m,) [pressure]."""
         assert self.nodal is not None
         return self.nodal.pressure(self.normal_forces(multiplier))
 
     def initially_active(self, u: Array, pressure: Array) -> Mask | None:
-        """Return an initial active set (m,); see `NodalField`. `u` (n_dofs,) are displacements [length]."""
+        """Return an initial active set (m,) or None, see `NodalField.initially_active`.
+
+        `u` (n_dofs,) are displacements [length], `pressure` (n_nodes,) the last nodal pressures [pressure].
+        """
         assert self.nodal is not None
         if self.tied is not None and self.equality is not None:
             return self.equality | (self.gap0 + self.B @ u < 0.0)
@@ -311,29 +362,32 @@ class Constraints:
 
 @dataclass(frozen=True, eq=False)
 class StackedConstraints(Constraints):
-    """The constraints of several pairs, one below the other.
+    """The constraints of several contact pairs, whose rows are stacked.
 
     Attributes
     ----------
     parts : dict of str to Constraints
-        The constraints of each pair, by its name.
+        The constraints of each pair, by the name of the pair.
     """
 
     parts: Mapping[str, Constraints] = field(default_factory=dict)
 
     def state(self, active: Mask) -> AnyArray:
-        """Return the set `active` (m,) with the `branches` of all pairs: while these are equal, the problem is smooth."""
+        """Return the active set (m,) and the `branches` of all pairs, in one array.
+
+        While this array is constant, the solution depends smoothly on the geometry.
+        """
         branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
         return np.concatenate([active.astype(np.int8), *branches])
 
     def rows(self) -> dict[str, slice]:
-        """Return the rows of each pair, by its name."""
+        """Return the range of rows of each pair, by the name of the pair."""
         ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()
         return {name: slice(first, end) for name, first, end in zip(self.parts, ends[:-1], ends[1:], strict=True)}
 
 
 def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
-    """Return the constraints of pairs, by their names, as one."""
+    """Return the stacked constraints of contact pairs, given the constraints of each pair by its name."""
     pairs = list(by_pair.values())
     if len(pairs) == 1:
         values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
@@ -364,7 +418,7 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
 
 
 def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
-    """Concatenate values (..., m) of all pairs, `zeros` where a pair has none; None where no pair has any."""
+    """Return the concatenated values (..., m) of all pairs, with `zeros` for pairs without them; None if no pair has any."""
     if all(value is None for value in values):
         return None
     return np.concatenate(
@@ -373,13 +427,16 @@ def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
 
 
 def _stacked_nodes(pairs: list[Constraints]) -> Indices | None:
-    """Return the nodes of all pairs; None where a pair has none."""
+    """Return the nodes (m,) of the constraints of all pairs; None if the constraints of any pair have no nodes."""
     nodes = [pair.nodes for pair in pairs if pair.nodes is not None]
     return np.concatenate(nodes) if len(nodes) == len(pairs) else None
 
 
 def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:
-    """Return the tangents of all pairs, zero where a pair has none; with `coupled`, those of the compliances."""
+    """Return k tangents (m, dim) of the constraints of all pairs; they are zero for pairs without tangents.
+
+    With `coupled`, `coupled_directions` take precedence over `directions`.
+    """
     directions = [(part.coupled_directions if coupled else ()) or part.directions for part in pairs]
     return tuple(
         np.vstack(
@@ -390,7 +447,10 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
 
 
 def _stacked_low_rank(pairs: list[Constraints], count: int) -> Array | None:
-    """Return the compliances beside C side by side; `count` is the number of tangents."""
+    """Return the block-diagonal factor Z (1 + count, m, h) of all pairs, where `count` is the number of tangents.
+
+    None if no pair has a `low_rank_compliance`.
+    """
     if all(pair.low_rank_compliance is None for pair in pairs):
         return None
     none = [np.zeros((1 + count, len(pair), 0)) for pair in pairs]
@@ -399,7 +459,7 @@ def _stacked_low_rank(pairs: list[Constraints], count: int) -> Array | None:
 
 
 class _Softened:
-    """The sum of a compliance, or none, and a diagonal one; see `Compliance`."""
+    """The sum of a compliance `inner` and a diagonal one, `softness` (m,); see `Compliance`."""
 
     def __init__(self, inner: Compliance | None, softness: Array) -> None:
         self._inner, self._softness = inner, softness

@@ -1,4 +1,8 @@
-"""Directions in which nodes are constrained, by supports along axes, in local frames, or by multi-point constraints."""
+"""Directions in which supports or multi-point constraints hold nodes.
+
+A held direction is described by orthogonal projectors P (dim, dim): the component ``P u`` of the displacement u of a node
+is prescribed.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,8 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
-# Cosine of the angle within which directions at several nodes are treated as one, such as those of a curved rim.
+# Cosine of the largest angle between directions at different nodes that are treated as one direction, such as along a
+# curved rim.
 TOGETHER = 0.94
 # Power of the inverse distance in the weights by which directions are interpolated to other nodes.
 NEAREST = 4
@@ -20,14 +25,14 @@ NEAREST = 4
 
 @dataclass(frozen=True, eq=False)
 class HeldMotions:
-    """The part of the displacement of nodes that is prescribed.
+    """Prescribed components of the displacements of nodes.
 
     Attributes
     ----------
     nodes : ndarray of int (h,)
-        Nodes with a prescribed displacement in some direction, ascending.
+        Nodes with a prescribed displacement in at least one direction, in ascending order.
     projectors : ndarray (h, dim, dim)
-        Orthogonal projectors on the prescribed directions [-].
+        Orthogonal projectors onto the prescribed directions of each node [-].
     """
 
     nodes: Indices
@@ -35,7 +40,15 @@ class HeldMotions:
 
     @classmethod
     def of(cls, supported: Mask, relations: csr_array) -> HeldMotions:
-        """Return the constraints by `supported` components (n_points, dim) and single-node `relations` (m, n_dofs)."""
+        """Return the prescribed components.
+
+        Parameters
+        ----------
+        supported : ndarray of bool (n_points, dim)
+            Components that supports hold.
+        relations : csr_array (m, n_dofs)
+            Rows of multi-point constraints, of which those count that involve only one node.
+        """
         dim = supported.shape[1]
         owners, normals = _rows_of_single_nodes(relations, dim)
         nodes = np.union1d(np.flatnonzero(supported.any(axis=1)), owners)
@@ -49,7 +62,7 @@ class HeldMotions:
         return cls(nodes, projectors)
 
     def at(self, nodes: NDArray[np.integer]) -> Array:
-        """Return the projectors (..., dim, dim) of nodes (...), zero where nothing is held."""
+        """Return the projectors (..., dim, dim) of `nodes` (...); zero for nodes that are free."""
         if not len(self.nodes):
             return np.zeros((*nodes.shape, *self.projectors.shape[1:]))
         index = np.minimum(np.searchsorted(self.nodes, nodes), len(self.nodes) - 1)
@@ -57,7 +70,7 @@ class HeldMotions:
 
 
 def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Array]:
-    """Return the nodes (k,) of rows that relate components of one node alone, and the unit vectors (k, dim) of the rows."""
+    """Return the nodes (k,) of those rows that involve only one node, and the unit vectors (k, dim) of these rows."""
     counts = np.diff(relations.indptr)
     rows = np.flatnonzero(counts > 0)
     if not len(rows):
@@ -73,14 +86,17 @@ def _rows_of_single_nodes(relations: csr_array, dim: int) -> tuple[Indices, Arra
 
 
 def spanned(tensors: Array, least: float) -> Array:
-    """Return the projectors (n, dim, dim) on the eigenvectors of symmetric `tensors` with eigenvalues from `least` on."""
+    """Return projectors (n, dim, dim) onto the eigenvectors of symmetric `tensors` whose eigenvalues are at least `least`."""
     values, vectors = np.linalg.eigh(tensors)
     vectors = np.where(values[:, None, :] >= least, vectors, 0.0)
     return np.asarray(vectors @ vectors.transpose(0, 2, 1))
 
 
 def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
-    """Return projectors (n, dim, dim) without the components of `vectors` (n, dim) in their range longer than `least`."""
+    """Return projectors (n, dim, dim) without the directions of the projections of `vectors` (n, dim).
+
+    A projection shorter than `least` is ignored.
+    """
     inside = np.einsum("nde,ne->nd", projectors, vectors)
     length = np.linalg.norm(inside, axis=1, keepdims=True)
     inside = np.where(length > least, inside / np.where(length > 0.0, length, 1.0), 0.0)
@@ -88,11 +104,23 @@ def without(projectors: Array, vectors: Array, least: Array | float) -> Array:
 
 
 def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
-    """Return fields of directions (n, dim) in which nodes are held, e.g. around a curved rim, and their nodes (n,).
+    """Return fields of directions in which nodes are held, such as the normals of a plane of symmetry or of a curved rim.
 
-    Nodes held in a single direction come first, together if directions are nearly equal or others lie in between; nodes
-    held in several directions join them. Other nodes get the mean of the directions nearest to their `places` (n, dim)
-    [length].
+    Nodes that are held in one direction form a field if their directions are nearly equal, or if directions of other nodes
+    lie in between. Nodes that are held in several directions are added to these fields. At other nodes, a field is
+    interpolated.
+
+    Parameters
+    ----------
+    projectors : ndarray (n, dim, dim)
+        Projectors onto the directions in which each node is held.
+    places : ndarray (n, dim)
+        Positions of the nodes [length].
+
+    Returns
+    -------
+    list of (ndarray (n, dim), ndarray of bool (n,))
+        Unit vectors of each field at all nodes, and the nodes that are held in its direction.
     """
     rest, directions = projectors.copy(), []
     while len(seeds := np.flatnonzero(rank := np.trace(rest, axis1=1, axis2=2).round())):
@@ -102,7 +130,7 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
         axis = np.linalg.eigh(rest[seeds])[1][:, :, -1]
         away = np.where(np.abs(axis @ axis.T) >= TOGETHER, _distances(places[seeds], places[seeds]), 0.0)
         order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
-        for child in order[1:]:  # one sign for all, taken from the nearest
+        for child in order[1:]:  # the sign of each vector is that for which it agrees with its nearest neighbour
             axis[child] *= np.sign(axis[child] @ axis[before[child]])
         along = _from_nearest(axis[order], places[seeds[order]], places)
         along[seeds[order]] = axis[order]
@@ -114,7 +142,10 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
 
 
 def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
-    """Return unit means (n, dim) of `directions` (k, dim) at `origin` (k, dim), by their distance to `places`."""
+    """Return unit vectors at `places` (n, dim), interpolated between `directions` (k, dim) at `origin` (k, dim).
+
+    Weights are the inverse distances to the power NEAREST.
+    """
     if (directions @ directions[0] > 1.0 - ROUND_OFF).all():
         return np.tile(directions[0], (len(places), 1))
     away = _distances(places, origin)
@@ -122,11 +153,12 @@ def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
 
 
 def _distances(one: Array, other: Array) -> Array:
-    """Return the distances (n, m) between points (n, dim) and others (m, dim), more than zero [length]."""
+    """Return the distances (n, m) between points (n, dim) and other points (m, dim), replaced by TINY if zero [length]."""
     from scipy.spatial.distance import cdist
 
     return np.maximum(cdist(one, other), TINY)
 
 
 def _unit(vectors: Array) -> Array:
+    """Return vectors (n, dim), normalised to unit length; zero vectors stay zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), TINY))

@@ -1,4 +1,4 @@
-"""Integration over the secondary surface: points, weights, nodal areas."""
+"""Integration over surfaces: quadrature rules of facets, mass matrices, and nodal areas."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from fastcontact.mesh.area_vectors import area_vectors
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
-    """Return the length or area per unit of xi, (n_facets, n_q), at `xi` (n_q, dim - 1).
+    """Return the ratio (n_facets, n_q) of length or area to the reference coordinates [length] or [area].
 
-    In axisymmetry, the area over the full circle.
+    `xi` (n_q, dim - 1) are the reference coordinates of points in each facet, and `points` (n_points, dim) the coordinates
+    of all points of the mesh [length]. In axisymmetric models the circumference is included.
     """
     reference = elements.get(element)
     corners = points[facets]
@@ -26,9 +27,9 @@ def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisy
 
 
 def gauss_rule(element: str, n: int) -> quadrature.Rule:
-    """Return the Gauss rule of a facet: `n` points in each direction, exact to degree 2n - 1.
+    """Return the Gauss rule of a facet with `n` points in each direction, which is exact for polynomials of degree 2n - 1.
 
-    On triangles the symmetric rule of degree 2n - 2.
+    On triangles it is a symmetric rule of degree 2n - 2.
 
     Raises
     ------
@@ -43,19 +44,26 @@ def gauss_rule(element: str, n: int) -> quadrature.Rule:
 
 
 def fine_rule(element: str) -> quadrature.Rule:
-    """Return a rule that integrates products of two shape functions over slightly curved facets."""
+    """Return a quadrature rule that is accurate for products of two shape functions on slightly curved facets."""
     return gauss_rule(element, elements.get(element).order + 2)
 
 
 def all_nodes_carry(element: str) -> bool:
-    """Return whether all nodal forces under a uniform pressure are compressive; at corners of quad8 and tri6 they are not."""
+    """Return whether a uniform pressure has compressive forces at all nodes of a facet.
+
+    At the corners of six-node triangles the forces vanish, and at those of eight-node quadrangles they are tensile.
+    """
     xi, weights = fine_rule(element)
     areas = weights @ elements.get(element).shape(xi)
     return bool(areas.min() >= 1e-6 * areas.max())
 
 
 def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_array:
-    """Return the surface mass matrix (m, m) in the order of ``surface.points`` [area]."""
+    """Return the mass matrix (m, m) of a surface, the integrals of products of two shape functions [area].
+
+    Rows and columns are in the order of ``surface.points``; `points` (n_points, dim) are the coordinates of all points
+    [length].
+    """
     entries = Entries()
     for block in surface.blocks:
         xi, weights = fine_rule(block.element)
@@ -66,15 +74,16 @@ def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_arra
 
 
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:
-    """Return the integral of each node's shape function (m,) [area]."""
+    """Return the integrals (m,) of the shape functions of the nodes over a surface [area]; parameters as in `mass_matrix`."""
     return np.asarray(mass_matrix(surface, points, axisymmetric).sum(axis=1)).ravel()
 
 
 def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
-    """Return the share of each node (m,) of a surface in the area of its facets, positive for all elements [length^2].
+    """Return the share (m,) of each node of a surface in the area of its facets, which is positive for all elements [area].
 
-    Shares are proportional to the squares of the shape functions, as for lumped masses (Hinton, Rock and Zienkiewicz, Earthq.
-    Eng. Struct. Dyn. 4, 1976). `points` (n_points, dim) [length].
+    The shares in a facet are proportional to the integrals of the squares of the shape functions, as for lumped masses
+    (Hinton, Rock and Zienkiewicz, Earthq. Eng. Struct. Dyn. 4, 1976). `points` (n_points, dim) are the coordinates of all
+    points [length].
     """
     areas = np.zeros(len(side.points))
     for block in side.blocks:

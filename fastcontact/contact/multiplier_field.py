@@ -1,6 +1,6 @@
-"""Multiplier fields: point forces, their projection onto the field, and the compliance between the two.
+"""Multiplier fields: projection of point forces onto the field, and compliance C of the forces that it does not represent.
 
-See `_pressure_field` for the formulas.
+For the formulas and symbols see `formulations._pressure_field`.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from fastcontact.linear.field_compliance import FieldCompliance
 
 @dataclass(frozen=True, eq=False)
 class Projection:
-    """Projection of point forces on a multiplier field, and the compliance of the complement.
+    """Projection of point forces onto a multiplier field, and compliance C of the remaining forces; see `Compliance`.
 
     Attributes
     ----------
     P : csr_array (m, k)
-        Functions of the multiplier field at the integration points.
+        Values, at the m integration points, of the functions that belong to the k independent values of the field [-].
     areas : ndarray (m,)
-        W; a point without area, at the axis, has no compliance: C vanishes there. It may carry a force of its own.
+        Areas W of the points [area]. A point without area, on the axis, has no compliance; it may carry a single force.
     rho : float
-        Augmentation [pressure / length].
+        The constant of the augmented Lagrangian [pressure / length].
     mass : SuperLU, optional
-        Factors of ``P.T W P``; None where no point takes part.
+        Factors of ``P.T W P``; None if no point can carry forces.
     eliminable : bool
-        Whether linear solvers may use the values of the field as unknowns in place of the forces.
+        Whether linear solvers may use the values of the field as unknowns instead of the point forces.
     quadratic : bool
-        Whether facets are.
+        Whether the facets are quadratic.
     """
 
     P: csr_array
@@ -45,7 +45,13 @@ class Projection:
     quadratic: bool = False
 
     def block(self, rows: Indices) -> Array:
-        """Return rows and columns `rows` of C, a dense matrix; ContactError where it would be too large to be of use."""
+        """Return the submatrix (q, q) of C for the points `rows` (q,) [length / force].
+
+        Raises
+        ------
+        ContactError
+            If the matrix is too large to be factorised.
+        """
         if len(rows) > MOST_ROWS:
             raise ContactError(
                 f"the continuous formulation closes {len(rows)} integration points at once, whose compliance would be a "
@@ -60,7 +66,7 @@ class Projection:
         return (np.diag(inverse) - P @ self.mass.solve(np.ascontiguousarray(P.T))) / self.rho
 
     def among(self, rows: Indices) -> Array | FieldCompliance:
-        """Return C among `rows`; see `Compliance`."""
+        """Return the compliance of the points `rows` (q,) in a form for linear solvers; see `Compliance.among`."""
         if not self.eliminable or self.mass is None or not (self.areas[rows] > 0).all():
             return self.block(rows)
         others = np.where(self.areas > 0, self.areas, 0.0) / self.rho
@@ -71,7 +77,7 @@ class Projection:
         return FieldCompliance(P, areas, stiffness, mass, lambda: self.block(rows), self.quadratic)
 
     def apply(self, multiplier: Array) -> Array:
-        """Return ``C multiplier``."""
+        """Return ``C @ multiplier`` (m,) [length] for point forces (m,) [force]."""
         inside = self.areas > 0
         pressure = np.divide(multiplier, self.areas, out=np.zeros_like(multiplier), where=inside)
         return np.where(inside, pressure - self.P @ self.field(np.where(inside, multiplier, 0.0)), 0.0) / self.rho
@@ -81,14 +87,14 @@ class Projection:
         return np.zeros(self.P.shape[1]) if self.mass is None else self.mass.solve(self.P.T @ multiplier)
 
     def compliant(self, columns: Indices) -> Array:
-        r"""Return a factor Z (m, h) of the compliance added by dropping `columns` of the multiplier field.
+        r"""Return the factor Z (m, h) of the compliance that is added if h values of the multiplier field are removed.
 
-        At supported nodes, as on an axis or in a plane of symmetry, the slip of a facet has one nodal value fewer than its
-        multiplier field: a field that alternates from node to node and decays along the surface does no work on any slip, and
-        is undetermined. Such fields are made compliant, like the fields that the multiplier field cannot represent: the shear
-        at the supported node then vanishes, as symmetry requires.
+        At supported nodes, for example on an axis or in a plane of symmetry, the slip of a facet has one nodal value fewer
+        than its multiplier field. A field that alternates from node to node and decays along the surface then does no work
+        on any slip, and is undetermined. Such fields are made compliant, like forces that the multiplier field does not
+        represent. The shear at the supported node then vanishes, as symmetry requires.
 
-        With E the unit vectors of the columns and :math:`M = P^T W P` that is
+        Let E be the unit vectors of the removed values `columns` (h,), and :math:`M = P^T W P`. The compliance is
         :math:`Z Z^T = P M^{-1} E (E^T M^{-1} E)^{-1} E^T M^{-1} P^T / \rho`.
         """
         if self.mass is None:

@@ -30,39 +30,39 @@ class PairOptions:
     Attributes
     ----------
     clearance, clearance_primary : callable, optional
-        Additions to the gap: functions from reference positions (n, dim) on the secondary and on the primary side to lengths
-        (n,), positive where the gap opens, negative for an interference [length].
+        Functions from reference positions (n, dim) [length] on the secondary and on the primary side to lengths (n,) that are
+        added to the gap: a positive clearance, or a negative interference [length].
     excluded, frictionless : ndarray of bool (n_points,), optional
-        Nodes without contact, and without friction.
+        Nodes without contact, and nodes without friction.
     frictionless_along : ndarray (dim,), optional
-        Direction along which friction is absent, at the `frictionless` nodes or, without these, everywhere [-].
+        Direction along which there is no friction, at the `frictionless` nodes or, if these are not given, everywhere [-].
     kind : str
         One of `KINDS`.
     penalty : float or OverclosureLaw, optional
-        Pressure by penetration [pressure / length], or its law; None: no penetration.
+        Ratio of contact pressure to penetration [pressure / length], or a law for it; None means no penetration.
     tangential_penalty : callable, optional
-        Shear stress per elastic slip in stick, a function from reference positions (n, dim) on the secondary side to positive
-        numbers (n,) [pressure / length]; None: no elastic slip.
+        Ratio of shear stress to elastic slip at sticking points, as a function from reference positions (n, dim) on the
+        secondary side to positive numbers (n,) [pressure / length]; None means no elastic slip.
     wear : float, optional
-        Archard's wear coefficient over the hardness, for wear of the secondary side [1 / pressure]; None: no wear.
+        Archard's wear coefficient divided by the hardness, for wear of the secondary side [1 / pressure]; None means no wear.
     search_distance : float, optional
-        Largest gap or penetration, now and at the beginning of the load step, at which points face the other side [length];
-        None: any.
+        Points are only paired if the gap or penetration is at most this distance, now or at the beginning of the load step
+        [length]; None means any distance.
     conductance : Conductance, optional
-        Thermal contact conductance; None: no heat flow.
+        Thermal contact conductance; None means no heat flow.
     friction_heat : float
         Fraction of the frictional work that becomes heat [-].
     obstacle_temperature : float, optional
-        Temperature of the rigid obstacle, where heat flows to it [temperature].
+        Temperature of a rigid obstacle that exchanges heat [temperature].
     cohesion : CohesiveLaw, optional
-        Traction-separation law; None: no tension.
+        Traction-separation law; None means that the pair has no tension.
     source : ndarray of bool (n_points,), optional
         Nodes from which fluid penetrates; None without fluid.
     same_place : ndarray of int (n_points,), optional
-        For each node, the node whose multiplier it shares in a periodic model; None where the model is not periodic.
+        In periodic models, for each node the node with which it has a common multiplier.
     turning : Rotation, optional
-        Rotation about the axis of a sector, where tractions rotate from one end of the pair to the other: their fields have
-        cylindrical components.
+        Rotation about the axis of a cyclic sector. Fields of tractions are then interpolated in cylindrical components,
+        because tractions rotate from one end of the pair to the other.
     """
 
     clearance: Field | None = None
@@ -90,38 +90,38 @@ class PairOptions:
 
     @property
     def tied(self) -> bool:
-        """Whether the pair neither opens nor slides."""
+        """Whether the sides of the pair are tied: they can neither separate nor slide."""
         return self.kind == "tied"
 
     @property
     def always_closed(self) -> bool:
-        """Whether all paired points are closed from the beginning."""
+        """Whether the constraints of all paired points are equations from the beginning."""
         return self.kind in ("tied", "bilateral")
 
     def out(self, candidates: Candidates) -> Mask:
-        """Return the candidates (n,) without contact: those nearer to an excluded node than to any other."""
+        """Return the candidates (n,) without contact: those whose node with the largest weight is excluded."""
         return (
             np.zeros(len(candidates.nodes), bool) if self.excluded is None else candidates.belonging_to(self.excluded)
         )
 
     def borders(self, side: Surface) -> tuple[Indices, Array]:
-        """Return (facet, xi) of the points on lines that bound the part nearest to excluded nodes."""
+        """Return the boundaries of the excluded part of a line: facets (n,) and reference coordinates xi (n,)."""
         mask = self.excluded
         if mask is None:
             return np.empty(0, np.intp), np.empty(0)
         order = np.argsort(elements.get(side.element).nodes[:, 0])
         inside = mask[side.facets[:, order]]
-        # Two neighbouring shape functions are equal at 0 on linear lines, at -2/3 and 2/3 on quadratic ones.
+        # The shape functions of neighbouring nodes are equal at 0 on linear lines, and at -2/3 and 2/3 on quadratic ones.
         equal = np.linspace(-2 / 3, 2 / 3, 2) if len(order) == 3 else np.zeros(1)
         facet, edge = np.nonzero(inside[:, 1:] != inside[:, :-1])
         return facet, equal[edge]
 
     def excluded_nodes(self, side: Surface) -> Mask:
-        """Return which nodes (m,) of a side carry no contact."""
+        """Return which nodes (m,) of a side are excluded from contact."""
         return np.zeros(len(side.points), bool) if self.excluded is None else self.excluded[side.points]
 
     def coefficients(self, friction: float, candidates: Candidates) -> Array:
-        """Return the coefficients of friction (n,) of candidates."""
+        """Return the coefficients of friction (n,) of candidates: `friction`, or zero at frictionless nodes [-]."""
         return np.where(self._slippery(candidates) & (self.frictionless_along is None), 0.0, friction)
 
     def _slippery(self, candidates: Candidates) -> Mask:
@@ -133,7 +133,21 @@ class PairOptions:
     def rubbing(
         self, directions: Sequence[Array], candidates: Candidates
     ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """Return rotated tangents (n, dim), each either with or without friction, and those with friction, else zero."""
+        """Return tangents that are aligned with the direction without friction.
+
+        Parameters
+        ----------
+        directions : sequence of k ndarray (n, dim)
+            Unit tangents.
+        candidates : Candidates
+
+        Returns
+        -------
+        tangents : tuple of k ndarray (n, dim)
+            Unit tangents, rotated such that the first is the direction without friction at frictionless candidates.
+        rubbing : tuple of k ndarray (n, dim)
+            The same tangents, set to zero in the direction without friction.
+        """
         along = self.frictionless_along
         if along is None:
             return tuple(directions), tuple(directions)
@@ -148,7 +162,10 @@ class PairOptions:
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float
     ) -> Array:
-        """Return the contribution of clearances times a factor to the gaps (n,) of candidates, zero if unpaired [length]."""
+        """Return the contribution (n,) of clearances, multiplied by `factor`, to the gaps of candidates; zero if unpaired.
+
+        `reference` (n_points, dim) are the undeformed coordinates of all points [length].
+        """
         added = np.zeros(len(candidates.nodes))
         rows = np.flatnonzero(pairing.paired)
         if not len(rows):
@@ -163,9 +180,10 @@ class PairOptions:
 
 
 def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
-    """Return the nodal field (m, m) of a multiplier without independent values at excluded nodes.
+    """Return the map (m, m) from independent to nodal values of a multiplier field, for a side with `excluded` nodes (m,).
 
-    These take the mean of their neighbours among the nodes `givers`, so that a uniform field stays uniform; zero without any.
+    The value at an excluded node is the mean of the values at its neighbours among the nodes `givers`, so that a uniform
+    field stays uniform. It is zero if there are no such neighbours. All other nodal values are independent.
     """
     m = len(side.points)
     if not excluded.any():

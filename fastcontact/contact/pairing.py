@@ -1,6 +1,6 @@
-"""Pairing: projection of secondary points onto primary facets, and rows of the gap function.
+"""Pairing: project secondary points onto primary facets, and compute the derivatives of their gaps and slips.
 
-Mortar in three dimensions pairs facets with facets instead, in `formulations._cut_faces`.
+Mortar contact in 3D pairs facets with facets instead, see `formulations._cut_faces`.
 """
 
 from __future__ import annotations
@@ -29,26 +29,26 @@ from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest distance beyond both facets at a node at which a point still faces it, in facet lengths.
+# Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly.
 FOLDED = 0.5
-# Fraction of either facet at an edge over which the normals of rounded edges vary.
+# Fraction of each of the two facets at an edge over which the normals vary if edges are rounded.
 ROUNDED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """Points of the secondary side where the gap is measured: combinations of its nodes.
+    """Points of the secondary side at which the gap is measured, as weighted combinations of nodes.
 
     Attributes
     ----------
     nodes : ndarray of int (n, k)
-        Point numbers.
+        Point numbers of the k nodes of each candidate.
     shape : ndarray (n, k)
-        Weight of each node.
+        Weight of each node, the value of its shape function [-].
     facet : ndarray of int (n,), optional
-        The secondary facet they lie on, counted through the blocks.
+        Number of the secondary facet on which each candidate lies; facets are numbered through all blocks.
     xi : ndarray (n, dim - 1), optional
-        Their reference coordinates in it.
+        Reference coordinates of each candidate in its facet [-].
     """
 
     nodes: Numbers
@@ -58,7 +58,10 @@ class Candidates:
 
     @classmethod
     def inside(cls, side: Surface, xi: Sequence[Array]) -> Candidates:
-        """Return points at the same reference coordinates (n, dim - 1) in all facets of a block, `xi` for each block."""
+        """Return candidates at the same reference coordinates in all facets of a block.
+
+        `xi` is a list of arrays (n_q, dim - 1), one for each block of `side`.
+        """
         nodes, shapes, facets, coordinates, first = [], [], [], [], 0
         for block, xi_of_block in zip(side.blocks, xi, strict=True):
             nodes.append(np.repeat(block.facets, len(xi_of_block), axis=0))
@@ -70,7 +73,7 @@ class Candidates:
 
     @classmethod
     def nodes_of(cls, side: Surface) -> Candidates:
-        """Return the nodes of a side, each on one of its facets."""
+        """Return the nodes of a side as candidates; each is located on one of its facets."""
         facet, xi, first = np.zeros(len(side.points), np.intp), np.zeros((len(side.points), 1)), 0
         for block in side.blocks:
             xi_of_nodes = elements.get(block.element).nodes
@@ -81,11 +84,11 @@ class Candidates:
         return cls(side.points[:, None], np.ones((len(side.points), 1)), facet, xi)
 
     def positions(self, coordinates: Array) -> Array:
-        """Return the positions (n, dim) for nodal `coordinates` (n_points, dim)."""
+        """Return the positions (n, dim) for nodal `coordinates` (n_points, dim) [length]."""
         return np.einsum("nk,nkd->nd", self.shape, coordinates[self.nodes])
 
     def belonging_to(self, mask: Mask) -> Mask:
-        """Return which candidates (n,) lie nearer to nodes of `mask` (n_points,) than to all others."""
+        """Return for which candidates (n,) the node with the largest weight is in `mask` (n_points,)."""
         inside = mask[self.nodes]
         largest = np.where(inside, self.shape, -np.inf).max(axis=1)
         return largest > np.where(inside, -np.inf, self.shape).max(axis=1) + LENGTH_ROUND_OFF
@@ -93,23 +96,23 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
-    """The primary facet that each candidate faces.
+    """Projection of each candidate onto the primary side.
 
     Attributes
     ----------
     facet : ndarray of int (n,)
-        Row in the primary facets, counted through their blocks.
+        Number of the opposite primary facet; facets are numbered through all blocks.
     xi : ndarray (n, dim - 1)
-        Reference coordinates of the projection.
+        Reference coordinates of the projection in this facet [-].
     normal : ndarray (n, dim)
-        Unit outward normal there: of the primary facet, or interpolated between the nodal means of the facets.
+        Unit outward normal of the primary side at the projection, as selected by the option `normals` [-].
     paired : ndarray of bool (n,)
-        False where a candidate stands out beyond the end of the primary surface.
+        Whether the candidate is paired; False beyond the end of the primary surface.
     offset : ndarray (n,), optional
-        Gap minus ``normal . x`` where the primary side is a rigid obstacle [length]; None for facets.
+        Gap minus ``normal . x``, where x is the position of the candidate, for a rigid obstacle [length]; None for facets.
     beyond : ndarray (n, dim - 1), optional
-        Distance of candidates beyond the end of the primary surface, in reference coordinates of the facet, which is extended
-        straight there; None if all are within.
+        Overhang of the candidate beyond the end of the primary surface, in reference coordinates of the facet, whose straight
+        extension it faces [-]; None if no candidate overhangs.
     """
 
     facet: Indices
@@ -120,7 +123,10 @@ class Pairing:
     beyond: Array | None = None
 
     def places(self, primary: Surface, rows: Indices) -> Places:
-        """Return the points of `primary` that candidates `rows` (n,) face, on facets extended straight beyond their ends."""
+        """Return the projections of the candidates `rows` (q,) onto `primary`.
+
+        Candidates beyond the end of the primary surface are projected onto the straight extension of their facet.
+        """
         points = places(primary, self.facet[rows], self.xi[rows])
         if self.beyond is None:
             return points
@@ -136,14 +142,31 @@ def pair(
     obstacle: Pose | None = None,
     rounded: bool = False,
 ) -> Pairing:
-    """Project candidate positions (n, dim) on the closest facet of `primary` at nodal `coordinates` [length].
+    """Project candidates onto the closest facets of the primary side, or onto a rigid obstacle.
 
-    A candidate farther out than `projection_tolerance` facet lengths beyond the end of its facet is not paired
-    (TOLE_PROJ_EXT of code_aster). A candidate paired there faces the straight extension of the facet, so that the forces
-    on both sides have one line of action and balance in moment. Unless `normals` is ``"facet"``, the normal is
-    interpolated between nodal means of the facets' normals, so that it is continuous across facets except at corners,
-    and the candidates are projected along it; a unit vector (dim,) is the normal everywhere. A rigid obstacle has the
-    pose `obstacle`. With `rounded`, facet normals vary continuously across edges.
+    Parameters
+    ----------
+    candidates : ndarray (n, dim)
+        Positions of the candidates [length].
+    primary : Surface or RigidSide
+    coordinates : ndarray (n_points, dim)
+        Current coordinates of all points of the mesh [length].
+    projection_tolerance : float
+        Largest overhang beyond the end of the primary surface at which a candidate is paired, in facet lengths [-]
+        (TOLE_PROJ_EXT of code_aster). It then faces the straight extension of the facet, so that the forces on both sides
+        have the same line of action, and their moments are in equilibrium.
+    normals : str or sequence of float
+        ``"facet"``: normal of the facet. A unit vector (dim,): this normal everywhere. Any other string: normal interpolated
+        between averaged nodal normals, which is continuous except at corners. In the latter two cases the candidates are
+        projected along the normal.
+    obstacle : Pose, optional
+        Position and rotation of a rigid obstacle.
+    rounded : bool
+        Whether the normals of facets vary continuously across edges.
+
+    Returns
+    -------
+    Pairing
 
     Raises
     ------
@@ -177,11 +200,24 @@ def pair(
 
 
 def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array, mean: Array) -> Array:
-    """Return facet normals (n, dim) that pass to the `mean` (n, dim) at their edges, over `ROUNDED` of each facet.
+    """Return normals (n, dim) of facets that vary continuously across edges.
 
-    Where facets meet in an edge, the contact force of a node may have any direction between their normals, and
-    equilibrium may place the node at the edge: with the normal of either facet the pairing alternates between them. Here
-    the direction follows from the position on the rounded edge.
+    In equilibrium a node may lie on the edge between two facets, with a contact force in a direction between their normals.
+    With the normal of one of the facets, the pairing then alternates between both. On a rounded edge the direction of the
+    force follows from the position of the node.
+
+    Parameters
+    ----------
+    primary : Surface
+    coordinates : ndarray (n_points, dim)
+        Current coordinates of all points of the mesh [length].
+    facet : ndarray of int (n,)
+        Number of the facet of each point.
+    xi : ndarray (n, dim - 1)
+        Reference coordinates in the facet [-].
+    mean : ndarray (n, dim)
+        Averaged normals at the points [-]. They are the result at edges. Over the fraction ROUNDED of the facet, the result
+        changes to the normal of the facet.
     """
     normals = at_nodes_of_facets([facet_normals(block, coordinates) for block in primary.blocks])[facet]
     normals = interpolated(normals, places(primary, facet, xi))
@@ -193,7 +229,7 @@ def _round_edges(primary: Surface, coordinates: Array, facet: Indices, xi: Array
 
 
 def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordinates: Array, outside: Mask) -> Pairing:
-    """Return the pairing with the overhang of candidates `outside` (n,) beyond the ends of their facets."""
+    """Return the pairing with the overhang `Pairing.beyond` of the candidates marked in `outside` (n,)."""
     rows = np.flatnonzero(outside)
     if not len(rows):
         return pairing
@@ -207,10 +243,10 @@ def _straight_on(pairing: Pairing, candidates: Array, primary: Surface, coordina
 
 
 def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> Mask:
-    """Return which candidates (n,) overhang an end at which another line continues smoothly.
+    """Return which candidates (n,) overhang the end of a line facet where an adjacent facet continues it smoothly.
 
-    On lines that fold inward, points at a distance lie beyond the ends of both facets at a node, but not beyond the end
-    of the surface. At a corner they lie beside it.
+    Opposite a node between two facets of a concave line, points at a distance lie beyond the ends of both facets, but not
+    beyond the end of the surface. In 3D the result is False for all candidates.
     """
     out = closest.overhang > 0.0
     if closest.position.shape[1] == 3 or not out.any():
@@ -220,7 +256,10 @@ def _at_smooth_ends(primary: Surface, coordinates: Array, closest: Closest) -> M
 
 
 def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
-    """Return arrays (n_i, k_i) as one, as wide as the widest: integers are repeated, floating-point numbers zero."""
+    """Return arrays (n_i, k_i) concatenated along the first axis, padded to the largest k_i.
+
+    Integers are padded with the last entry of the row, floating-point numbers with zeros.
+    """
     width = max(values.shape[1] for values in arrays)
     missing = [((0, 0), (0, width - values.shape[1])) for values in arrays]
     integer = np.issubdtype(arrays[0].dtype, np.integer)
@@ -235,10 +274,26 @@ def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
 def gap_rows(
     candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, reference: Array
 ) -> tuple[csr_array, Array]:
-    """Return (G, gap0): gap of the candidates = gap0 + G u; rows of unpaired candidates are empty.
+    """Return G and gap0 of the gaps ``gap0 + G u`` of candidates.
 
-    ``gap = n . (x_secondary - x_primary(xi))`` with the facet, xi and normal of `pairing` held fixed; `reference`
-    (n_points, dim) are undeformed coordinates, u the displacements of all points, point by point.
+    The gap of a candidate is ``n . (x_secondary - x_primary)`` with the normal n, the position x_secondary of the candidate
+    and the position x_primary of its projection. The facet, the reference coordinates and the normal of `pairing` are
+    constant, so that the gap is a linear function of the displacements u (n_dofs,) of all points.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    pairing : Pairing
+    primary : Surface or RigidSide
+    reference : ndarray (n_points, dim)
+        Undeformed coordinates of all points [length].
+
+    Returns
+    -------
+    G : csr_array (n, n_dofs)
+        Derivatives of the gaps [-]; rows of unpaired candidates are empty.
+    gap0 : ndarray (n,)
+        Gaps at u = 0 [length].
     """
     G = rows_along(pairing.normal, candidates, pairing, primary, reference.size)
     gap0 = G @ reference.ravel()
@@ -248,12 +303,14 @@ def gap_rows(
 
 
 def tangents(normal: Array, held: Array | None = None) -> list[Array]:
-    """Return unit tangents (n, dim) that complete `normal` (n, dim): one in 2D, two in 3D.
+    """Return unit tangents (n, dim) that form an orthonormal basis with the unit normals `normal` (n, dim).
 
-    In 3D one pair of axes perpendicular to the mean normal is rotated to every point by the smallest rotation. Tangents then
-    vary no faster than normals, so that components of tractions along them can be interpolated as fields, and the choice
-    of the first axis does not matter. Where displacements are held, by projectors `held` (n, 3, 3), the tangents are
-    rotated so that one of them is held as far as any tangent is.
+    There is one tangent in 2D, and there are two in 3D. In 3D two axes perpendicular to the mean normal are rotated to each
+    point by the smallest rotation from the mean normal to the normal. Tangents then vary as smoothly as normals, so that
+    components of tractions along them can be interpolated. The choice of the first axis does not matter.
+
+    `held` (n, 3, 3) are projectors onto the directions in which supports hold displacements. If they are given, the tangents
+    are rotated about the normal so that the first one lies as far as possible in these directions.
     """
     if normal.shape[1] == 2:
         return [np.column_stack([normal[:, 1], -normal[:, 0]])]
@@ -262,7 +319,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     mean = mean / length if length > LENGTH_ROUND_OFF * len(normal) else np.array([0.0, 0.0, 1.0])
     axis = np.cross(np.eye(3)[np.argmin(np.abs(mean))], mean)
     axis /= np.linalg.norm(axis)
-    # Rotation of the axis by the rotation of the mean normal to the normal; a half turn about it where they are opposite.
+    # Apply the rotation from the mean normal to the normal to the axis; if they are opposite, rotate by 180 degrees about it.
     both = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
@@ -279,7 +336,7 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
 
 
 def normals(directions: Sequence[Array]) -> Array:
-    """Return the unit normals (n, dim) that `tangents` complete."""
+    """Return the unit normals (n, dim), given the unit tangents `directions` that `tangents` returns for them."""
     if len(directions) == 1:
         return np.column_stack([-directions[0][:, 1], directions[0][:, 0]])
     return np.cross(directions[0], directions[1])
@@ -288,8 +345,9 @@ def normals(directions: Sequence[Array]) -> Array:
 def rows_along(
     direction: Array, candidates: Candidates, pairing: Pairing, primary: Surface | RigidSide, n_dofs: int
 ) -> csr_array:
-    """Return rows (n, n_dofs) of the relative motion of paired points along `direction` (n, dim).
+    """Return the derivatives (n, n_dofs) of relative displacements with respect to the displacements of all points [-].
 
+    The displacement of each candidate relative to its projection on the primary side is taken along `direction` (n, dim).
     Rows of unpaired candidates are empty.
     """
     dim = direction.shape[1]

@@ -1,9 +1,9 @@
-"""Projection along averaged normals: continuous across facets, unlike closest-point projection.
+"""Projection along averaged normals, which is continuous across facets, unlike closest-point projection.
 
-On a faceted surface the closest point jumps at concave edges, by a distance proportional to the gap; iterated pairings may
-then not converge. Along normals interpolated between nodal means the projection varies continuously (Puso and Laursen, 2004,
-section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2), on facets in 3D (`along_normals`) and on lines in the plane
-(`along_line_normals`).
+On a faceted surface the closest point jumps at concave edges, by a distance that is proportional to the gap. Repeated
+pairing may then not converge. Along normals that are interpolated between averaged nodal normals, the projection varies
+continuously (Puso and Laursen, 2004, section 3; Popp, Gitterle, Gee and Wall, 2010, section 4.2). `along_normals` projects
+onto facets in 3D, and `along_line_normals` onto lines in 2D.
 """
 
 from __future__ import annotations
@@ -22,22 +22,23 @@ from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 
-# Facets that meet at a smaller angle than this approximate a smooth surface; others form a corner [degrees].
+# Facets whose normals enclose a smaller angle than this approximate a smooth surface; others form a corner [degrees].
 CORNER = 45.0
 
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Points of a surface given by facets and reference coordinates; k is the largest number of nodes of a facet.
+    """Points of a surface that are given by facets and reference coordinates; k is the largest number of nodes of a facet.
 
     Attributes
     ----------
     nodes, local : ndarray of int (n, k)
-        Point numbers, and positions in the points of the surface; of facets with fewer nodes some are repeated.
+        Nodes of the facet of each point, as point numbers and as positions in ``Surface.points``. If a facet has fewer than
+        k nodes, the last one is repeated.
     shape : ndarray (n, k)
-        Shape functions; zero for repeated nodes.
+        Shape functions of the nodes, zero for repeated nodes [-].
     gradient : ndarray (n, k, dim - 1)
-        Their derivatives.
+        Their derivatives with respect to the reference coordinates [-].
     """
 
     nodes: Numbers
@@ -47,7 +48,7 @@ class Places:
 
 
 def places(side: Surface, facet: Indices, xi: Array) -> Places:
-    """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) of facets (n,)."""
+    """Return the points of `side` at the reference coordinates `xi` (n, dim - 1) in the facets numbered `facet` (n,)."""
     if len(side.blocks) == 1:
         return _of_block(side.blocks[0], facet, xi)
     width = max(block.facets.shape[1] for block in side.blocks)
@@ -70,14 +71,16 @@ def places(side: Surface, facet: Indices, xi: Array) -> Places:
 
 
 def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
+    """Return the points at reference coordinates `xi` (n, dim - 1) in the facets `rows` (n,) of a block."""
     element = elements.get(block.element)
     return Places(block.facets[rows], block.local[rows], element.shape(xi), element.gradient(xi))
 
 
 def nodal_normals(side: Surface, coordinates: Array) -> Array:
-    """Return the mean of the facets' unit normals at each node (m, dim), weighted by their angles there, normalised.
+    """Return the averaged unit normals (m, dim) of the nodes of a side.
 
-    With these weights it depends on the surface alone, not on its division into facets (Thuermer and Wuethrich, 1998).
+    The normal of a node is the mean of the unit normals of its facets, weighted by their angles at the node. With these
+    weights it does not depend on how the surface is divided into facets (Thuermer and Wuethrich, 1998).
     """
     normals = [facet_normals(block, coordinates) for block in side.blocks]
     return _nodal_means(
@@ -86,7 +89,11 @@ def nodal_normals(side: Surface, coordinates: Array) -> Array:
 
 
 def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]) -> Array:
-    """Return the means (m, dim) of `nodal_normals` from the normals and angles of the facets of each block."""
+    """Return the means (m, dim) of `nodal_normals`.
+
+    `values` and `angles` are the normals (n_facets, k, dim) and the angles (n_facets, k) of the facets at their nodes, by
+    block.
+    """
     n, dim = len(side.points), values[0].shape[2]
     at = np.concatenate([block.local.ravel() for block in side.blocks])
     weighted = [(angle[:, :, None] * normals).reshape(-1, dim) for normals, angle in zip(values, angles, strict=True)]
@@ -96,16 +103,21 @@ def _nodal_means(side: Surface, values: Sequence[Array], angles: Sequence[Array]
 
 
 def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
-    """Return, for each block, unit normals (n_facets, n_nodes, dim) at the nodes of facets as parts of a smooth surface.
+    """Return averaged unit normals at the nodes of the facets, separately on both sides of corners.
 
-    These are the nodal means of `nodal_normals`; at corners only the facets that meet the facet smoothly enter the mean, so
-    that a punch is flat up to its corner, also where its flanks belong to the surface.
+    They are those of `nodal_normals`, except at corners. There, the mean only includes the facets that continue the facet
+    smoothly, so that a punch is flat up to its corner although its flanks belong to the surface.
+
+    Returns
+    -------
+    list of ndarray (n_facets, n_nodes, dim)
+        Normals of each block.
     """
     facet_normals_of_blocks = [facet_normals(block, coordinates) for block in side.blocks]
     angles = [facet_angles(elements.get(block.element), coordinates[block.facets]) for block in side.blocks]
     means = _nodal_means(side, facet_normals_of_blocks, angles)
     smooth = [means[block.local] for block in side.blocks]
-    # A node is at a corner where a facet deviates from the mean by more than half the angle between two that form one.
+    # A node is a corner if the normal of one of its facets deviates from the mean by more than half of CORNER.
     flat, corner = np.cos(np.radians(0.5 * CORNER)), np.zeros(len(side.points), bool)
     for block, normals, mean in zip(side.blocks, facet_normals_of_blocks, smooth, strict=True):
         corner[block.local[np.einsum("fad,fad->fa", normals, mean) < flat]] = True
@@ -128,16 +140,16 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
 
 
 def at_nodes_of_facets(of_blocks: Sequence[Array]) -> Array:
-    """Return values at the nodes of facets (n_facets, k, ...) of all blocks as one array, as wide as the widest block.
+    """Return the values at the nodes of facets of all blocks in one array (n_facets, k, ...).
 
-    The last entry of facets with fewer nodes is repeated, as in `places`.
+    k is the largest number of nodes of a facet. For facets with fewer nodes the last value is repeated, as in `places`.
     """
     width = max(values.shape[1] for values in of_blocks)
     return np.concatenate([values[:, np.minimum(np.arange(width), values.shape[1] - 1)] for values in of_blocks])
 
 
 def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
-    """Return the unit normals (n_facets, n_nodes, dim) of facets at their own nodes."""
+    """Return the unit normals (n_facets, n_nodes, dim) of each facet at its nodes, for `coordinates` (n_points, dim)."""
     element, nodes = elements.get(block.element), coordinates[block.facets]
     slopes = element.gradient(element.nodes)
     if element.dim == 2:
@@ -149,11 +161,11 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
 
 
 def facet_angles(element: elements.Element, nodes: Array) -> Array:
-    """Return the angles (n, k) of facets with nodes (n, k, dim) at their corners; 1 at other nodes, and on lines."""
+    """Return the angles (n, k) of facets with nodes (n, k, dim) at their corners [radian]; 1 at other nodes and for lines."""
     if element.dim == 1:
         return np.ones(nodes.shape[:2])
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
-    around = np.arange(n)  # edges run from each corner to the next
+    around = np.arange(n)
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
     shared(
         lambda portion: projection_kernels.angles(nodes, beside, *portion, angle), portions(len(nodes), nodes.shape[1])
@@ -162,7 +174,7 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
 
 
 def interpolated(normals: Array, at: Places) -> Array:
-    """Return unit normals (n, dim) interpolated from those at the nodes of facets (n, k, dim)."""
+    """Return unit normals (n, dim) at points, interpolated between the normals (n, k, dim) at the nodes of their facets."""
     normal = np.einsum("nk,nkd->nd", at.shape, normals)
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
@@ -170,32 +182,33 @@ def interpolated(normals: Array, at: Places) -> Array:
 def along_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
-    """Project points on a surface in 3D along its interpolated normals, starting from their closest points.
+    """Project points onto a surface in 3D along its interpolated normals, starting from their closest points.
 
     Parameters
     ----------
     points : ndarray (n, 3)
-        [length].
+        Positions of the points [length].
     side : Surface
     coordinates : ndarray (n_points, 3)
         Coordinates of all nodes [length].
     normals : ndarray (n_facets, k, 3)
-        Unit normals of the facets at their nodes, see `smooth_normals`.
+        Unit normals at the nodes of the facets of all blocks, see `smooth_normals` and `at_nodes_of_facets`.
     start : Closest
-        Closest points; kept where the projection fails.
+        Closest points, from which the iteration starts. They are the result if it fails.
 
     Returns
     -------
     facet : ndarray of int (n,)
+        Number of the facet of each projection.
     xi : ndarray (n, 2)
-        Inside the facet.
+        Reference coordinates of the projection, within the facet [-].
     overhang : ndarray (n,)
-        Distance of the projection beyond the end of its facet, in facet lengths.
+        Distance of the projection beyond the end of its facet, in facet lengths [-].
     normal : ndarray (n, 3)
-        Interpolated unit normals there.
+        Interpolated unit normal at the projection [-].
     """
     facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
-    # Relative to the middle of the surface: far from the origin, round-off would exceed a converged step.
+    # Coordinates are relative to the centre of the surface. Far from the origin, their round-off would exceed the tolerance.
     x = coordinates[side.points]
     midst = 0.5 * (x.min(axis=0) + x.max(axis=0))
     heights = np.einsum("nd,nd->n", points - start.position, start.normal)
@@ -216,7 +229,10 @@ def along_normals(
 
 
 def _polynomials(kinds: Sequence[Array]) -> Array:
-    """Return the coefficients (n_facets, width, 3) of vectors at the nodes of facets (n, m, 3), kind by kind."""
+    """Return the polynomial coefficients (n_facets, width, 3) of vectors that are interpolated on facets.
+
+    `kinds` are the vectors (n, m, 3) at the nodes of the facets of each block.
+    """
     out, first = np.empty((sum(map(len, kinds)), max(kind.shape[1] for kind in kinds), 3)), 0
     for kind in kinds:
         projection_kernels.coefficients(kind, tables(kind.shape[1]).to_terms, first, 0, len(kind), out)
@@ -227,7 +243,7 @@ def _polynomials(kinds: Sequence[Array]) -> Array:
 def along_line_normals(
     points: Array, side: Surface, coordinates: Array, normals: Array, start: Closest
 ) -> tuple[Indices, Array, Array, Array]:
-    """Project points (n, 2) on a line along its interpolated normals; see `along_normals`."""
+    """Project points (n, 2) onto a line along its interpolated normals; for the other parameters see `along_normals`."""
     n_facets = side.n_facets
     corners, at_nodes = np.zeros((n_facets, 3, 2)), np.zeros((n_facets, 3, 2))
     at_nodes[:, : normals.shape[1]] = normals
@@ -248,10 +264,10 @@ def along_line_normals(
 
 
 def smooth_ends(side: Surface, normals: Array) -> Mask:
-    """Return the ends (n_facets, 2) of lines at which another line continues without a corner.
+    """Return the ends (n_facets, 2) of line facets at which an adjacent facet continues the line without a corner.
 
-    `normals` (n_facets, k, 2) are those of the facets at their nodes, see `smooth_normals`: the same for both
-    facets at such an end.
+    `normals` (n_facets, k, 2) are the normals at the nodes of the facets, see `smooth_normals`. At such an end they are
+    equal for both facets.
     """
     ends = np.concatenate([block.local[:, :2] for block in side.blocks])
     total = np.zeros((len(side.points), 2))

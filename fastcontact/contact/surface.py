@@ -1,4 +1,4 @@
-"""One side of a contact pair: the facets of a group, with outward orientation."""
+"""One side of a contact pair: the facets of a group, with normals that point out of the body."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from fastcontact.mesh.topology import ordered_line, outer_facets, remembered, sa
 
 @dataclass(frozen=True, eq=False)
 class FacetBlock:
-    """Facets of one kind.
+    """Facets of one element type.
 
     Attributes
     ----------
     element : str
-        Element of the facets.
-    facets : ndarray (n_facets, n_nodes)
-        Connectivity, normals pointing out of the solid.
-    local : ndarray (n_facets, n_nodes)
-        `facets` as positions in the points of the surface.
+        Name of the element type of the facets.
+    facets : ndarray of int (n_facets, n_nodes)
+        Point numbers of the nodes of each facet, oriented such that normals point out of the body.
+    local : ndarray of int (n_facets, n_nodes)
+        The same nodes, as positions in `Surface.points`.
     """
 
     element: str
@@ -37,21 +37,22 @@ class FacetBlock:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Facets of one side of a contact pair, numbered through blocks of one kind each.
+    """Facets of one side of a contact pair, in blocks of one element type each; facets are numbered through all blocks.
 
     Attributes
     ----------
     group : str
         Name of the group in the mesh.
     blocks : tuple of FacetBlock
-        The facets; several blocks where triangles and quadrangles meet.
-    points : ndarray (m,)
-        The nodes; in order along the line where the facets form one open line, else ascending.
+        The facets. There are several blocks if the side has triangles and quadrangles.
+    points : ndarray of int (m,)
+        Point numbers of the nodes: in the order along the line if the facets form one open line, otherwise in ascending
+        order.
     abscissa : ndarray (m,)
-        Length along the surface to each node [length]; zero where there is no such order.
+        Arc length along the line to each node; zero if the facets do not form one open line [length].
     periodic_ends : tuple of (ndarray of int (k,), ndarray of int (k,), ndarray (dim, dim) or (k, dim, dim))
-        Positions in `points` at both ends of a periodic part, and the rotation [-] from the first to the second: there the
-        surface continues. In a plane of symmetry both ends are the same nodes, and the rotation is a reflection.
+        Ends at which the surface is continued: positions in `points` of the nodes of two ends, and the rotation from the
+        first to the second end [-]. In a plane of symmetry both ends are the same nodes, and the rotation is a reflection.
     """
 
     group: str
@@ -61,7 +62,7 @@ class Surface:
     periodic_ends: tuple[tuple[Indices, Indices, Array], ...] = ()
 
     def with_periodic_ends(self, ends: Iterable[tuple[Indices, Indices, Array]]) -> Surface:
-        """Return the surface, continued at ends (k,) and (k,) given by point numbers, as far as it contains them."""
+        """Return the surface with `periodic_ends`, where nodes are given by point numbers; nodes elsewhere are ignored."""
         order, on_surface = np.argsort(self.points), []
         for first, second, turn in ends:
             both = np.isin(first, self.points) & np.isin(second, self.points) & (first != second)
@@ -70,34 +71,37 @@ class Surface:
         return replace(self, periodic_ends=tuple(on_surface))
 
     def add_across_ends(self, vectors: Array) -> None:
-        """Add the vectors (m, dim), sums over facets, of both ends of each periodic interface, in place."""
+        """Add up the vectors (m, dim) of corresponding nodes at both ends of each periodic interface, in place.
+
+        The vectors are sums over the facets of a node, which at a periodic end include the facets of the other end.
+        """
         for first, second, turn in self.periodic_ends:
             vectors[first] += (vectors[second][:, None] @ turn)[:, 0]
             vectors[second] = (vectors[first][:, None] @ np.swapaxes(turn, -1, -2))[:, 0]
 
     @property
     def n_facets(self) -> int:
-        """Number of facets of all kinds."""
+        """Number of facets of all blocks."""
         return sum(len(block.facets) for block in self.blocks)
 
     @property
     def order(self) -> int:
-        """Order of the facets: 1 where all are linear, 2 where any is quadratic."""
+        """Order of the facets: 1 if all facets are linear, otherwise 2."""
         return max(elements.get(block.element).order for block in self.blocks)
 
     @property
     def element(self) -> str:
-        """Element of the facets, where they are of one kind."""
+        """Name of the element type of the facets; ContactError if there are several types."""
         return self._only_block().element
 
     @property
     def facets(self) -> Numbers:
-        """Connectivity (n_facets, n_nodes), where the facets are of one kind."""
+        """`FacetBlock.facets` (n_facets, n_nodes) of the only block; ContactError if there are several."""
         return self._only_block().facets
 
     @property
     def local(self) -> Indices:
-        """`facets` as positions in `points`, where they are of one kind."""
+        """`FacetBlock.local` (n_facets, n_nodes) of the only block; ContactError if there are several."""
         return self._only_block().local
 
     def _only_block(self) -> FacetBlock:
@@ -110,13 +114,13 @@ class Surface:
 
     @cached_property
     def inner_ends(self) -> Mask:
-        """Which ends (n_facets, 2) of lines meet another line."""
+        """Ends (n_facets, 2) of line facets at which another line facet begins or ends."""
         ends = np.concatenate([block.local[:, :2] for block in self.blocks])
         return np.asarray(np.bincount(ends.ravel())[ends] > 1)
 
     @cached_property
     def beside(self) -> csr_array:
-        """One (m, m) where two nodes lie in one facet."""
+        """Adjacency matrix (m, m) of the nodes: one if two nodes belong to the same facet, otherwise zero."""
         rows = [np.repeat(block.local, block.local.shape[1], axis=1).ravel() for block in self.blocks]
         columns = [np.tile(block.local, block.local.shape[1]).ravel() for block in self.blocks]
         row, column, m = np.concatenate(rows), np.concatenate(columns), len(self.points)
@@ -126,19 +130,22 @@ class Surface:
 
     @cached_property
     def near(self) -> csr_array:
-        """One (m, m) where two nodes lie in one facet or in two facets that share a node."""
+        """Matrix (m, m), one if two nodes belong to the same facet or to two facets with a common node, otherwise zero."""
         adjacency = csr_array(self.beside @ self.beside)
         adjacency.data[:] = 1.0
         return adjacency
 
     @cached_property
     def triangular(self) -> Mask:
-        """Which facets (n_facets,) are triangles."""
+        """The facets (n_facets,) that are triangles."""
         return np.concatenate([np.full(len(b.facets), elements.get(b.element).n_corners == 3) for b in self.blocks])
 
     @cached_property
     def neighbours(self) -> tuple[Indices, Indices]:
-        """Facets that share a node with each facet, ascending, in compressed rows: offsets (n_facets + 1,) and facets."""
+        """For each facet, the other facets with which it has a common node, in ascending order.
+
+        They are stored as offsets (n_facets + 1,) and numbers of facets, as in a CSR matrix.
+        """
         nodes = np.concatenate([block.local.ravel() for block in self.blocks])
         sizes = np.concatenate([np.full(len(block.local), block.local.shape[1]) for block in self.blocks])
         start = np.concatenate([[0], np.cumsum(sizes)])
@@ -150,12 +157,18 @@ class Surface:
         return adjacency.indptr.astype(np.intp), adjacency.indices.astype(np.intp)
 
     def corners(self, coordinates: Array) -> list[Array]:
-        """Return the nodes (n_facets, n_nodes, dim) of each block at nodal `coordinates` (n_points, dim)."""
+        """Return the positions (n_facets, n_nodes, dim) of the nodes of the facets of each block [length].
+
+        `coordinates` (n_points, dim) are those of all points of the mesh [length].
+        """
         return [coordinates[block.facets] for block in self.blocks]
 
 
 def line_neighbours(local: Indices) -> Indices:
-    """Return the lines (n, 2) before and after each line of nodes (n, k), -1 for none: all have the same orientation."""
+    """Return the line facets (n, 2) before and after each line facet with nodes (n, k); -1 if there is none.
+
+    All facets must have the same orientation.
+    """
     begins, ends = np.full((2, int(local.max()) + 1), -1, np.intp)
     begins[local[:, 0]] = ends[local[:, 1]] = np.arange(len(local))
     return np.column_stack([ends[local[:, 0]], begins[local[:, 1]]])
@@ -163,7 +176,7 @@ def line_neighbours(local: Indices) -> Indices:
 
 @remembered
 def surface(mesh: Mesh, group: str) -> Surface:
-    """Return the facets of `group` oriented from the solid behind them, as ORIE_PEAU of code_aster does.
+    """Return the facets of `group`, oriented such that normals point out of the body, as ORIE_PEAU of code_aster does.
 
     Raises
     ------
@@ -187,7 +200,10 @@ def surface(mesh: Mesh, group: str) -> Surface:
 
 
 def _outward(mesh: Mesh, group: str, name: str, block: Numbers, outer: Mapping[str, Numbers]) -> Numbers:
-    """Return the facets `outer` of the solids that match `block`, with the solid's orientation."""
+    """Return the facets of `block` (n, k) with the orientation that they have among the outer facets of the bodies.
+
+    `outer` are the outer facets by element type; `name` is the element type of the block.
+    """
     candidates = outer.get(name, np.empty((0, elements.get(name).n_nodes), np.int32))
     rows = same_facets(candidates, block)
     missing = np.flatnonzero(rows < 0)
@@ -201,6 +217,7 @@ def _outward(mesh: Mesh, group: str, name: str, block: Numbers, outer: Mapping[s
 
 
 def _ordered(mesh: Mesh, group: str, facets: Mapping[str, Numbers]) -> tuple[Numbers, Array]:
+    """Return `Surface.points` (m,) and `Surface.abscissa` (m,)."""
     if mesh.dim == 2:
         try:
             line = ordered_line(mesh, group)

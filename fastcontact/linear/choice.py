@@ -1,4 +1,7 @@
-"""Linear solvers by name, and the choice of one by the size of a problem; a new file in `solvers` is a new solver."""
+"""Linear solvers by name, and the choice of one by the size of a problem.
+
+Each module of the package `solvers` implements one solver under the name of the module. To add a solver, add a module.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,15 @@ from fastcontact.linear.factor_solver import AFFORDABLE
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 
 log = logging.getLogger("fastcontact")
-# Solvers that need an optional package, and the extra that installs it.
+# Solvers that need an optional package: the name of the package, and the extra of fastcontact that installs it.
 OPTIONAL = {"cholmod": ("kvxopt", "cholmod")}
 KNOWN = tuple(name for _, name, _ in pkgutil.iter_modules(solvers.__path__))
 SOLVERS = tuple(name for name in KNOWN if name not in OPTIONAL or importlib.util.find_spec(OPTIONAL[name][0]))
 # Largest admissible relative residual.
 LOOSEST = 1e-3
-# Sizes above which a multigrid solution is cheaper than a factorisation (measured, see bench/README.md); where
-# constraints need columns of K^-1, which a factorisation provides at once and multigrid by one solution each: AFFORDABLE.
+# Number of unknowns, by dimension, above which a multigrid solution costs less than a factorisation (measured, see
+# bench/README.md). If constraints need columns of K^-1, the limit is AFFORDABLE, because multigrid needs one solution for
+# each column.
 DIRECT_UP_TO = {2: AFFORDABLE[2], 3: 15_000}
 
 
@@ -32,23 +36,25 @@ def make(
     Parameters
     ----------
     name : str
-        ``"direct"``; ``"cholmod"``, direct too, where its package is installed; ``"amg"``, multigrid; ``"pyamg"``, slow,
-        to compare with; or ``"auto"``: direct for 2D and small 3D problems, multigrid beyond. Multigrid needs
-        more iterations where parts are thin or materials nearly incompressible.
+        - ``"direct"``: Cholesky factorisation;
+        - ``"cholmod"``: Cholesky factorisation by CHOLMOD, which needs an optional package;
+        - ``"amg"``: multigrid, which needs more iterations if parts are thin or materials nearly incompressible;
+        - ``"pyamg"``: multigrid of pyamg, which is slower, for comparison;
+        - ``"auto"``: ``"direct"`` for 2D problems and small 3D problems, otherwise ``"amg"``.
     dim, n_dofs : int
-        Dimension and number of unknowns, for ``"auto"``.
+        Dimension and number of unknowns, for the choice by ``"auto"``.
     tolerance : float
         Relative residual of iterative solvers, at most 0.001.
     precision : {"single", "double"}, optional
-        Precision of the multigrid cycle, single by default; direct solvers always work in double precision.
+        Precision of the multigrid cycle, single by default. Direct solvers always use double precision.
     columns : bool
-        Whether constraints cannot be eliminated but need columns of ``K^-1``, as those with a full compliance do. For
-        ``"auto"``.
+        Whether constraints cannot be eliminated and need columns of ``K^-1``, such as those with a full compliance matrix;
+        for the choice by ``"auto"``.
 
     Raises
     ------
     ModelError
-        If there is no such solver, a package that it needs is missing, or the tolerance is out of range.
+        If the name is unknown, if a package that the solver needs is missing, or if the tolerance is out of range.
     """
     check_tolerance(tolerance)
     if name == "auto":
@@ -65,7 +71,7 @@ def make(
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Raise ModelError if a tolerance of linear solvers is out of range."""
+    """Raise a ModelError if the tolerance of a linear solver is out of range."""
     if not 0.0 < tolerance <= LOOSEST:
         raise ModelError(
             f"the tolerance {tolerance} of the linear solver must be positive and at most {LOOSEST}, such as 1e-10"
@@ -73,7 +79,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def tight_enough(tolerance: float, relative: float) -> float:
-    """Return a checked `tolerance`, or the criterion on the out-of-balance force if that is smaller."""
+    """Return the smaller of a checked `tolerance` and the criterion `relative` on the residual force."""
     check_tolerance(tolerance)
     if tolerance > relative:
         log.info("linear solver: the tolerance %.1e falls to %.1e, the criterion on balance", tolerance, relative)
@@ -82,7 +88,7 @@ def tight_enough(tolerance: float, relative: float) -> float:
 
 
 def chosen(dim: int, n_dofs: int, columns: bool = False) -> tuple[str, str]:
-    """Return the solver chosen by ``"auto"``, and the reason."""
+    """Return the name of the solver that ``"auto"`` selects, and the reason; for parameters see `make`."""
     limit = (AFFORDABLE if columns else DIRECT_UP_TO)[dim]
     if n_dofs <= limit:
         return "direct", f"for {n_dofs} unknowns in {dim}D a factorisation is cheapest (up to {limit})"

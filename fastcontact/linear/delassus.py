@@ -1,7 +1,10 @@
-"""Schur complement of linear constraints: ``(B K^-1 B.T + C) multiplier = c - B K^-1 f``.
+"""Schur complement of linear constraints, the Delassus operator.
 
-Only the degrees of freedom in B matter. Their rows and columns of ``K^-1`` are computed at their first appearance and cached,
-so further active sets and pairings cost a small dense solution and one solution with K each.
+A system ``K u = f + B.T multiplier`` with the constraints ``B u + C multiplier = c`` is reduced to
+``(B K^-1 B.T + C) multiplier = c - B K^-1 f``. For symbols see `linear.protocol`. The matrix ``B K^-1 B.T`` only depends on
+the rows and columns of ``K^-1`` that belong to degrees of freedom in B. They are computed when they are first needed, and
+stored. A new active set or pairing with the same degrees of freedom then costs a small dense solution and one solution with
+K.
 """
 
 from __future__ import annotations
@@ -19,17 +22,19 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-# Number of right-hand sides at a time: full columns of K^-1 are long, and only short parts of them are stored.
+# Number of right-hand sides that are solved for at a time. It bounds the memory of complete columns of K^-1, of which only
+# the entries at a few degrees of freedom are stored.
 CHUNK = 32
-# Largest number of constraints whose full compliance is formed and factorised: 3.2 GB per copy, and minutes; with friction,
-# where Newton's method factorises a nonsymmetric matrix several times for each pairing, ten seconds each.
+# Largest number of constraints whose Delassus operator is formed and factorised. A matrix of 20 000 rows takes 3.2 GB, and
+# its factorisation minutes. With friction, Newton's method factorises a nonsymmetric matrix several times for each pairing;
+# with 6 000 rows, one factorisation takes ten seconds.
 MOST_ROWS, MOST_ROWS_WITH_FRICTION = 20_000, 6_000
-# Formulation whose constraints never need columns of the inverse.
+# Options of a contact pair whose constraints can be eliminated, so that the Delassus operator is not formed.
 CHEAP = 'formulation="mortar" with multipliers="dual"'
 
 
 class TooManyColumnsError(ConvergenceError):
-    """Columns of the inverse would cost an iterative solver more than a factorisation."""
+    """Raised if an iterative solver would need so many columns of the inverse that a factorisation costs less."""
 
     def __init__(self, count: int) -> None:
         super().__init__(
@@ -39,12 +44,12 @@ class TooManyColumnsError(ConvergenceError):
 
 
 def check_rows(count: int, most: int | None = None) -> None:
-    """Refuse a full compliance of too many constraints.
+    """Check that the number of constraints whose Delassus operator is formed is not too large.
 
     Raises
     ------
     ContactError
-        If it would take hours.
+        If `count` exceeds `most`, by default MOST_ROWS.
     """
     most = MOST_ROWS if most is None else most
     if count > most:
@@ -56,27 +61,28 @@ def check_rows(count: int, most: int | None = None) -> None:
 
 
 class InverseColumns:
-    """Rows and columns of ``K^-1`` for the degrees of freedom requested so far.
+    """Submatrix of ``K^-1`` that belongs to the degrees of freedom requested so far.
 
     Parameters
     ----------
     n : int
         Size of K.
     solve_many : method
-        Method of the solver that owns these columns; maps right-hand sides (n, k) [force] to solutions (n, k) [length].
+        Method of the solver to which this object belongs. It maps right-hand sides (n, k) [force] to solutions (n, k)
+        [length].
     most : int, optional
         Largest number of columns; unlimited by default.
 
     Attributes
     ----------
     asked : list of ndarray of int
-        Degrees of freedom in the order in which they were solved for, on which round-off and errors of iterative solutions
-        depend.
+        Degrees of freedom of each request. Their order matters, because round-off and the errors of iterative solutions
+        depend on it.
     """
 
     def __init__(self, n: int, solve_many: Callable[[Array], Array], most: int | None = None) -> None:
         self._most = n if most is None else most
-        # A weak reference: a cycle of solver and columns would keep the factors, the largest objects, alive.
+        # The reference is weak, because a reference cycle would keep the factors of the solver, which are large, in memory.
         self._solve_many = weakref.WeakMethod(solve_many)
         self._place = np.full(n, -1, np.intp)
         self._dofs = np.empty(0, np.intp)
@@ -84,12 +90,15 @@ class InverseColumns:
         self.asked: list[Indices] = []
 
     def give(self, dofs: Indices, values: Array) -> None:
-        """Store rows and columns `dofs` (k,) of ``K^-1`` computed otherwise; only while nothing is stored."""
+        """Store the submatrix `values` (k, k) of ``K^-1`` for `dofs` (k,) [length / force], which was computed elsewhere.
+
+        It must be called before any request.
+        """
         self._dofs, self._values = dofs, values
         self._place[dofs] = np.arange(len(dofs))
 
     def of_rows(self, R: csr_array) -> Array:
-        """Return ``R K^-1 R.T`` (m, m) [length / force] for sparse rows R (m, n)."""
+        """Return ``R K^-1 R.T`` (m, m) [length / force] for a sparse matrix R (m, n)."""
         check_rows(R.shape[0])
         used = R.data != 0.0
         column = self._places(R.indices[used])
@@ -98,7 +107,7 @@ class InverseColumns:
         return symmetric(np.asarray(rows @ (rows @ self._values).T))
 
     def put_back(self, requests: Sequence[Indices]) -> None:
-        """Restore exactly the columns of `requests`, in that order; solve only for missing ones."""
+        """Restore the state after the given `requests`, in their order; solve only for columns that are not stored."""
         pairs = zip(self.asked, requests, strict=False)
         same = next((i for i, (old, new) in enumerate(pairs) if not np.array_equal(old, new)), len(requests))
         if later := sum(len(dofs) for dofs in self.asked[same:]):
@@ -109,13 +118,17 @@ class InverseColumns:
             self._places(dofs)
 
     def _places(self, dofs: NDArray[np.integer]) -> Indices:
-        """Return the positions of `dofs` (k,), which may repeat, among stored columns; solve for new ones."""
+        """Return the positions (k,) of `dofs` (k,) among the stored columns, after solving for new ones.
+
+        A degree of freedom may occur several times in `dofs`.
+        """
         new = np.unique(dofs[self._place[dofs] < 0]).astype(np.intp)
         if len(new):
             self._extend(new)
         return self._place[dofs]
 
     def _extend(self, new: Indices) -> None:
+        """Solve for the columns of the degrees of freedom `new` (k,), and store them."""
         old = len(self._dofs)
         if old + len(new) > self._most:
             raise TooManyColumnsError(old + len(new))
@@ -136,14 +149,14 @@ class InverseColumns:
 
 
 def lu_factors(A: Array) -> tuple[Array, Array]:
-    """Return the factors of a matrix (m, m) by SciPy's `lu_factor`.
+    """Return the LU factors of a matrix A (m, m), as `scipy.linalg.lu_factor` does.
 
     Raises
     ------
     LinAlgError
-        If it is singular up to round-off.
+        If A is singular up to round-off.
     """
-    with warnings.catch_warnings(action="ignore"):  # warning of an exactly zero pivot
+    with warnings.catch_warnings(action="ignore"):  # SciPy warns if a pivot is exactly zero; below this is an error
         lu, pivots = lu_factor(A)
     if not (np.abs(np.diag(lu)) > _round_off(A) * np.abs(A).max(axis=0)).all():
         raise LinAlgError("singular")
@@ -156,9 +169,23 @@ def symmetric(delassus: Array) -> Array:
 
 
 def solve_multipliers(delassus: Array, wanted: Array, C: Array | FieldCompliance | None) -> Array:
-    """Return the multipliers (m,) [force] with ``(delassus + C) multiplier = wanted`` (m,) [length].
+    """Return the multipliers with ``(delassus + C) multiplier = wanted``.
 
-    C is a matrix (m, m), the diagonal (m,) of a diagonal one, or None; `delassus` (m, m) is overwritten.
+    If the matrix is singular up to round-off, the solution of minimum norm is returned.
+
+    Parameters
+    ----------
+    delassus : ndarray (m, m)
+        Delassus operator; it is overwritten [length / force].
+    wanted : ndarray (m,)
+        Right-hand side [length].
+    C : ndarray (m, m) or (m,) or FieldCompliance, optional
+        Compliance of the constraints, or the diagonal of a diagonal one [length / force].
+
+    Returns
+    -------
+    ndarray (m,)
+        [force].
     """
     C = C.dense() if isinstance(C, FieldCompliance) else C
     if C is not None and C.ndim == 1:
@@ -174,10 +201,10 @@ def solve_multipliers(delassus: Array, wanted: Array, C: Array | FieldCompliance
 
 
 def _smallest(delassus: Array, wanted: Array) -> Array:
-    """Return the minimum-norm multipliers (m,) of linearly dependent rows."""
+    """Return the multipliers (m,) of minimum norm [force] for linearly dependent constraints."""
     return np.asarray(lstsq(delassus, wanted, cond=_round_off(delassus))[0])
 
 
 def _round_off(delassus: Array) -> float:
-    """Return the rounding error of a factorisation (m, m) over its diagonal."""
+    """Return a bound of the round-off of the pivots of a matrix (m, m), relative to its diagonal [-]."""
     return 10.0 * len(delassus) * float(np.finfo(float).eps)

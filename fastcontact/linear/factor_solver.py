@@ -1,6 +1,6 @@
-"""Common part of direct solvers: right-hand sides by factors of K, constraints by the Schur complement.
+"""Common part of direct solvers: solution with the factors of K, and constraints by the Schur complement.
 
-Solutions for right-hand sides that are linear combinations of earlier ones are combined from theirs (`KnownLoads`).
+If a right-hand side is a linear combination of earlier ones, so is its solution, which is not computed again (`KnownLoads`).
 """
 
 from __future__ import annotations
@@ -20,24 +20,28 @@ from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Number of last unknowns above which their dense block costs more than the solutions it saves.
+# Largest number of unknowns that are eliminated last. For more of them, the dense block of K^-1 costs more than it saves.
 LAST_UP_TO = 4000
-# Number of unknowns up to which a factorisation is affordable, by the dimension.
+# Largest number of unknowns for which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
+# Relative residual of direct solutions.
 ATTAINABLE = 1e-14
 # Number of stored right-hand sides: loads and supports seldom have more independent ramps.
 KEPT = 4
 
 
 class KnownLoads:
-    """Stores the last right-hand sides and solutions, and combines them where that is exact to round-off."""
+    """The last right-hand sides and their solutions, for right-hand sides that are linear combinations of them."""
 
     def __init__(self) -> None:
         self._loads: list[Array] = []
         self._solutions: list[Array] = []
 
     def solution(self, f: Array, solve: Callable[[Array], Array]) -> Array:
-        """Return the solution (n,) for f (n,); `solve` computes new ones."""
+        """Return the solution (n,) for the right-hand side f (n,).
+
+        If f is not a linear combination of the stored right-hand sides up to round-off, the function `solve` is called.
+        """
         size = float(np.linalg.norm(f))
         if size == 0.0:
             return np.zeros_like(f)
@@ -50,25 +54,26 @@ class KnownLoads:
         return size * u
 
     def _projected(self, f: Array) -> tuple[Array, Array]:
-        """Return the least-squares weights of the stored loads for f, and the remainder (n,)."""
+        """Return the weights of the stored right-hand sides in the least-squares approximation of f, and its error (n,)."""
         weights, left = np.zeros(len(self._loads)), f
         if self._loads:
             gram = np.array([[one @ other for other in self._loads] for one in self._loads])
-            for _ in range(2):  # a second pass recovers digits lost in the normal equations
+            for _ in range(2):  # The second pass removes the error of the normal equations.
                 weights = weights + np.linalg.lstsq(gram, [load @ left for load in self._loads], rcond=None)[0]
                 left = f - sum((w * load for w, load in zip(weights, self._loads, strict=True)), np.zeros_like(f))
         return weights, left
 
     def _keep(self, f: Array, u: Array) -> None:
+        """Store the right-hand side f (n,) and its solution u (n,); discard the oldest ones."""
         self._loads, self._solutions = [*self._loads[1 - KEPT :], f], [*self._solutions[1 - KEPT :], u]
 
     def snapshot(self) -> list[dict[str, Any]]:
-        """Return the stored right-hand sides in sparse form: ``places`` and ``values``."""
+        """Return the stored right-hand sides: ``places`` and ``values`` of their nonzero entries."""
         places = [np.flatnonzero(f) for f in self._loads]
         return [{"places": at, "values": f[at]} for at, f in zip(places, self._loads, strict=True)]
 
     def put_back(self, snapshot: Sequence[Mapping[str, Any]], n: int, solve: Callable[[Array], Array]) -> None:
-        """Restore the right-hand sides of a `snapshot`, for the same matrix (n, n); solve only for missing ones."""
+        """Restore the right-hand sides of a `snapshot` for the same matrix (n, n); `solve` computes missing solutions."""
         now = list(zip(self._loads, self._solutions, strict=True))
         self._loads, self._solutions = [], []
         for entry in snapshot:
@@ -79,16 +84,23 @@ class KnownLoads:
 
 
 class FactorSolver(LinearSolver):
-    """A direct solver; sub-classes factorise.
+    """Base class of direct solvers; subclasses implement the factorisation.
 
-    Unknowns that equations may involve are eliminated last. Their Delassus operator is the inverse of the trailing block,
-    ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, and costs no solution with K at all; the displacement of the other unknowns under
-    contact forces follows from theirs by half a solution.
+    Unknowns that equations may involve, with the index c below, are eliminated last. With the factors ``K = L D L.T``,
+    their block of the inverse is ``(K^-1)_cc = (L_cc D_c L_cc.T)^-1``, which takes no solution with K. The displacements of
+    the other unknowns under contact forces follow from those of the unknowns c by back substitution alone.
 
     Parameters
     ----------
     tolerance : float
-        Ignored: direct solutions are exact up to round-off.
+        Not used, because direct solutions are exact up to round-off.
+
+    Attributes
+    ----------
+    n : int
+        Number of unknowns.
+    last : ndarray of int (m,) or None
+        The unknowns that are eliminated last, if any.
     """
 
     name: str
@@ -105,7 +117,7 @@ class FactorSolver(LinearSolver):
         return f"{type(self).__name__}({f'{self.n} unknowns' if self.n else 'not prepared'})"
 
     def _factorised(self, K: bsr_array, last: Indices) -> SymmetricFactors:
-        """Return the factors of K (n, n), with the unknowns `last` (m,) last, or raise ModelError if it is singular."""
+        """Return the factors of K (n, n), with the unknowns `last` (m,) eliminated last; ModelError if K is singular."""
         raise NotImplementedError
 
     def prepare(
@@ -135,11 +147,11 @@ class FactorSolver(LinearSolver):
         return self.last is not None
 
     def load(self, f: Array) -> Any:
-        """Return the prepared matrix with right-hand side `f` (n,)."""
+        """Return the prepared matrix with the right-hand side `f` (n,) [force]."""
         return LoadedFactor(self, f, self.known_loads.solution(f, self.back_substitute))
 
     def snapshot(self) -> dict[str, Any]:
-        """See `LinearSolver.snapshot`: columns of ``K^-1`` computed so far, and stored right-hand sides."""
+        """Return the requested columns of ``K^-1`` and the stored right-hand sides; see `LinearSolver.snapshot`."""
         state = {"asked": list(self.columns.asked), "loads": self.known_loads.snapshot()}
         return {**state, "refines": True} if self.refines else state
 
@@ -150,7 +162,7 @@ class FactorSolver(LinearSolver):
         self.known_loads.put_back(snapshot["loads"], self.n, self._factors.solve)
 
     def improve(self, excess: float) -> bool:
-        """See `LinearSolver.improve`: one step of iterative refinement for later solutions."""
+        """Apply one step of iterative refinement in later solutions; see `LinearSolver.improve`."""
         if self.refines:
             return False
         log.info("linear solver: forces are out of balance by %.1e times the bound, solutions are refined", excess)
@@ -158,23 +170,26 @@ class FactorSolver(LinearSolver):
         return True
 
     def refined(self, f: Array) -> Array:
-        """Return ``K^-1 f``, shape (n,), with one step of iterative refinement."""
+        """Return ``K^-1 f`` (n,), with one step of iterative refinement."""
         u = self.back_substitute(f)
         return u + self.back_substitute(f - self._K @ u)
 
     def back_substitute(self, f: Array) -> Array:
-        """Return ``K^-1 f``, shape (n,)."""
+        """Return ``K^-1 f`` (n,)."""
         self.counters.iterations += 1
         return self._factors.solve(f)
 
     def extend(self, u: Array) -> Array:
-        """Return the displacement (n,) under forces on the unknowns `last` alone, which move by u (m,)."""
+        """Return the displacements (n,) [length] under forces on the unknowns `last` alone, which move by u (m,)."""
         self.counters.iterations += 1
         return self._factors.extended(u)
 
 
 class LoadedFactor:
-    """See `linear.protocol.Loaded`; `free` (n,) is the displacement without equations."""
+    """The factors of a `FactorSolver` with a right-hand side f (n,); see `linear.protocol.Loaded`.
+
+    `free` (n,) is the solution without equations [length].
+    """
 
     def __init__(self, solver: FactorSolver, f: Array, free: Array) -> None:
         self._solver, self._f, self._free = solver, f, free
@@ -217,7 +232,7 @@ class LoadedFactor:
         return None if last is None else CondensedProblem(self._solver.inverse, self._free[last])
 
     def _moved(self, force: Array) -> Array | None:
-        """Return the displacement (m,) of the unknowns `last` under a force (n,); None where that acts on others, too."""
+        """Return the displacements (m,) of the unknowns `last` under forces (n,); None if forces act on other unknowns."""
         last = self._solver.last
         if last is None or np.count_nonzero(force) != np.count_nonzero(force[last]):
             return None
@@ -225,14 +240,16 @@ class LoadedFactor:
 
 
 class CondensedProblem:
-    """K condensed to the k contact unknowns by a dense inverse; see `linear.protocol.Loaded`. Vectors have length k.
+    """The system after static condensation to the k unknowns that equations may involve; see `linear.protocol.Loaded`.
+
+    All vectors have the length k.
 
     Parameters
     ----------
     inverse : ndarray (k, k)
-        Rows and columns of ``K^-1``, symmetric [length / force].
+        Block of ``K^-1`` for these unknowns, the inverse of the condensed matrix [length / force].
     free : ndarray (k,)
-        Displacement without equations [length].
+        Solution without equations [length].
     """
 
     def __init__(self, inverse: Array, free: Array) -> None:

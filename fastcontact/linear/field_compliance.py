@@ -1,14 +1,17 @@
-r"""Compliance of point forces outside a multiplier field, and the equivalent equations for the field.
+r"""Compliance of point forces of a multiplier field, and equivalent equations for the values of the field.
 
-Forces of points with the weights W belong to a field with the values p, ``P p`` at the points. Components outside the field
-are compliant: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho` among the points of some equations, M the mass matrix of the
-field over these and all other points. With forces W (P p - rho (B u - c)) the equations ``B u + C force = c`` are
-:math:`P^T W (B u - c) + E p = 0` for the field, E the mass matrix of the other points over rho, which vanishes except at
-the edge of the contact. Springs of the stiffness rho W act along the rows B, on components outside the field.
+A multiplier field with the values p has the pressures ``P p`` at its integration points, whose areas are the diagonal
+matrix W. Let M be the mass matrix of the field, integrated with all points, and :math:`\rho` the constant of the augmented
+Lagrangian, see `contact.formulations._pressure_field`. Some of the points are closed, with the equations
+``B u + C force = c``. Forces that the field does not represent are compliant: :math:`C = (W^{-1} - P M^{-1} P^T) / \rho`.
 
-Points with an additional compliance S, such as a penalty, have the compliance :math:`C + S`. With
-:math:`W' = W / (1 + \rho W S)` in place of W, in the equations of the field as well as in the springs, E becomes
-:math:`E + P^T W W' S P`: all values are compliant.
+With the forces :math:`W (P p - \rho (B u - c))` the equations are equivalent to :math:`P^T W (B u - c) + E p = 0` for the
+field, and to springs of the stiffness :math:`\rho W` along the rows of B. E is the mass matrix over the other points,
+divided by :math:`\rho`. It vanishes except at the edge of the contact.
+
+If points have an additional compliance S, such as that of a penalty, their compliance is :math:`C + S`. In the equations of
+the field and in the springs, W is then replaced by :math:`W' = W / (1 + \rho W S)`, and E by :math:`E + P^T W W' S P`, so
+that all values of the field are compliant.
 """
 
 from __future__ import annotations
@@ -25,24 +28,25 @@ from fastcontact.arrays import Array, Indices, Mask
 
 @dataclass(frozen=True, eq=False)
 class FieldCompliance:
-    """Equations for the values of multiplier fields, and springs of their points, in the notation of the module.
+    """Compliance of m equations at points of multiplier fields; for the symbols see the module.
 
-    Exact constraints are represented by fields of one point without springs.
+    Equations without compliance are represented by fields of one point each, without springs.
 
     Attributes
     ----------
     P : csr_array (m, k)
-        From field values to the points of the equations [-].
+        Map from the k values of the fields to the points of the equations [-].
     weights : ndarray (m,)
-        W, positive [area].
+        Areas W of the points, positive [area].
     stiffness : ndarray (m,)
-        rho W [force / length].
+        Stiffness rho W of the springs [force / length].
     others : csr_array (k, k)
-        E: the mass matrix of the points without equations over rho, plus the contribution of compliant points.
+        The matrix E.
     dense : callable
-        Returns C (m, m) [length / force].
+        Function without arguments that returns C (m, m) [length / force].
     bordered : bool
-        Whether values without compliance remain unknowns, too: on quadratic facets, whose equations are nearly dependent.
+        Whether values without compliance are not eliminated either. This is the case for quadratic facets, whose equations
+        are nearly linearly dependent.
     """
 
     P: csr_array
@@ -54,7 +58,7 @@ class FieldCompliance:
 
     @classmethod
     def stacked(cls, compliances: Sequence[FieldCompliance], dense: Callable[[], Array]) -> FieldCompliance:
-        """Return the block-diagonal combination of several compliances."""
+        """Return the block-diagonal matrix of several compliances, with the function `dense` for all equations."""
         return cls(
             csr_array(block_diag([compliance.P for compliance in compliances], format="csr")),
             np.concatenate([compliance.weights for compliance in compliances]),
@@ -66,12 +70,15 @@ class FieldCompliance:
 
     @classmethod
     def none(cls, m: int) -> FieldCompliance:
-        """Return the compliance of m exact constraints."""
+        """Return the compliance of m equations without compliance."""
         identity = csr_array(diags_array(np.ones(m)))
         return cls(identity, np.ones(m), np.zeros(m), csr_array((m, m)), lambda: np.zeros((m, m)))
 
     def softened(self, softness: Array, dense: Callable[[], Array]) -> FieldCompliance:
-        """Return the compliance increased by `softness` (m,) at the points [length / force]."""
+        """Return the compliance with the diagonal compliance S, `softness` (m,), added [length / force].
+
+        `dense` is the function that returns the sum as a matrix.
+        """
         share = 1.0 / (1.0 + self.stiffness * softness)
         weights = self.weights * share
         added = self.P.T @ diags_array(self.weights * weights * softness) @ self.P
@@ -80,11 +87,14 @@ class FieldCompliance:
         return FieldCompliance(self.P, weights, self.stiffness * share, others, dense, self.bordered)
 
     def of_field(self, B: csr_array, c: Array) -> FieldEquations:
-        """Return the equivalent equations for the field, from rows B (m, n) and right-hand sides c (m,) [length]."""
+        """Return the equivalent equations for the values of the field.
+
+        B (m, n) and c (m,) are the matrix [-] and the right-hand sides [length] of the equations at the points.
+        """
         shares = csr_array(self.P.T @ diags_array(self.weights))
         size = np.asarray(abs(shares).sum(axis=1))
         touched = np.flatnonzero(size > 0.0)
-        # Each equation is scaled by its area, which is small at the edge of the contact.
+        # Each equation is divided by its area, which may be small at the edge of the contact.
         units = 1.0 / size[touched]
         shares = csr_array(diags_array(units) @ shares[touched])
         edge = (self.others.diagonal()[touched] > 0.0) | self.bordered
@@ -93,7 +103,10 @@ class FieldCompliance:
         return FieldEquations(csr_array(shares @ B), shares @ c, P, edge, compliance, touched[edge], units[edge])
 
     def _at_edge(self, given: Indices, units: Array) -> csr_array:
-        """Return E (e, e) among values `given` (e,), those without any equation being eliminated."""
+        """Return E (e, e) for the values `given` (e,), scaled by `units` (e,).
+
+        Values of the field that occur in no equation are eliminated from E.
+        """
         rest = np.setdiff1d(np.flatnonzero(self.others.diagonal() > 0.0), given)
         E = csr_array(self.others[given][:, given])
         across = csr_array(self.others[given][:, rest])
@@ -109,19 +122,25 @@ class FieldCompliance:
 
 @dataclass(frozen=True, eq=False)
 class FieldEquations:
-    """``rows u + E p = right``, p the values of the field with any equation; ``P p`` are pressures at the points.
+    """Equations ``rows u + E p = right`` for those values p (l,) of a field that the equations at points involve.
 
     Attributes
     ----------
     rows : csr_array (l, n)
+        [-].
     right : ndarray (l,)
+        [length].
     P : csr_array (m, l)
+        Map from the values p to the pressures at the points.
     edge : ndarray of bool (l,)
-        Values that remain unknowns: the compliant ones at the edge of the contact; with a penalty all, see `bordered`.
+        The e values that are not eliminated: those with a compliance, at the edge of the contact or due to a penalty; or all
+        values, see `FieldCompliance.bordered`.
     compliance : csr_array (e, e)
-        E among these unknowns.
-    at, units : ndarray (e,)
-        Their positions in the field, and their scaling.
+        E for these values.
+    at : ndarray of int (e,)
+        Numbers of these values in the field.
+    units : ndarray (e,)
+        Their scaling factors.
     """
 
     rows: csr_array

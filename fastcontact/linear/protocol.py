@@ -1,9 +1,9 @@
 """Protocols of linear solvers.
 
-Shapes: n unknowns, m equations among them. ``K`` is a stiffness [force / length], ``u`` a displacement [length], ``f`` a
-force [force]. Equations ``B u + C multiplier = c`` have rows B (m, n) [-] and right-hand sides c (m,) [length]; their
-multipliers (m,) are forces [force], their compliance C is a length per force: a matrix (m, m), or the diagonal (m,) of a
-diagonal one.
+A solver handles systems with n unknowns and m linear equations between them. K (n, n) is a stiffness matrix [force /
+length], u (n,) are displacements [length], and f (n,) forces [force]. The equations are ``B u + C multiplier = c`` with a
+matrix B (m, n) [-], right-hand sides c (m,) [length], Lagrange multipliers (m,) [force] and a compliance C [length /
+force]. C is a matrix (m, m), or the diagonal (m,) of a diagonal matrix.
 """
 
 from __future__ import annotations
@@ -18,36 +18,44 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.springs import Springs
 
-# Default relative accuracy of the solutions.
+# Default relative residual at which iterative solvers stop.
 TOLERANCE = 1e-10
-# Contrasts of materials up to this, see `LinearSolver`, are ignored.
+# Largest `LinearSolver.contrast` that is ignored.
 MILD = 10.0
-# Called with an unfinished solution (u, multiplier, relative residual); the solver stops if it returns True.
+# Function of an unconverged solution u (n,) and multiplier (m,), and of its relative residual. It returns whether to stop.
 Monitor = Callable[[Array, Array, float], bool]
 
 
 class Product(Protocol):
-    """Matrix-vector products of a solver that stores K (n, n) in its own format."""
+    """Products with the matrix K (n, n) of a solver that has stored it in a different format."""
 
     def __matmul__(self, u: Array) -> Array:
-        """Return ``K u``, shape (n,) [force]."""
+        """Return ``K @ u`` (n,) [force]."""
         ...
 
     def row_sums(self, u: Array) -> Array:
-        """Return ``|K| |u|``, shape (n,) [force]."""
+        """Return ``abs(K) @ abs(u)`` (n,) [force]."""
         ...
 
 
 @dataclass
 class Counters:
-    """Work done since `prepare`: factorisations or hierarchies, and solutions or iterations."""
+    """Work of a solver since `LinearSolver.prepare`.
+
+    Attributes
+    ----------
+    setups : int
+        Number of factorisations or multigrid hierarchies.
+    iterations : int
+        Number of solutions of a direct solver, or of iterations of an iterative one.
+    """
 
     setups: int = 0
     iterations: int = 0
 
 
 class Loaded(Protocol):
-    """A prepared matrix with a right-hand side f (n,)."""
+    """A prepared matrix K (n, n) with a right-hand side f (n,)."""
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
@@ -55,49 +63,71 @@ class Loaded(Protocol):
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``K u = f + B.T multiplier`` and ``B u + C multiplier = c``.
 
-        B has full row rank where C, symmetric and positive semidefinite, is None or singular. Iterative solvers start from
-        `guess` (n,), call `monitor` regularly and return the unfinished solution if it returns True; they stop at a relative
-        residual of `tolerance` if that is given and larger than their own. `nodes` (m,) are the nodes of the equations, whose
-        unknowns are preferred for elimination.
+        Parameters
+        ----------
+        B : csr_array (m, n)
+            Matrix of the equations; it must have full row rank unless C is positive definite [-].
+        c : ndarray (m,)
+            Right-hand sides [length].
+        C : ndarray (m, m) or (m,) or FieldCompliance, optional
+            Compliance, symmetric and positive semidefinite; zero by default [length / force].
+        guess : ndarray (n,), optional
+            Initial guess of u for iterative solvers [length].
+        monitor : callable, optional
+            `Monitor` that iterative solvers call regularly. If it returns True, they return the unconverged solution.
+        tolerance : float, optional
+            Relative residual at which iterative solvers stop, if it is larger than their tolerance [-].
+        nodes : ndarray of int (m,), optional
+            The node of each equation, whose unknowns are preferred for elimination.
+
+        Returns
+        -------
+        u : ndarray (n,)
+            [length].
+        multiplier : ndarray (m,)
+            [force].
         """
         ...
 
     def delassus(self, R: csr_array) -> tuple[Array, Array]:
-        """Return ``R K^-1 f``, shape (m,) [length], and ``R K^-1 R.T``, shape (m, m) [length / force], of rows R (m, n)."""
+        """Return ``R K^-1 f`` (m,) [length] and the Delassus operator ``R K^-1 R.T`` (m, m) [length / force] for R (m, n)."""
         ...
 
     def involved_solution(self, force: Array, elsewhere: Array | None) -> Array:
-        """Return ``K^-1 (f + force)``, shape (n,), valid at the `involved` unknowns of `LinearSolver.prepare`.
+        """Return ``K^-1 (f + force)`` (n,) [length], valid only at the `involved` unknowns of `LinearSolver.prepare`.
 
-        Solvers for which the other unknowns are an extra cost copy them from `elsewhere` (n,), if given. `solve` does
-        the same with its `guess`.
+        A solver for which the other unknowns cost extra copies them from `elsewhere` (n,), if this is given. Likewise,
+        `solve` copies them from its `guess`.
         """
         ...
 
     def full_solution(self, force: Array, u: Array | None = None) -> Array:
-        """Return ``K^-1 (f + force)``, shape (n,); `u` (n,) is the result of `involved_solution` or `solve` for it."""
+        """Return ``K^-1 (f + force)`` (n,) [length].
+
+        `u` (n,) is the result of `involved_solution` or `solve` with the same forces, if it is known [length].
+        """
         ...
 
     def condensed(self) -> Loaded | None:
-        """Return the problem condensed to the `involved` unknowns; None for solvers that do not condense.
+        """Return the system after static condensation to the `involved` unknowns; None if the solver does not condense.
 
-        Its vectors and columns have these unknowns, in their order.
+        The unknowns of the condensed system are the involved ones, in the order of `involved`.
         """
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionTerms:
-    """Forces of sliding friction in addition to those of equations.
+    """Effect of sliding friction on the equilibrium, see `LoadedNonsymmetric.solve_nonsymmetric`.
 
     Attributes
     ----------
     rows : csr_array (m, n)
-        Rows that multipliers act through in place of those of the equations [-].
+        Matrix whose transpose maps the multipliers to forces on the unknowns, instead of the transpose of B [-].
     springs : Springs, optional
-        S is their matrix [force / length].
+        Springs that are added to K; S is their matrix (n, n) [force / length].
     forces : ndarray (n,), optional
-        Further forces [force].
+        Additional forces on the unknowns [force].
     """
 
     rows: csr_array
@@ -107,7 +137,10 @@ class FrictionTerms:
 
 @runtime_checkable
 class LoadedNonsymmetric(Loaded, Protocol):
-    """Solver of systems whose multipliers act through other rows than those of the equations, as in sliding friction."""
+    """A `Loaded` that also solves the nonsymmetric systems of sliding friction.
+
+    In these systems the forces of the multipliers are ``rows.T @ multiplier`` with a matrix other than B.
+    """
 
     @property
     def contrast(self) -> float:
@@ -124,33 +157,54 @@ class LoadedNonsymmetric(Loaded, Protocol):
     ) -> tuple[Array, Array]:  # fmt: skip
         """Return (u, multiplier) with ``B u + C multiplier = c`` and ``K u + S u = f + forces + rows.T multiplier``.
 
-        C (m,) is a diagonal compliance, None stands for zero. S, forces and rows are those of `friction`; without it they
-        are zero and B. Equations of one of the `nodes` (m,) may share unknowns. The iteration starts from `guess` (n,) and
-        ends at a relative residual of `tolerance`, or at the solver's own if that is larger.
+        Parameters
+        ----------
+        B : csr_array (m, n)
+            Matrix of the equations [-].
+        c : ndarray (m,)
+            Right-hand sides [length].
+        nodes : ndarray of int (m,)
+            The node of each equation. Equations of the same node may involve the same unknowns.
+        guess : ndarray (n,)
+            Initial guess of u [length].
+        tolerance : float
+            Relative residual at which the iteration stops, if it is larger than the tolerance of the solver [-].
+        friction : FrictionTerms, optional
+            S, `forces` and `rows`. By default S and `forces` are zero, and `rows` is B.
+        C : ndarray (m,), optional
+            Diagonal compliance; zero by default [length / force].
+
+        Returns
+        -------
+        u : ndarray (n,)
+            [length].
+        multiplier : ndarray (m,)
+            [force].
 
         Raises
         ------
         ConvergenceError
-            If exact constraints are linearly dependent, in B or in rows, or the iteration does not converge.
+            If equations without compliance are linearly dependent, in B or in `rows`, or if the iteration does not converge.
         """
         ...
 
 
 class LinearSolver(Protocol):
-    """Solves ``K u = f`` under linear equations, for one K and many right-hand sides and sets of equations.
+    """Solver of ``K u = f`` under linear equations, for one matrix K and many right-hand sides and sets of equations.
 
     Attributes
     ----------
     tolerance : float
-        Relative accuracy of the solutions [-]; `improve` may lower it.
+        Relative residual of the solutions, which `improve` may reduce [-].
     asked : float, optional
-        The original tolerance, if `improve` has lowered it [-].
+        The original tolerance, if `improve` has reduced it [-].
     counters : Counters
     gave_up : str
-        Reason why another method replaced this one; empty if none did.
+        Reason why a different method has replaced this one; empty if none has.
     contrast : float
-        By how much some deformations of a cell are stiffer than others: errors of displacements may exceed residuals by so
-        much, and iterations that need not end with exact solutions go on by so much further [-].
+        Ratio of the stiffest to the softest deformation of a cell, such as dilatation and shear of nearly incompressible
+        material. Relative errors of displacements may exceed relative residuals by this factor, and the tolerances of inexact
+        solutions are divided by it [-].
     """
 
     tolerance: float
@@ -161,12 +215,12 @@ class LinearSolver(Protocol):
 
     @property
     def iterative(self) -> bool:
-        """Whether less accurate solutions cost less."""
+        """Whether a solution with a larger tolerance costs less."""
         ...
 
     @property
     def condenses(self) -> bool:
-        """Whether the prepared solver has K condensed to the `involved` unknowns."""
+        """Whether `prepare` has condensed K statically to the `involved` unknowns."""
         return False
 
     def prepare(
@@ -177,19 +231,19 @@ class LinearSolver(Protocol):
         Parameters
         ----------
         K : bsr_array (n, n)
-            Symmetric and positive definite [force / length].
+            Symmetric positive definite matrix [force / length].
         rigid_modes : ndarray (n, n_modes)
-            Near null space of K, the rigid-body modes [length].
+            Rigid-body modes, which span the near null space of K [length].
         involved : ndarray of int (k,), optional
-            Unknowns that equations may involve; a hint.
+            Unknowns that equations may involve. Solvers may use this information to save work.
         release : bool
-            Whether a solver with its own storage of K may reuse the memory of K and leave it empty. The returned object then
-            replaces K in products.
+            Whether a solver that stores K in a different format may release the memory of K and leave it empty. The returned
+            object then replaces K in products.
 
         Returns
         -------
         bsr_array or Product
-            K, or its replacement.
+            K, or the object that replaces it in products.
         """
         ...
 
@@ -198,16 +252,16 @@ class LinearSolver(Protocol):
         ...
 
     def snapshot(self) -> dict[str, Any]:
-        """Return everything on which later solutions depend, as plain numbers, strings and arrays.
+        """Return all data on which later solutions depend, as numbers, strings and arrays.
 
-        It is the solver's part of the state of an analysis, and is saved with it: arrays are replaced, never written into.
+        The state of an analysis includes the snapshot, and a restart saves it. Its arrays must not be modified later.
         """
         ...
 
     def put_back(self, snapshot: Mapping[str, Any]) -> None:
-        """Continue from a `snapshot` of this solver, or of one of the same kind that was prepared for the same matrix."""
+        """Restore the data of a `snapshot`, taken of this solver or of one of the same class for the same matrix."""
         ...
 
     def improve(self, excess: float) -> bool:
-        """Make later solutions more accurate, since the residual exceeds its bound by `excess`; False if impossible."""
+        """Reduce `tolerance`, because the residual exceeds its bound by the factor `excess`; return False if impossible."""
         return False

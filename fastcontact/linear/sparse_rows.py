@@ -1,4 +1,4 @@
-"""Sparse matrices from cells or nodal values, and their sums; rows scaled and selected without matrix products."""
+"""Functions for sparse matrices: assembly from cells or nodal values, sums, and scaling and selection of rows."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 
 
 class Entries:
-    """Entries of a sparse matrix, collected cell by cell."""
+    """Entries of a sparse matrix that is assembled from cells."""
 
     def __init__(self) -> None:
         self._rows: list[Numbers] = []
@@ -18,14 +18,14 @@ class Entries:
         self._values: list[Array] = []
 
     def add(self, rows: NDArray[np.integer], columns: NDArray[np.integer], values: Array) -> None:
-        """Add blocks (n, k, l) at rows (n, k) and columns (n, l); zeros are left out."""
+        """Add n dense blocks `values` (n, k, l) at `rows` (n, k) and `columns` (n, l); zeros are left out."""
         nonzero = np.flatnonzero(values)
         self._rows.append(np.broadcast_to(rows[:, :, None].astype(np.int32), values.shape).ravel()[nonzero])
         self._columns.append(np.broadcast_to(columns[:, None, :].astype(np.int32), values.shape).ravel()[nonzero])
         self._values.append(values.ravel()[nonzero])
 
     def matrix(self, size: tuple[int, int]) -> csr_array:
-        """Return the sum of all entries."""
+        """Return the matrix of the given size, in which entries at the same position are added."""
         if not self._rows:
             return csr_array(size)
         positions = np.concatenate(self._rows), np.concatenate(self._columns)
@@ -33,20 +33,26 @@ class Entries:
 
 
 def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_array:
-    """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
+    """Return the shape functions (m, n_nodes) of all nodes at m points.
+
+    `shape` (m, n) are the shape functions of the n nodes `local` (m, n) of the cell of each point.
+    """
     row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
     return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
 
 
 def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
-    """Return the sum of two matrices (n, n) in the blocks of the first, which are sorted."""
+    """Return the sum of two matrices (n, n), with the block size of the first one and sorted blocks."""
     total = bsr_array(K + more.tobsr(K.blocksize))
     total.sort_indices()
     return total
 
 
 def rows_of(mean: csr_array, direction: Array) -> csr_array:
-    """Return rows (m, n_dofs) along directions (m, dim) from weights (m, n_points) of nodes."""
+    """Return rows (m, n_dofs) of the components along `direction` (m, dim) of weighted sums of nodal vectors.
+
+    `mean` (m, n_points) are the weights of the nodes.
+    """
     dim = direction.shape[1]
     row = np.repeat(np.arange(mean.shape[0]), np.diff(mean.indptr))
     values = mean.data[:, None] * direction[row]
@@ -68,21 +74,24 @@ def nodal_rows(nodes: NDArray[np.integer], values: Array, n_dofs: int) -> csr_ar
 
 
 def scaled(matrix: csr_array, factor: AnyArray) -> csr_array:
-    """Return the matrix (m, n) with its rows times `factor` (m,); rows times zero are empty."""
+    """Return the matrix (m, n) with its rows multiplied by `factor` (m,); rows with a factor of zero are empty."""
     values = matrix.data * np.repeat(factor, np.diff(matrix.indptr))
     result = csr_array((values, matrix.indices, matrix.indptr), shape=matrix.shape)
     if not factor.all():
-        result = result.copy()  # indices are moved
+        result = result.copy()  # because `eliminate_zeros` modifies the index arrays, which `matrix` shares
         result.eliminate_zeros()
     return result
 
 
 def taken(matrix: csr_array, rows: Indices) -> csr_array:
-    """Return `rows` (k,) of a matrix, ascending; the matrix itself if these are all."""
+    """Return the rows `rows` (k,), in ascending order, of a matrix; the matrix itself if these are all rows."""
     return matrix if len(rows) == matrix.shape[0] else matrix[rows]
 
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
-    """Return the matrix (m, n) without rows whose entries are below `least` times the largest in the row of `origin`."""
+    """Return the matrix (m, n) in which rows that are round-off are empty.
+
+    These are rows whose entries are less than `least` times the largest entry in the same row of `origin`.
+    """
     significant = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
     return matrix if significant.all() else scaled(matrix, significant)

@@ -1,4 +1,4 @@
-"""Springs along rows of displacements, such as penalties: stored as rows, not as an assembled matrix."""
+"""Springs between unknowns, such as penalties, which are stored by rows instead of as an assembled matrix."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear import springs_kernels
 from fastcontact.linear.sparse_rows import scaled
 
-# Relative difference below which springs count as equal.
+# Relative difference below which two sets of springs are equally good in a preconditioner.
 ALIKE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class Springs:
-    """Springs with the forces ``-through.T (stiffness * (rows u))``.
+    """Springs with the forces ``-through.T @ (stiffness * (rows @ u))`` on n unknowns u.
 
     Attributes
     ----------
     rows : csr_array (q, n)
-        Rows of the elongation of each spring [-].
+        Derivatives of the elongations of q springs with respect to the unknowns [-].
     stiffness : ndarray (q,)
-        Stiffness, not negative [force / length].
+        Stiffness of each spring, not negative [force / length].
     through : csr_array (q, n), optional
-        Rows along which the forces act [-]; `rows` by default. Springs of preconditioners have none.
+        Matrix whose transpose maps the forces of the springs to the unknowns; `rows` by default [-].
     """
 
     rows: csr_array
@@ -36,7 +36,7 @@ class Springs:
     through: csr_array | None = None
 
     def subtract_forces(self, u: AnyArray, r: AnyArray, factor: float = 1.0) -> None:
-        """Subtract from `r` (n,) `factor` times the product of their matrix with `u` (n,)."""
+        """Subtract `factor` times the product of the stiffness matrix of the springs and `u` (n,) from `r` (n,), in place."""
         R = self.rows
         if self.through is not None:
             r -= factor * (self.through.T @ (self.stiffness * (R @ u)))
@@ -44,7 +44,7 @@ class Springs:
         springs_kernels.subtract(R.indptr, R.indices, R.data, self.stiffness, r.dtype.type(factor), u, r)
 
     def beside(self, others: Springs | None) -> Springs:
-        """Return these springs and others."""
+        """Return these springs together with `others`."""
         if others is None:
             return self
         pair = (self, others)
@@ -56,7 +56,10 @@ class Springs:
         return Springs(rows, np.concatenate([one.stiffness for one in pair]), through)
 
     def under(self, pivots: Indices, weights: csr_array) -> Springs:
-        """Return the springs for ``u[pivots] = weights u``, weights (m, n); rows are then zero at the pivots."""
+        """Return the springs after the elimination ``u[pivots] = weights @ u`` with weights (m, n).
+
+        Their rows are zero in the columns of the pivots.
+        """
         R, W, n = self.rows, weights, self.rows.shape[1]
         number = np.full(n, -1, np.int32)
         number[pivots] = np.arange(len(pivots))
@@ -68,22 +71,22 @@ class Springs:
         return Springs(csr_array(unchanged + followed @ W), self.stiffness)
 
     def scaled(self, factor: float, kind: DTypeLike = float) -> Springs:
-        """Return springs with `factor` times the stiffness, in a given precision."""
+        """Return the springs with the stiffness multiplied by `factor`, in the data type `kind`."""
         return Springs(self.rows.astype(kind), (factor * self.stiffness).astype(kind))
 
     def to_dict(self) -> dict[str, AnyArray]:
-        """Return the springs as plain arrays."""
+        """Return the rows and the stiffness as arrays."""
         R = self.rows
         return {"indptr": R.indptr, "indices": R.indices, "data": R.data, "stiffness": self.stiffness}
 
     @classmethod
     def from_dict(cls, arrays: Mapping[str, AnyArray], n: int) -> Springs:
-        """Return the springs saved by `to_dict`, for n unknowns."""
+        """Return the springs of n unknowns, given the arrays of `to_dict`."""
         shape = (len(arrays["stiffness"]), n)
         return cls(csr_array((arrays["data"], arrays["indices"], arrays["indptr"]), shape=shape), arrays["stiffness"])
 
     def alike(self, other: Springs | None) -> bool:
-        """Return whether `other` springs act on the same unknowns with nearly the same stiffness."""
+        """Return whether `other` springs have nearly the same rows and stiffness, see ALIKE."""
         if other is None or self.rows.shape != other.rows.shape:
             return False
         scaled_self, scaled_other = (scaled(one.rows, np.sqrt(one.stiffness)) for one in (self, other))

@@ -1,11 +1,13 @@
-r"""Semismooth Newton method for contact with Coulomb friction, independent of the operator from forces to gaps and slips.
+r"""Semismooth Newton method for contact with Coulomb friction.
 
-With normal forces n, tangential ones t, gaps g and slips s, scaled such that each constraint has a compliance near one,
-the solution is the zero of
+The method does not depend on how gaps and slips are computed from the contact forces, see `Linearised`. Let n be the normal
+forces, t the tangential forces, g the gaps and s the slips, scaled such that each constraint has a compliance near one. The
+solution is the zero of
 
 .. math:: n - [n - g]_+, \qquad t - P(t - s), \qquad P \text{ the projection on the disc of radius } \mu [n - g]_+
 
-(Alart and Curnier, 1991). These residuals are semismooth; a line search decreases their norm.
+(Alart and Curnier, 1991), where :math:`[x]_+ = \max(x, 0)`. These residuals are semismooth functions of n and t. A line
+search ensures that their norm decreases.
 """
 
 from __future__ import annotations
@@ -18,28 +20,31 @@ import numpy as np
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Mask
 
-# Residual of a solution over the largest force.
+# Tolerance of the residual, relative to the largest force.
 EXACT = 1e-12
-# Largest number of Newton iterations, smallest damping factor, and number of undamped steps against the residual after
-# which to stop.
+# Largest number of Newton iterations, smallest damping factor, and largest number of full steps that do not decrease the
+# residual.
 PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
 
 
 @dataclass(frozen=True, eq=False)
 class Forces:
-    """The solution, or the best iterate. Forces and gaps have the shape (1 + k, m), with normal components first.
+    """Solution of Newton's method, or the best iterate if it has not converged.
 
     Attributes
     ----------
-    y, gaps : ndarray (1 + k, m)
-        Forces; gaps and slips.
+    y : ndarray (1 + k, m)
+        Normal forces, then the tangential forces along each of k tangents.
+    gaps : ndarray (1 + k, m)
+        Gaps, then the slips along each tangent.
     closed, sticking : ndarray of bool (m,)
+        Constraints that are closed, and closed constraints that stick.
     settled : bool
         Whether the iteration has converged.
     residual : float
-        Largest residual over the largest force.
+        Largest residual, relative to the largest force [-].
     iterations : int
-        Newton iterations.
+        Number of Newton iterations.
     """
 
     y: Array
@@ -52,13 +57,13 @@ class Forces:
 
 
 class Linearised(Protocol):
-    """Map from forces to gaps and slips, and its Newton step.
+    """Contact problem whose Newton step can be computed.
 
     Attributes
     ----------
     law : Law
     round_off : float
-        Bound of the round-off of gaps and slips.
+        Bound of the round-off of gaps and slips, in their scaled unit.
     """
 
     law: Law
@@ -67,8 +72,8 @@ class Linearised(Protocol):
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """Return forces and gaps (1 + k, m) that solve the equations of a contact state, linearised at `y` and `gaps`.
 
-        Closed gaps and sticking slips vanish; sliding constraints have ``t = mu n d`` with the direction d of t - s, which in
-        three dimensions varies with t - s.
+        The gaps of `closed` constraints (m,) and the slips of `sticking` ones (m,) vanish. Sliding constraints satisfy
+        ``t = mu n d`` with the direction d of t - s, which in 3D varies with t - s. Open constraints have no forces.
         """
         ...
 
@@ -77,20 +82,21 @@ def newton(
     problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None,
     line_search: bool = True, least: int = 0,
 ) -> Forces:  # fmt: skip
-    """Find a zero of the residual, starting from forces and gaps (1 + k, m).
+    """Return the zero of the residual, or the best iterate.
 
     Parameters
     ----------
     problem : Linearised
     y, gaps : ndarray (1 + k, m)
+        Initial forces, and the gaps and slips that belong to them.
     exact : float
-        Tolerance of the residual over the largest force.
+        Tolerance of the residual, relative to the largest force [-].
     patience : int, optional
-        Iterations allowed; PATIENCE by default.
+        Largest number of iterations; PATIENCE by default.
     line_search : bool
-        Whether steps are shortened until the residual decreases; otherwise full steps are taken.
+        Whether a step is halved until the residual decreases. Otherwise full steps are taken.
     least : int
-        Minimum number of iterations.
+        Smallest number of iterations.
     """
     patience = PATIENCE if patience is None else patience
     law = problem.law
@@ -115,7 +121,7 @@ def newton(
             and np.linalg.norm(law.residual(y + damping * step, gaps + damping * change)) > (1 - 1e-4 * damping) * size
         ):
             damping *= 0.5
-            if damping < SHORTEST:  # at a kink there may be no step that decreases the residual: take the full one
+            if damping < SHORTEST:  # at a kink there may be no step that decreases the residual: take the full step
                 damping, uphill = 1.0, uphill + 1
                 break
         y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)

@@ -1,15 +1,15 @@
 """Contact with Coulomb friction on a dense Delassus operator.
 
-Gaps and slips are ``(g, s) = free + F (n, t)`` with the normal forces n and the tangential ones t. Two methods are tried in
-turn:
+The gaps g and the slips s depend on the normal forces n and the tangential forces t as ``(g, s) = free + F (n, t)``. Two
+methods are tried in turn:
 
-1. Newton's method, see `cone_newton`; in two dimensions it is an active-set method with open, stick, and slip in either
-   direction. It nearly always suffices.
-2. The same from the solution for a polyhedral cone with few edges, a linear complementarity problem that Lemke's method
-solves
-   for every positive definite F and every mu (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
+1. Newton's method, see `cone_newton`, from several initial forces. In 2D it is an active set method, in which the state of a
+   constraint is open, stick, or slip in one of two directions.
+2. Newton's method from the solution for a polyhedral friction cone with few edges. The latter is a linear complementarity
+   problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu (Klarbring, 1986;
+   Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
 
-With large mu there may be several solutions; one of them is found.
+With large coefficients of friction the solution may not be unique. The methods compute one solution.
 """
 
 from __future__ import annotations
@@ -25,33 +25,38 @@ from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
 
-# Accepted residual over the largest force where round-off prevents a smaller one.
+# Largest accepted residual, relative to the largest force, if round-off prevents a smaller one.
 ACCEPTABLE = 1e-9
-# Edges of the cones in three dimensions, and the largest complementarity problem.
+# Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
-# Linearly dependent slips get this compliance, relative to that of the gaps: at nodes of several sides, or held by
-# supports on one side, tangential forces are undetermined. If a pivot is below DEPENDENT, all slips get it. If slips
-# yield to it by more than the fraction JAMMED of the gaps, forces are not balanced: the bodies jam.
+# If slips are linearly dependent, tangential forces are not unique; examples are nodes that belong to several surfaces, and
+# nodes that supports hold on one side. F counts as dependent if a squared pivot of its scaled Cholesky factor is below
+# DEPENDENT. All slips then get the first compliance YIELDING, relative to the compliance of the gaps, and the second one if
+# the first does not suffice. If the elastic slip due to this compliance exceeds JAMMED, relative to the scale of gaps and
+# slips without forces, the forces are not in equilibrium: the bodies jam.
 JAMMED = 1e-6
 YIELDING, DEPENDENT = (1e-11, 1e-9), 1e-8
-# Edges are degenerate for pivoting: their problem is shifted by this fraction.
+# The linear complementarity problem of a polyhedral cone is degenerate. Its right-hand side is perturbed by this amount,
+# relative to the scale of gaps and slips without forces.
 SHIFT = 1e-6
 
 
 def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
-    """Return forces that satisfy unilateral contact and Coulomb's law.
+    """Return the forces that satisfy unilateral contact and Coulomb's law.
 
     Parameters
     ----------
     F : ndarray ((1 + k) m, (1 + k) m)
-        Compliance, symmetric and positive semidefinite; normal parts first, then those along each of k tangents.
+        Delassus operator of m constraints, symmetric and positive semidefinite [length / force]. Its rows and columns belong
+        to the normal components of all constraints, then to their components along each of k tangents.
     free : ndarray (1 + k, m)
-        Gaps and slips without forces.
+        Gaps, then slips along each tangent, without contact forces [length].
     mu : ndarray (m,)
+        Coefficients of friction [-].
     closed : ndarray of bool (m,)
-        Constraints that are closed and sticking in the second start.
+        Constraints that are assumed closed and sticking in an initial guess of Newton's method.
     guess : ndarray (1 + k, m), optional
-        Forces of the first start.
+        Another initial guess of the forces, which is tried first [force].
     """
     parts, m = free.shape
     if not m:
@@ -67,7 +72,8 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
         F[slips, slips] += yielding
         problem = _Problem(F, free * unit / length, mu)
         for start, line_search in _starts(problem, closed, guess):
-            # With forces of an earlier pairing, gaps of soft constraints are not closed to the round-off of the others.
+            # At least one iteration, because the initial forces may be those of an earlier pairing: the residual may be below
+            # the round-off of all constraints although the gaps of soft ones are not closed.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
@@ -84,7 +90,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
 
 
 def _dependent(F: Array) -> bool:
-    """Return whether rows of a scaled compliance F are linearly dependent up to round-off."""
+    """Return whether rows of F, scaled to a diagonal of ones for the gaps, are linearly dependent up to round-off."""
     try:
         return bool(np.diag(np.linalg.cholesky(F)).min() ** 2 < DEPENDENT)
     except np.linalg.LinAlgError:
@@ -92,24 +98,30 @@ def _dependent(F: Array) -> bool:
 
 
 class _Problem:
-    """See `cone_newton.Linearised`; F is scaled to compliances of one."""
+    """The problem of `solve` in scaled units, for `cone_newton.newton`; see `cone_newton.Linearised`.
+
+    F is scaled such that the compliance of each gap is one.
+    """
 
     def __init__(self, F: Array, free: Array, mu: Array) -> None:
         self.F, self.free, self.mu, self.law = F, free, mu, Law(mu)
         self.round_off = float(16 * np.finfo(float).eps * np.abs(free).max())
 
     def gaps(self, y: Array) -> Array:
+        """Return gaps and slips (1 + k, m) for forces y (1 + k, m)."""
         return self.free + (self.F @ y.ravel()).reshape(self.free.shape)
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
+        """See `cone_newton.Linearised`."""
         there = _step(self, y, gaps, closed, sticking)
         return there, self.gaps(there)
 
 
 def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
-    """Yield initial forces of Newton's method, the cheapest first, and whether to use a line search.
+    """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in the order of increasing cost.
 
-    At kinks of the residual full steps often succeed where no shortened step decreases it.
+    The same initial forces are tried with and without a line search: at a kink of the residual, Newton's method may converge
+    with full steps although no shortened step decreases the residual.
     """
     if guess is not None and guess.any():
         yield guess, True
@@ -126,7 +138,7 @@ def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tu
 
 
 def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:
-    """Return the forces of `cone_newton.Linearised.step`."""
+    """Return the forces (1 + k, m) after a Newton step; see `cone_newton.Linearised.step`."""
     new, rows = np.zeros_like(y), np.flatnonzero(closed)
     if len(rows):
         A, D = _equations(problem.law, problem.F, y, gaps, rows, sticking)
@@ -136,7 +148,10 @@ def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask
 
 
 def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
-    """Return A and D of the equations ``A y + D free = 0`` of closed constraints `rows` (q,), see `Law.linearised`."""
+    """Return A and D of the equations ``A y + D free = 0`` of the closed constraints `rows` (q,).
+
+    A ((1 + k) q, (1 + k) q) is ``E + D F`` with E and D (1 + k, 1 + k, q) of `Law.linearised`.
+    """
     parts, among = np.arange(len(y)), np.arange(len(rows))
     E, D = law.linearised(y, gaps, rows, sticking)
     unknown = (parts[:, None] * y.shape[1] + rows).ravel()
@@ -147,7 +162,11 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
 
 
 def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
-    """Return a function that returns how `forces` vary with gaps and slips, both (1 + k, m); F and mu as in `solve`."""
+    """Return the derivative of the solution `forces`, as a function.
+
+    The function returns the change (1 + k, m) of the forces due to a change (1 + k, m) of the gaps and slips without forces.
+    F and mu are those of `solve`.
+    """
     rows, unit = np.flatnonzero(forces.closed), _units(F, len(mu))
     everywhere = np.tile(unit, len(forces.y))
     A, D = _equations(
@@ -166,13 +185,16 @@ def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
 
 
 def _units(F: Array, m: int) -> Array:
-    """Return the scale (m,) of forces by which each constraint has a compliance of one, so that c = 1 suits all."""
+    """Return the units (m,) of force in which the compliance of each gap is one.
+
+    The parameter of the complementarity function, which multiplies gaps and slips, can then be one for all constraints.
+    """
     compliance = np.diag(F)[:m]
     return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max())))
 
 
 def _solved(A: Array, right: Array) -> Array:
-    """Solve a linear system; of minimum norm where constraints are linearly dependent."""
+    """Return the solution of ``A x = right``; if A is singular, return the least-squares solution of minimum norm."""
     try:
         solution = np.linalg.solve(A, right)
         if np.abs(A @ solution - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
@@ -183,9 +205,10 @@ def _solved(A: Array, right: Array) -> Array:
 
 
 def _on_edges(problem: _Problem, edges: int) -> Array | None:
-    """Return the forces for a polyhedral cone with a few edges, None if Lemke's method fails.
+    """Return the forces (1 + k, m) for a friction cone with a number of `edges`; None if Lemke's method fails.
 
-    Unknowns are the normal forces, the tangential forces along each edge, and the largest slip along an edge.
+    The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, and the
+    largest slip along an edge (Stewart and Trinkle, 1996).
     """
     k, m = len(problem.free) - 1, problem.free.shape[1]
     size, last = (2 + edges) * m, (1 + edges) * m
@@ -199,7 +222,7 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     M[last:, :m] = np.diag(problem.mu)
     M[last:, m:last] = -np.tile(np.eye(m), edges)
     M[m:last, last:] = np.tile(np.eye(m), edges).T
-    q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # all different
+    q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # multiples of the golden ratio: all are different
     q[:last] += X.T @ problem.free.ravel()
     z, _ = lemke.solved(M, q, 5 * size)
     return None if z is None else (X @ z[:last]).reshape(1 + k, m)

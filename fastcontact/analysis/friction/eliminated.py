@@ -1,9 +1,11 @@
-"""Coulomb friction with eliminated constraints: the Delassus operator is not formed.
+"""Coulomb friction by Newton's method with linear solvers that eliminate constraints: the Delassus operator is not formed.
 
-In a step of Newton's method closed gaps and sticking slips are equations. A sliding constraint has the friction force
-``mu n`` along its direction d: its multiplier acts through the rows ``B + mu d T``, see `linear.protocol`. In three
-dimensions t rotates with the slip, which acts as a spring perpendicular to d: ``t = mu n d - stiffness (s - (d s) d)``.
-Penalties are a diagonal compliance of these equations.
+In each step of Newton's method, the gaps of closed constraints and the slips of sticking ones are linear equations. A
+sliding constraint with the normal force n has the friction force ``mu n`` along its slip direction d. Let B be the
+derivative of the gap with respect to the displacements, and T the derivatives of the slips. The multiplier of the gap then
+acts through the rows ``B + mu d T`` instead of B, see `linear.protocol`. In 3D the friction force t also rotates with the
+slip s, which has the effect of a spring perpendicular to d: ``t = mu n d - stiffness * (s - (d . s) d)``. Penalties are a
+diagonal compliance of these equations.
 """
 
 from __future__ import annotations
@@ -27,16 +29,18 @@ from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
 from fastcontact.round_off import TINY
 
-# Bound of the tangential stiffness perpendicular to a slip, which is unbounded as the slip vanishes, over the stiffness
-# of the constraint. The solution does not depend on it, because the slip has no perpendicular component there.
+# Bound of the stiffness of the spring perpendicular to the slip, relative to the stiffness of the constraint. Without a bound
+# it tends to infinity as the slip vanishes. The solution does not depend on it, because its slip is parallel to d.
 STIFFEST = 100.0
-# Factor by which constraints are assumed softer than the diagonal of their unknowns, since neighbouring nodes deform as well.
-# Nearly incompressible cells resist a single node far more than a surface (`LinearSolver.contrast`): beyond MILD, constraints
-# are softer still, by its square root; otherwise Newton's method reverses a few slips repeatedly (nu = 0.4999, 161 442
-# unknowns: 588 iterations without convergence; nu = 0.499 was not affected).
+# Estimated stiffness of a constraint relative to the stiffness that the diagonal of K gives it. It is smaller because
+# neighbouring nodes deform as well. Nearly incompressible cells resist the displacement of a single node far more than that
+# of a surface (`LinearSolver.contrast`). If this contrast exceeds MILD, the estimate is divided by the square root of their
+# ratio; otherwise Newton's method reverses a few slips repeatedly (with nu = 0.4999 and 161 442 unknowns, 588 iterations
+# did not converge; nu = 0.499 was not affected).
 SOFTER = 0.2
-# Tolerance of the residual of the friction law over that of the linear solutions, and the looser one after PATIENCE
-# steps: contact forces that are a small fraction of all forces cannot be more accurate.
+# Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, the larger tolerance that
+# is accepted after PATIENCE steps, and this number of steps. If contact forces are a small fraction of all forces, they
+# cannot be more accurate.
 ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
 
 
@@ -48,21 +52,23 @@ def solve(
     u: Array,
     forces: Array | None,
 ) -> tuple[Array, Forces] | None:
-    """Return displacement and forces, or None where the method fails.
+    """Return the unknowns (n,) [length] and the contact forces, or None if the method fails.
 
     Parameters
     ----------
     loaded : LoadedNonsymmetric
+        Prepared matrix K (n, n) with a right-hand side.
     constraints : Constraints
-        See `friction.solve`; without compliance except `softness` and `tangential_softness`.
+        The m constraints in the n unknowns, see `friction.solve.solve`. The only compliances allowed are the diagonal ones,
+        `softness` and `tangential_softness`.
     closed : ndarray of bool (m,)
-        Constraints that are closed and sticking at first.
+        Constraints that are assumed closed and sticking at the start, if there are no initial `forces`.
     accuracy : Accuracy
-        Accuracy, whose residual is that of the linear solutions.
+        Its `residual` is the relative tolerance of the linear solutions.
     u : ndarray (n,)
-        Initial unknowns [length].
+        Initial guess of the unknowns [length].
     forces : ndarray (1 + k, m), optional
-        Initial forces [force].
+        Initial guess of the forces: normal ones, then those along each of k tangents [force].
     """
     tolerance, steps = accuracy.residual or 0.0, accuracy.max_newton_steps
     problem = Eliminated(loaded, constraints, u, tolerance, inexact=steps is None)
@@ -74,9 +80,9 @@ def solve(
             state = sticking if equality is None else sticking | equality, sticking
         else:
             state = problem.law.state(y, gaps)
-        # At least once, because initial forces and displacements are not in balance.
+        # At least one step is necessary, because initial forces and displacements are not in equilibrium.
         y, gaps = problem.step(y, gaps, *state)
-        if not state[0].any():  # no constraint was closed: start from the displacements without contact
+        if not state[0].any():  # all were open: close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(EXACT, ENOUGH * tolerance)
         iterate = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
@@ -89,7 +95,7 @@ def solve(
             iterate = replace(iterate, settled=iterate.settled or iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
                 return None
-        if iterate.y is not problem.reached:  # between two steps: displacements are only known at their ends
+        if iterate.y is not problem.reached:  # a damped step: displacements are only known at the ends of full steps
             problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
     except ConvergenceError:
         return None
@@ -97,12 +103,15 @@ def solve(
 
 
 class Eliminated:
-    """See `cone_newton.Linearised`: forces and gaps in units of each constraint's own stiffness.
+    """The equations of a contact problem for `cone_newton.newton`, with eliminated constraints; see `cone_newton.Linearised`.
+
+    Forces are divided, and gaps multiplied, by the square root of the estimated stiffness of each constraint. Both then have
+    the same unit. Parameters are those of `solve`; with `inexact` the tolerance of the linear solutions varies, see `finish`.
 
     Attributes
     ----------
     u : ndarray (n,)
-        Displacement at the end of the last step.
+        Unknowns at the end of the last step [length].
     reached : ndarray (1 + k, m)
         Scaled forces at the end of the last step.
     """
@@ -142,14 +151,17 @@ class Eliminated:
         )
 
     def _compliance_of_rows(self, rows: tuple[csr_array, ...], yielding: Array) -> Array:
-        """Return `compliance_of_rows` plus the tangential compliance: directions with compliance are not idle."""
+        """Return the sum of `compliance_of_rows` and the tangential compliance of the constraints themselves.
+
+        Tangents with such a compliance are thus not idle.
+        """
         compliance = compliance_of_rows(rows, yielding)
         slips = np.arange(1, len(rows))
         compliance[slips, slips] += self._gives[1:]
         return compliance
 
     def start(self, forces: Array | None) -> tuple[Array, Array]:
-        """Return scaled forces and gaps of the initial displacement."""
+        """Return scaled forces and gaps (1 + k, m) at the initial unknowns, given initial `forces` (1 + k, m) [force]."""
         y = np.zeros_like(self._free) if forces is None else np.where(self._usable, forces, 0.0)
         if self._turn is not None:
             y = (self._turn @ y.ravel()).reshape(y.shape)
@@ -158,7 +170,10 @@ class Eliminated:
         return self.reached, self._scaled(self._gaps(self.u, y))
 
     def unscaled(self, scaled: Forces) -> Forces:
-        """Return unscaled forces and gaps along the original tangents."""
+        """Return forces [force] and gaps [length] along the original tangents, from the last step.
+
+        Whether constraints are closed or stick, the residual and the number of iterations are those of `scaled`.
+        """
         y = self.reached * self._unit
         gaps = self._gaps(self.u, y)
         if self._turn is not None:
@@ -169,7 +184,7 @@ class Eliminated:
         return self._free + np.stack([R @ u for R in self._rows]) + self._gives * forces
 
     def _scaled(self, gaps: Array) -> Array:
-        """Return scaled gaps; constraints that cannot close count as open."""
+        """Return scaled gaps (1 + k, m), given `gaps` [length]; constraints that cannot close get a positive gap."""
         gaps = np.where(self._usable, gaps * self._unit, 0.0)
         gaps[0, ~self._usable] = 1.0
         return gaps
@@ -196,10 +211,10 @@ class Eliminated:
         return self.reached, self._scaled(self._gaps(u, new))
 
     def _accuracy(self, y: Array, gaps: Array) -> float:
-        """Return the relative residual of the linear solution of a step from forces `y` and `gaps`.
+        """Return the relative residual to which the linear system of a step from forces `y` and `gaps` is solved.
 
-        Steps follow the residual of the friction law, as the solutions of pairings do, up to LOOSEST: looser steps change the
-        directions of slips that hardly move. The last step is exact.
+        It is proportional to the residual of the friction law, but at most LOOSEST: less accurate steps would change the
+        directions of small slips. The last step is solved to the full tolerance.
         """
         if not self._inexact:
             return self._tolerance
@@ -208,12 +223,12 @@ class Eliminated:
         return max(self._tolerance, min(RESIDUAL * off / size, LOOSEST) if size else LOOSEST)
 
     def finish(self) -> bool:
-        """Make further steps exact; return whether the last one was inexact."""
+        """Use the full tolerance in further steps; return whether the last step was less accurate."""
         self._inexact = False
         return self._last > self._tolerance
 
     def _sliding(self, y: Array, gaps: Array, at: Indices) -> _Sliding:
-        """Return slip directions and friction rows of the sliding constraints `at` (q,)."""
+        """Return the friction terms of the sliding constraints numbered `at` (q,), linearised at `y` and `gaps`."""
         d, turning = self.law.slide(y, gaps, at)
         pull = self.law.mu[at] * d
         if len(d) == 1:
@@ -221,13 +236,13 @@ class Eliminated:
         across = np.stack([-d[1], d[0]])
         rows = sum(scaled(taken(T, at), factor) for factor, T in zip(across, self._rows[1:], strict=True))
         spring = np.minimum(turning / np.maximum(1.0 - turning, TINY), STIFFEST) * self._unit[at] ** 2
-        spring = spring / (1.0 + spring * self._gives[1, at])  # in series with that of the constraint
+        spring = spring / (1.0 + spring * self._gives[1, at])  # in series with the compliance of the constraint
         return _Sliding(
             at, pull, _Across(across, Springs(csr_array(rows), spring), (across * self._free[1:, at]).sum(axis=0))
         )
 
     def _drag(self, B: csr_array, shut: Indices, sliding: _Sliding) -> FrictionTerms:
-        """Return the frictional terms of equations B whose first rows are the gaps of `shut`."""
+        """Return the friction terms of the linear system, whose equations `B` begin with the gaps of constraints `shut`."""
         pull = np.zeros((len(self._rows) - 1, len(self._usable)))
         pull[:, sliding.at] = sliding.pull
         through = taken(self._rows[0], shut)
@@ -242,7 +257,7 @@ class Eliminated:
 
 
 def diagonal_compliance(constraints: Constraints) -> Array:
-    """Return the diagonal compliance of constraints along normals and tangents (1 + k, m) [length / force]."""
+    """Return the diagonal compliance (1 + k, m) of constraints, along normals and then each tangent [length / force]."""
     compliance = np.zeros((1 + len(constraints.tangents), len(constraints)))
     if constraints.softness is not None:
         compliance[0] = constraints.softness
@@ -253,7 +268,16 @@ def diagonal_compliance(constraints: Constraints) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Across:
-    """Springs perpendicular to slips: directions (k, q), and perpendicular slips (q,) at u = 0."""
+    """Springs perpendicular to the slip directions of q sliding constraints in 3D.
+
+    Attributes
+    ----------
+    along : ndarray (k, q)
+        Unit vectors perpendicular to the slip directions, in components along the tangents.
+    springs : Springs
+    free : ndarray (q,)
+        Elongations at u = 0 [length].
+    """
 
     along: Array
     springs: Springs
@@ -262,14 +286,24 @@ class _Across:
 
 @dataclass(frozen=True, eq=False)
 class _Sliding:
-    """Sliding constraints `at` (q,): tangential over normal forces (k, q), and springs in three dimensions."""
+    """Linearised friction of q sliding constraints.
+
+    Attributes
+    ----------
+    at : ndarray of int (q,)
+        Numbers of the constraints.
+    pull : ndarray (k, q)
+        Ratios of the tangential forces to the normal force, ``mu d`` [-].
+    springs : _Across, optional
+        The springs perpendicular to the slip directions, in 3D.
+    """
 
     at: Indices
     pull: Array
     springs: _Across | None = None
 
     def force(self, normal: Array, u: Array) -> Array:
-        """Return the tangential forces (k, q)."""
+        """Return the tangential forces (k, q) for normal forces (q,) [force] and unknowns u (n,) [length]."""
         dragged = self.pull * normal
         if self.springs is None:
             return dragged

@@ -1,4 +1,7 @@
-"""Lemke's pivoting method for linear complementarity problems: slow, but finite where Newton's method does not converge."""
+"""Lemke's pivoting method for linear complementarity problems (Lemke, 1965).
+
+It is slow, but it terminates after a finite number of pivots also if Newton's method does not converge.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,10 @@ from fastcontact.round_off import ROUND_OFF
 
 
 def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
-    """Return z (n,) with ``w = M z + q, w >= 0, z >= 0, w.T z = 0`` by complementary pivots from a ray (Lemke, 1965).
+    """Return z (n,) with ``w = M z + q``, ``w >= 0``, ``z >= 0`` and ``w.T z = 0``.
 
-    The pivots end with a solution if M is copositive, q is not negative along the solutions of the homogeneous problem,
-    and no basis is degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
+    The pivots end with a solution if M is copositive, if ``q.T v >= 0`` for all solutions v of the homogeneous problem
+    (q = 0), and if no basis is degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
 
     Parameters
     ----------
@@ -24,14 +27,15 @@ def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
     Returns
     -------
     z : ndarray (n,) or None
-        None where the pivots end on a ray, or exceed `most`.
+        The solution; None if the pivots end on a ray, or if their number exceeds `most`.
     count : int
         Number of pivots.
     """
     n, z = len(q), np.zeros(len(q))
     if not (q < 0.0).any():
         return z, 0
-    # Basic variables as functions of the others: w_i has the number i, z_i n + i, the artificial variable 2 n.
+    # Rows: basic variables as affine functions of the nonbasic ones. The variable w_i has the number i, z_i the number n + i,
+    # and the artificial variable the number 2 n.
     table = np.column_stack([M, np.ones(n), q])
     basic, others = np.arange(n), np.arange(n, 2 * n + 1)
     row, column = int(q.argmin()), n
@@ -52,7 +56,7 @@ def solved(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
 
 
 def _exchange(table: Array, row: int, column: int) -> None:
-    """Exchange a basic variable with another one."""
+    """Pivot in place: exchange the basic variable of `row` with the nonbasic variable of `column`."""
     at, factors = table[row, column], table[:, column].copy()
     table[:, column], factors[row] = 0.0, 0.0
     table[row] /= -at
@@ -61,9 +65,10 @@ def _exchange(table: Array, row: int, column: int) -> None:
 
 
 def _blocking(table: Array, basic: Indices, column: int) -> int | None:
-    """Return the row whose variable vanishes first as that of the column grows, None if none does.
+    """Return the row whose basic variable vanishes first as the nonbasic variable of `column` grows (ratio test).
 
-    Among equals, the artificial variable is chosen first, then the one with the largest pivot.
+    None if no basic variable decreases. Among rows with the same ratio, the row of the artificial variable has priority, then
+    the row with the largest pivot.
     """
     slope = -table[:, column]
     falling = np.flatnonzero(slope > ROUND_OFF * np.abs(slope).max())

@@ -1,11 +1,15 @@
-"""Coulomb friction along the path of a load step, in increments on one Delassus operator.
+"""Coulomb friction along the load path within a step, in increments with one Delassus operator.
 
-A step solved at once counts the slip of a constraint from the beginning of the step, although a constraint that closes within
-the step only slides from first touch on. Here the load increment is applied in equal parts, with the geometry and the
-Delassus operator F of the end of the step. With gaps and slips ``(g, s) = free + F y`` at the end, and gaps g0 and
-forces y0 at the beginning, where s = 0, those at a fraction p of the step are ``free + (1 - p) ((g0, 0) - free - F y0) +
-F y``. Closing is no slip where normals are inclined: the correction for closing g0 is part of `free`, and each increment
-counts the part that belongs to what it closes of the gap.
+If a load step is solved at once, the slip of a constraint is counted from the beginning of the step, although a constraint
+that closes within the step slides only after it has closed. Here the load increment is applied in equal parts, with the
+geometry and the Delassus operator F at the end of the step.
+
+Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for forces y. At its beginning there are gaps g0,
+forces y0 and no slips. At a fraction p of the step, gaps and slips for forces y are
+``free + (1 - p) * ((g0, 0) - free - F y0) + F y``.
+
+If normals are inclined, a constraint that closes has a tangential relative displacement that is no slip. The correction for
+closing the whole gap g0 is part of `free`; each increment counts the fraction of it by which this increment closes the gap.
 
 The last increment depends on the earlier ones only through their slips, which stay fixed while the geometry converges.
 """
@@ -26,19 +30,29 @@ from fastcontact.contact.constraints import Constraints
 def along(
     lag: Array, closing: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
 ) -> tuple[Forces, tuple[Array, Array, Array]]:
-    """Return the forces at the end of a step, and `Slid.slip` along tangents (k, m), `work` and `normal` there.
+    """Return the forces at the end of a load step that is solved in increments.
 
     Parameters
     ----------
     lag : ndarray (1 + k, m)
-        Gaps and slips at the beginning minus those at the end under the forces of the beginning [length].
+        Gaps and slips at the beginning of the step, minus those at its end under the forces of its beginning [length].
     closing : ndarray (1 + k, m)
-        Gaps at the beginning, and the slips that closing them would add, see `Path.closed` [length].
+        Gaps at the beginning of the step, and the slips that closing them would add, see `Path.closed` [length].
     y : ndarray (1 + k, m)
-        Forces at the beginning [force].
+        Normal and tangential forces at the beginning of the step [force].
     parts : int
+        Number of increments.
     solve : callable
-        Function of additional gaps and slips, initially closed constraints and initial forces that returns the forces.
+        Function that returns the `Forces` of an increment. Its arguments are gaps and slips (1 + k, m) [length] to be added,
+        initially closed constraints (m,), and initial forces (1 + k, m) [force] or None.
+
+    Returns
+    -------
+    forces : Forces
+        Forces at the end of the step, with the slips of the whole step.
+    before : (ndarray (k, m), ndarray (2, m), ndarray (m,))
+        Slips along the tangents [length], frictional work [energy] and normal forces [force] at the beginning of the last
+        increment; see `Slid`.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
     gap = closing[0]
@@ -61,11 +75,24 @@ def along(
 
 
 def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
-    """Return the frictional work of constraints in an increment, and that of constraints that close in it, both (2, m).
+    """Return the frictional work in an increment.
 
-    The mean tangential forces are those at the end (k, m) times the ratio of the mean of the normal forces at both ends
-    to that at the end (m,), because sliding friction is at its limit; `before` are the normal forces at the beginning.
-    Slips are (k, m).
+    The tangential force is integrated over the slip by the trapezoidal rule. Since sliding friction is at its limit, the
+    tangential force at the beginning is that at the end, scaled by the ratio of the normal forces.
+
+    Parameters
+    ----------
+    before, normal : ndarray (m,)
+        Normal forces at the beginning and at the end of the increment [force].
+    tangential : ndarray (k, m)
+        Tangential forces at the end of the increment [force].
+    slip : ndarray (k, m)
+        Slips in the increment [length].
+
+    Returns
+    -------
+    ndarray (2, m)
+        Frictional work of each constraint, and the same if the constraint closes in the increment, otherwise zero [energy].
     """
     once = -0.5 * (tangential * slip).sum(axis=0)
     ratio = np.divide(before, normal, out=np.zeros_like(normal), where=normal > 0.0)
@@ -73,13 +100,13 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
 
 
 def shifted(constraints: Constraints, slid: Slid) -> Constraints:
-    """Return constraints whose slips are measured from the last increment on."""
+    """Return the constraints with slips measured from the beginning of the last increment."""
     before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in constraints.directions])
     return replace(constraints, slip0=-before if constraints.slip0 is None else constraints.slip0 - before)
 
 
 def completed(solution: FrictionalEquilibrium, slid: Slid) -> FrictionalEquilibrium:
-    """Return the solution of `shifted` constraints with the slip and the work of the whole step."""
+    """Return the solution with the slips and the frictional work of the step, given the solution of `shifted` constraints."""
     last = np.where(solution.active[:, None], solution.slip, 0.0)
     work = slid.work + friction_work(slid.normal, solution.multiplier, solution.tangential.T, last.T)
     before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in solution.directions], axis=1)

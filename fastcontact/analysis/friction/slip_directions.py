@@ -1,6 +1,11 @@
-"""Slip directions left free by supports: tangents are aligned with them, the others are held.
+"""Tangents along which supports allow no slip.
 
-The functions use the compliance block of each single constraint (1 + k, 1 + k, m), normal part first.
+At a constraint on a symmetry plane or on an axis, supports prevent slip along one tangent or along both. The functions detect
+such tangents by the compliance of each constraint, rotate the two tangents of a constraint in 3D so that one of them is the
+direction in which slip is prevented, and mark this tangent as idle.
+
+The compliance of m constraints, each on its own, is an array (1 + k, 1 + k, m): the changes of the gap and of the k slips
+of a constraint by its normal force and its k tangential forces [length / force], in this order.
 """
 
 from __future__ import annotations
@@ -11,41 +16,55 @@ from scipy.sparse import block_array, csr_array, diags_array
 from fastcontact.arrays import Array, Mask
 from fastcontact.round_off import TINY
 
-# A slip direction is held if its compliance relative to that of the gap is less than this.
+# A tangent is idle if its compliance relative to the compliance of the gap is less than this.
 IDLE = 1e-10
-# Compliance of a prescribed slip relative to that of its gap: negligible, but it gives sticking an equation, which no
-# force in the cone satisfies.
+# Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
+# has a solution. The force of this solution lies outside the friction cone, so that the constraint slides.
 GIVING = 1e-8
 
 
 def own_compliance(F: Array, parts: int) -> Array:
-    """Return the compliance (parts, parts, m) of each constraint from that of all, F (parts m, parts m)."""
+    """Return the compliance (parts, parts, m) of each constraint, given the compliance F (parts m, parts m) of all.
+
+    `parts` is 1 + k; F has the normal components of all constraints first, then the components along each tangent.
+    """
     m = len(F) // parts
     index = np.arange(parts * m).reshape(parts, m)
     return np.asarray(F[index[:, None], index[None]])
 
 
 def compliance_of_rows(rows: tuple[csr_array, ...], yielding: Array) -> Array:
-    """Return the compliance (parts, parts, m) of each constraint for a diagonal stiffness matrix.
+    """Return the compliance (1 + k, 1 + k, m) of each constraint for a diagonal stiffness matrix.
 
     Parameters
     ----------
     rows : tuple of csr_array (m, n)
-        Rows of the gaps, and of the slips along each tangent.
+        Derivatives of the gaps, and of the slips along each of k tangents, with respect to the n unknowns [-].
     yielding : ndarray (n,)
-        Compliance of each unknown [length / force].
+        Compliance of each unknown, the reciprocal of its stiffness [length / force].
     """
     weighted = [csr_array((R.data * yielding[R.indices], R.indices, R.indptr), shape=R.shape) for R in rows]
     return np.array([[weighted_rows.multiply(R).sum(axis=1) for R in rows] for weighted_rows in weighted])
 
 
 def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array | None:
-    """Return Q (3 m, 3 m) that rotates two tangents so that one is idle where supports leave one slip direction free.
+    """Return the matrix that rotates the two tangents of each constraint in 3D so that one is idle if possible.
 
-    In a plane of symmetry both tangents may be oblique to it; then neither is idle by itself. If `directions`, two of (m, 3),
-    are given, the other tangents are rotated so that the first is perpendicular to the coordinate axis nearest to the tangent
-    plane: otherwise the choice of tangents would decide which displacements, along axes, are eliminated. None without
-    rotation.
+    If supports leave one slip direction free, both tangents may be oblique to it, and neither is idle before the rotation.
+
+    Parameters
+    ----------
+    compliance : ndarray (3, 3, m)
+        Compliance of each constraint [length / force].
+    directions : tuple of two ndarray (m, 3), optional
+        The tangents. If they are given, the tangents of the other constraints are rotated, too, so that the first one is
+        perpendicular to one of the coordinate axes: the elimination of displacements, which are components along these axes,
+        then does not depend on the choice of tangents.
+
+    Returns
+    -------
+    csr_array (3 m, 3 m) or None
+        Q, for components of normals and then of both tangents. None if no tangent needs a rotation.
     """
     m = compliance.shape[2]
     gap = np.maximum(compliance[0, 0], TINY)
@@ -61,17 +80,21 @@ def aligning(compliance: Array, directions: tuple[Array, ...] = ()) -> csr_array
     return csr_array(block_array([[diags_array(np.ones(m)), zero, zero], [zero, c, s], [zero, -s, c]], format="csr"))
 
 
-def _to_axes(one: Array, other: Array) -> Array:
-    """Return the angles (m,) of rotation from the tangents (m, 3) to those along axes."""
-    normal = np.cross(one, other)
-    first = np.cross(np.eye(3)[np.argmin(np.abs(normal), axis=1)], normal)
-    return np.asarray(np.arctan2((first * other).sum(axis=1), (first * one).sum(axis=1)))
+def _to_axes(tangent: Array, second_tangent: Array) -> Array:
+    """Return angles (m,) by which the tangents (m, 3) rotate until the first is perpendicular to a coordinate axis [rad].
+
+    The axis is the one with the largest angle to the normal.
+    """
+    normal = np.cross(tangent, second_tangent)
+    aligned = np.cross(np.eye(3)[np.argmin(np.abs(normal), axis=1)], normal)
+    return np.asarray(np.arctan2((aligned * second_tangent).sum(axis=1), (aligned * tangent).sum(axis=1)))
 
 
 def idle(directions: Array) -> Mask:
-    """Return the tangents (k, m) along which supports allow no motion, or none except that of the gap.
+    """Return which tangents (k, m) are idle, given the compliance `directions` (1 + k, 1 + k, m) of each constraint.
 
-    This is the case at an axis and in a plane of symmetry, where the equation of friction would be empty.
+    Along an idle tangent, supports allow no motion, or only a motion that is proportional to the change of the gap. The
+    equation of its slip would be empty or linearly dependent. This occurs on axes and in planes of symmetry.
     """
     k = len(directions) - 1
     along = directions[np.arange(1, k + 1), np.arange(1, k + 1)]

@@ -1,10 +1,11 @@
-"""Coulomb friction: unilateral contact and the friction cone, solved together on the Delassus operator.
+"""Solve unilateral contact with Coulomb friction for fixed contact geometry.
 
-With normal forces n >= 0 and tangential forces t of all constraints as unknowns, gaps and slips of the step are
-``(g, s) = (g, s)_free + F (n, t)`` with ``F = R K^-1 R.T + C``, R the normal and tangential rows and C the compliance of
-the constraints themselves. `dense` solves this: in stick the slip of the step is exactly zero, in slip the force lies exactly
-on the cone. Where the linear solver eliminates constraints, `eliminated` is tried first: the same law with the stiffness
-instead of the compliance.
+The unknowns are the normal forces n >= 0 and the tangential forces t of all constraints. The gaps g and the slips s of the
+load step are ``(g, s) = free + F (n, t)``, where `free` are their values without contact forces. The Delassus operator is
+``F = R K^-1 R.T + C``, where K is the stiffness matrix, R contains the derivatives of gaps and slips with respect to the
+displacements, and C is the compliance of the constraints themselves. `dense` solves this problem without regularisation:
+the slip of a sticking constraint is zero, and the force of a sliding one lies on the friction cone. If the linear solver
+can eliminate constraints, `eliminated` is tried first. It solves the same problem without forming F.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
-# Accuracy of the increments of a step with eliminated constraints: the last one is solved again to that of the step.
+# Accuracy of the increments of a step in `eliminated`. The last increment is solved again to the accuracy of the step.
 ROUGH = Accuracy(0.0, residual=1e-4)
 
 
@@ -37,27 +38,30 @@ def solve(
     loaded: Loaded, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
     guess: FrictionalEquilibrium | None = None, path: Path | None = None,
 ) -> FrictionalEquilibrium:  # fmt: skip
-    """Find displacement and contact forces under contact and friction.
+    """Return the displacements and the contact forces that satisfy unilateral contact and Coulomb's law.
 
-    Open constraints are left out, because each costs columns of the inverse stiffness: the problem begins with those
-    that were closed, and adds others when they penetrate. Constraints left out in the end are open and free of forces,
-    so the result is complete. Constraints coupled by a compliance are included all at once.
+    Each constraint in F costs columns of the inverse stiffness matrix. The problem therefore begins with the constraints that
+    were closed, and adds others if they penetrate. Constraints that are never added are open and free of forces, so that the
+    result is that of the complete problem. If a compliance couples constraints, all of them are included from the start.
 
     Parameters
     ----------
     loaded : Loaded
+        Prepared matrix K (n, n) with a right-hand side.
     constraints : Constraints
-        Rows for the unknowns of the solver; `Constraints.slip0` (k, m) is the slip at zero unknowns, minus that at the
-        beginning of the step [length].
+        The m constraints in the n unknowns of the solver. `Constraints.slip0` (k, m) is the slip if all unknowns are zero,
+        minus the slip at the beginning of the step [length].
     closed : ndarray of bool (m,)
-        Constraints that are closed and sticking at first.
+        Constraints that are assumed closed and sticking at the start.
     accuracy : Accuracy
+        Tolerances and limits.
     u : ndarray (n,)
-        Unknowns that constraints do not change, see `Loaded.involved_solution`; initial guess of iterative solvers [length].
+        Initial guess of iterative solvers, and values of the unknowns that constraints do not involve, see
+        `Loaded.involved_solution` [length].
     guess : FrictionalEquilibrium, optional
-        A solution with nearly the same forces; ignored if its constraints are different.
+        Solution of a similar problem, from whose forces to start; ignored if its number of constraints is different.
     path : Path, optional
-        Path along which to solve in increments.
+        Data at the beginning of the step, if it is solved in increments along the load path.
     """
     forces = None if guess is None else guess.forces_along(constraints.directions, len(constraints))
     together = constraints.coupled
@@ -85,7 +89,7 @@ def _eliminated(
     loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None,
     path: Path | None,
 ) -> FrictionalEquilibrium | None:  # fmt: skip
-    """Solve without the Delassus operator of the constraints, see `eliminated`; None where that fails."""
+    """Return the solution by `eliminated`, without the Delassus operator; None if this fails. Parameters as in `solve`."""
     usable, before = constraints.usable, None
 
     def solved(constraints: Constraints, closed: Mask, accuracy: Accuracy, forces: Array | None) -> dense.Forces:
@@ -118,7 +122,7 @@ def _eliminated(
 
 
 def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Array:
-    """Return the lag (1 + k, m) of `path.along` for forces y (1 + k, m) at the beginning."""
+    """Return the argument `lag` (1 + k, m) of `path.along`, given the forces y (1 + k, m) at the beginning of the step."""
     end = loaded.full_solution(constraints.force(y[0], y[1:].T))
     lag = -constraints.gaps_at_rest() - np.stack([R @ end for R in (constraints.B, *constraints.tangents)])
     lag -= eliminated.diagonal_compliance(constraints) * y
@@ -129,14 +133,18 @@ def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Arra
 def _among(
     chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
 ) -> FrictionalEquilibrium:  # fmt: skip
-    """Solve with the `chosen` constraints (m,) alone; gaps and slips of the others follow from the displacement."""
+    """Return the solution with the `chosen` constraints (m,) alone, by the dense Delassus operator.
+
+    The gaps and slips of the other constraints follow from the displacements. The other parameters are those of `solve`, with
+    initial `forces` (1 + k, m) or None [force].
+    """
     rows = np.flatnonzero(chosen)
     k, m = len(constraints.tangents), len(constraints)
     check_rows((1 + k) * len(rows), MOST_ROWS_WITH_FRICTION)
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
-    if constraints.tangential_softness is not None:  # before the search for held slips: compliant ones are not held
+    if constraints.tangential_softness is not None:  # before idle tangents are detected: compliant ones are not idle
         slips = np.arange(len(rows), len(F))
         F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
@@ -182,7 +190,7 @@ def _among(
     active, sticking = np.zeros(m, bool), np.zeros(m, bool)
     active[rows], sticking[rows] = result.closed, result.sticking
 
-    # Equations have no friction, and slips that supports hold do not vary.
+    # Constraints that are equations have no friction, and slips along idle tangents do not vary.
     mu = np.where(equations, 0.0, constraints.coefficients[rows])
     at_end = replace(result, sticking=result.sticking & ~equations)
     return FrictionalEquilibrium(
@@ -195,9 +203,17 @@ def _among(
 def _response(
     loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held: Mask, forces: tuple[Array, Array, dense.Forces]
 ) -> Response:  # fmt: skip
-    """Return the response of a solution, given its rows, numbers and rotation, and what `dense.response` needs.
+    """Return the linear response of a solution to additional forces and gaps.
 
-    Slips `held` (k, q) do not vary.
+    Parameters
+    ----------
+    loaded : Loaded
+    among : (csr_array ((1 + k) q, n), ndarray of int (q,), csr_array or None)
+        R, and the numbers of its q constraints; rotation Q of their tangents.
+    held : ndarray of bool (k, q)
+        Idle tangents, along which slips do not vary.
+    forces : tuple
+        Arguments of `dense.response`.
     """
     (R, rows, Q), varied = among, dense.response(*forces)
 
@@ -211,7 +227,19 @@ def _response(
 
 
 def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints) -> Slid:
-    """Return slips (k, r), works (2, r) and normal forces (r,) of `path.along` at all constraints, rotated back by Q."""
+    """Return the data at the beginning of the last increment, for all constraints.
+
+    Parameters
+    ----------
+    before : (ndarray (k, q), ndarray (2, q), ndarray (q,))
+        Slips [length], frictional work [energy] and normal forces [force] that `path.along` returns.
+    Q : csr_array, optional
+        Rotation of the tangents, which is undone.
+    rows : ndarray of int (q,)
+        Numbers of these constraints.
+    constraints : Constraints
+        All m constraints.
+    """
     slip, work, normal = before
     if Q is not None:
         slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
@@ -225,7 +253,7 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
 
 
 def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
-    """Add, in place, the compliance of constraints `rows` to the Delassus operator F ((1 + k) m, (1 + k) m)."""
+    """Add, in place, the compliance of the constraints `rows` (q,) to their Delassus operator F ((1 + k) q, (1 + k) q)."""
     if constraints.compliance is not None and len(rows):
         frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
         F += _turned(constraints.compliance.block(rows), frame)
@@ -239,7 +267,10 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
 def _on_delassus_operator(
     F: Array, free: Array, friction: Array, closed: Mask, equality: Mask, start: Array | None
 ) -> dense.Forces:
-    """Solve the problem on the compliance F, from which constraints that are equations are eliminated first."""
+    """Return the solution of `dense.solve`, where constraints that are equations are eliminated first.
+
+    `equality` (m,) are these constraints; the other parameters are those of `dense.solve`.
+    """
     if not equality.any():
         return dense.solve(F, free, friction, closed, start)
     index = np.arange(free.size).reshape(free.shape)
@@ -258,18 +289,20 @@ def _on_delassus_operator(
 
 
 def _turned(C: Array, along: Array) -> Array:
-    """Return the compliance of normal and tangential forces ((1 + k) m, (1 + k) m), C (m, m) being that of vectors.
+    """Return the compliance ((1 + k) m, (1 + k) m) with respect to normal and tangential forces.
 
-    Tangents vary from one constraint to the next: C couples force vectors, not their components.
+    C couples force vectors. Their components along normals and tangents are coupled by the scalar products of these
+    directions, which vary from one constraint to the next.
 
     Parameters
     ----------
     C : ndarray (m, m)
+        Compliance that couples the force vectors of constraints [length / force].
     along : ndarray (k, m, dim)
-        Tangents, zero without friction.
+        Unit tangents; zero at constraints without friction.
     """
     normal = normals(list(along))
-    normal[~along.any(axis=(0, 2)), 0] = 1.0  # where there is no friction
+    normal[~along.any(axis=(0, 2)), 0] = 1.0  # any unit vector, for constraints without friction
     frame = np.concatenate([normal[None], along]).reshape(-1, normal.shape[1])
     parts = len(along) + 1
     return np.asarray(np.tile(C, (parts, parts)) * (frame @ frame.T))

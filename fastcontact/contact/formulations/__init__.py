@@ -1,6 +1,7 @@
-"""Contact formulations: one file each; a new file here is a new formulation.
+"""Contact formulations.
 
-Every module of this package whose name has no leading underscore defines one class ``FORMULATION``.
+Each module of this package whose name has no leading underscore implements one formulation, under the name of the module, and
+defines its class as ``FORMULATION``. To add a formulation, add a module.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from fastcontact.contact.formulations._formulation import Formulation
 
 
 class _Formulations(Mapping[str, type[Formulation]]):
-    """The formulations by name, each imported at its first use: most models have one."""
+    """The formulations by name. Each is imported at its first use, because most models use only one."""
 
     _names = tuple(name for _, name, _ in pkgutil.iter_modules(__path__) if not name.startswith("_"))
 

@@ -1,7 +1,7 @@
 """Segmentation of secondary faces by clipping with the primary faces, and integration over the segments (Puso, 2004).
 
-Both sides are projected along the normal of the secondary facet, so that each segment has one facet on either side.
-Curved facets are clipped as their corner polygons, an error of second order in the facet's length over its radius.
+Both sides are projected along the normal of the secondary facet. Each segment then belongs to one facet on each side. Curved
+facets are clipped as the polygons of their corners; the error is of second order in the ratio of facet length to radius.
 """
 
 from __future__ import annotations
@@ -23,26 +23,29 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-# Largest distance of a facing facet: in distances of the closest primary facet, and radii of the facet itself.
+# Facets are clipped up to a distance of DISTANCES times the distance of the closest primary facet plus RADII times the
+# radius of the secondary facet.
 DISTANCES, RADII = 2.0, 3.0
-# Work per secondary facet relative to that per node of a cell, for the choice of threads.
+# Work per secondary facet relative to the unit of work in `parallel.portions`, for the choice of the number of threads.
 EFFORT = 400
-# Total degree in s and t of the products of mapped shape functions of a facet.
+# Degree, by the number of nodes of a facet, of its shape functions as polynomials of both reference coordinates.
 DEGREE = {3: 1, 4: 2, 6: 2, 8: 3, 9: 4}
 
 
 def face_overlap(
     secondary: Surface, primary: Surface, reference: Array, deformed: Array, smoothing: Smoothing | None
 ) -> Overlap:
-    """Cut and integrate the secondary facets on the deformed configuration; areas are those of the reference.
+    """Clip the secondary facets on the deformed configuration, and integrate over the segments.
+
+    Integrals use the areas of the undeformed configuration.
 
     Parameters
     ----------
     secondary, primary : Surface
     reference, deformed : ndarray (n_points, 3)
-        Coordinates of all points [length].
+        Undeformed and deformed coordinates of all points [length].
     smoothing : Smoothing or None
-        The smooth surfaces that facets approximate, if they are taken into account.
+        The smooth surfaces that the facets approximate; None if gaps are measured between the facets.
 
     Raises
     ------
@@ -77,9 +80,25 @@ def face_overlap(
 def _heights(
     smoothing: Smoothing | None, pairs: Indices, rows: tuple[slice, slice], axes: list[Array] | None
 ) -> tuple[Array, Array, Array]:
-    """Return the heights of the facets of two blocks above their planes, and the factors (n_pairs, 2) of `Smoothing.shared`.
+    """Return the heights of the smooth surfaces above the facets of two blocks, and factors for each pair of facets.
 
-    Without smoothing the heights have no coefficients. `rows` are the facets of the two blocks, `axes` the `frames` of all.
+    Parameters
+    ----------
+    smoothing : Smoothing or None
+        Without smoothing, the heights are empty arrays.
+    pairs : ndarray of int (n_pairs, 2)
+        Numbers of the secondary and the primary facet, each in its block.
+    rows : (slice, slice)
+        Ranges of the facets of the two blocks among all facets of their sides.
+    axes : list of ndarray or None
+        `surface_smoothing.frames` of all facets of both sides.
+
+    Returns
+    -------
+    secondary, primary : ndarray
+        Coefficients of the heights, see `surface_smoothing`.
+    factors : ndarray (n_pairs, 2)
+        See `Smoothing.shared`.
     """
     if smoothing is None or axes is None:
         none = np.zeros((0, 0, 0))
@@ -95,7 +114,22 @@ def _heights(
 
 @dataclass(frozen=True, eq=False)
 class _Polygons:
-    """Facets of one kind: nodes (n, k, 3), the planes of their corners, radii around the centres (n,), boxes."""
+    """Deformed facets of a block, as polygons of their corners in planes.
+
+    Attributes
+    ----------
+    block : FacetBlock
+    nodes : ndarray (n, k, 3)
+        Positions of the k nodes of each of n facets [length].
+    count : int
+        Number of corners of a facet.
+    origin, axes : ndarray (n, 3), ndarray (n, 3, 3)
+        Centres of the facets [length], and unit vectors (in rows): two in the plane of the corners, and its normal.
+    radius : ndarray (n,)
+        Largest distance of a corner from the centre [length].
+    low, high : ndarray (n, 3)
+        Bounding boxes of the corners [length].
+    """
 
     block: FacetBlock
     nodes: Array
@@ -108,7 +142,7 @@ class _Polygons:
 
     @classmethod
     def of(cls, block: FacetBlock, deformed: Array) -> _Polygons:
-        """Return the deformed facets of a block."""
+        """Return the facets of a block for nodal coordinates `deformed` (n_points, 3) [length]."""
         nodes, count = deformed[block.facets], elements.get(block.element).n_corners
         origin, axes = np.empty((len(nodes), 3)), np.empty((len(nodes), 3, 3))
         _cut_faces_kernels.planes(nodes, count, origin, axes)
@@ -118,7 +152,10 @@ class _Polygons:
 
 
 def _facing(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
-    """Return the pairs of facets (n, 2) that overlap, in ascending order."""
+    """Return pairs (n, 2) of a secondary and a primary facet that may overlap, in ascending order.
+
+    `reach` is the largest distance (n_secondary,) at which facets are paired [length].
+    """
     numbers = tree_order(primary.origin, 1)
     tree = build(primary.low[numbers], primary.high[numbers])
     room = 8 * (len(secondary.nodes) + len(primary.nodes))
@@ -136,13 +173,37 @@ def _facing(secondary: _Polygons, primary: _Polygons, reach: Array) -> Indices:
 def _integrated(
     secondary: _Polygons, primary: _Polygons, pairs: Indices, reference: Array, heights: tuple[Array, Array, Array]
 ) -> tuple[Coupling, Array, Array]:
-    """Return the coupling of pairs of facets, and mass and `closer` of the secondary ones over the overlap."""
+    """Return the integrals over the overlap of pairs of facets.
+
+    Parameters
+    ----------
+    secondary, primary : _Polygons
+    pairs : ndarray of int (n_pairs, 2)
+        Numbers of the facets.
+    reference : ndarray (n_points, 3)
+        Undeformed coordinates of all points [length].
+    heights : tuple of ndarray
+        The value of `_heights`.
+
+    Returns
+    -------
+    coupling : Coupling
+    mass : ndarray (n, k, k)
+        Integrals of products of two shape functions of the n secondary facets [area].
+    closer : ndarray (n, k)
+        Integrals of the shape functions times the distance by which the smooth surfaces are closer than the facets [volume].
+
+    Raises
+    ------
+    ContactError
+        If a facet is too distorted to be projected.
+    """
     one, other = elements.get(secondary.block.element), elements.get(primary.block.element)
     to_terms, other_to_terms = tables(one.n_nodes).to_terms, tables(other.n_nodes).to_terms
     n, k = secondary.block.facets.shape
     mass, integrals, closer = np.empty((n, k, k)), np.empty((len(pairs), k, other.n_nodes)), np.empty((n, k))
     degree = DEGREE[one.n_nodes] + max(DEGREE[one.n_nodes], DEGREE[other.n_nodes])
-    if one.n_nodes == other.n_nodes == 3:  # integrated exactly, whichever the first corner
+    if one.n_nodes == other.n_nodes == 3:  # exact quadrature, so that the result does not depend on the first corner
         degree = max(degree, heights[0].shape[1])
     given = (
         np.searchsorted(pairs[:, 0], np.arange(n + 1)), secondary.nodes, secondary.count, secondary.origin, secondary.axes,
@@ -160,4 +221,5 @@ def _integrated(
 
 
 def _middle(element: elements.Element) -> Array:
+    """Return the reference coordinates (2,) of the centre of a facet."""
     return np.ascontiguousarray(element.nodes[: element.n_corners].mean(axis=0))

@@ -1,11 +1,11 @@
-r"""Pressure fields that remain determined by their integration points on partly covered facets.
+r"""Choice of the independent values of a pressure field on facets that are only partly covered by the other side.
 
-The integration points of a facet of which only a strip faces the other side hardly determine a field over the whole facet:
-on a strip of a fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the other end has the
-weight :math:`\theta^{2k+1}`. The measure is the smallest eigenvalue of the mass matrix over the covered part, relative to
-that over the whole facet. Where it is too small the field is simplified: linear between the corners of a quadratic facet, or
-constant from the nodes that other facets determine. Fields that are constant over a strip remain representable, so a uniform
-pressure is transmitted.
+If only a strip of a facet faces the other side, the integration points in this strip hardly determine a field over the
+complete facet: on a strip of the fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the
+other end has a weight proportional to :math:`\theta^{2k+1}`. The measure is the smallest generalised eigenvalue of two mass
+matrices of the facet, with integrals over the covered part and over the complete facet. If it is too small, the field is
+simplified. It becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that other facets
+determine. Constant fields remain representable, so that a uniform pressure is transmitted.
 """
 
 from __future__ import annotations
@@ -22,21 +22,22 @@ from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import SINGLE_PRECISION
 
-# A seventh of the facet determines a line, two fifths a parabola; values at the other end are amplified at most thirtyfold.
+# Smallest generalised eigenvalue at which a field counts as determined. A linear field needs about a seventh of the length
+# of a line, a quadratic one two fifths. Errors of the values at the other end are amplified by at most 30.
 DETERMINED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class WholeFacets:
-    """Mass matrices of the fields over whole facets of a block.
+    """Mass matrices of the complete facets of a block, which have k nodes each.
 
     Attributes
     ----------
     block : FacetBlock
     to_corners : ndarray (n_corners, k)
-        Coefficients of corner functions in shape functions [-].
+        Coefficients that express the linear shape functions of the corners by the k shape functions of the facet [-].
     mass : ndarray (n_facets, k, k)
-        Integrals of products of two shape functions over the facets [area].
+        Integrals of products of two shape functions over each facet [area].
     """
 
     block: FacetBlock
@@ -54,9 +55,11 @@ class WholeFacets:
         return cls(block, to_corners, np.einsum("fq,qa,qb->fab", dA, N, N))
 
     def degrees(self, mass: Array) -> Indices:
-        """Return the degree of the field (n_facets,) that `mass` (n_facets, k, k) over the covered part determines.
+        """Return the degree (n_facets,) of the field that the covered part of each facet determines.
 
-        2 for the full field, 1 for one that is linear between the corners, 0 for none, -1 where nothing takes part.
+        It is 2 for the field of the shape functions, 1 for a field that is linear between the corners, 0 if neither is
+        determined, and -1 if no part of the facet is covered. `mass` (n_facets, k, k) are the integrals over the covered part
+        [area].
         """
         degrees = np.full(len(mass), 2)
         degrees[~mass.any(axis=(1, 2))] = -1
@@ -69,7 +72,7 @@ class WholeFacets:
 
 
 def _smallest(full: Array, mass: Array) -> Array:
-    """Return the smallest generalised eigenvalues (n_facets,) of mass matrices relative to those of whole facets."""
+    """Return the smallest eigenvalue (n_facets,) of ``mass x = eigenvalue * full x`` for each pair of mass matrices [-]."""
     inverse = np.linalg.inv(np.linalg.cholesky(full))
     return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
 
@@ -77,17 +80,25 @@ def _smallest(full: Array, mass: Array) -> Array:
 def determined(
     side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
 ) -> tuple[csr_array, Indices]:
-    """Return the matrix (m, k) from the independent values of the field to all nodes, and the nodes (k,) of these values.
+    """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
 
     Parameters
     ----------
     side : Surface
+        The secondary side, with m nodes.
     fields : list of WholeFacets
-        Whole facets of each block of the side.
+        Mass matrices of the complete facets, for each block of the side.
     masses : list of ndarray (n_facets, n_nodes, n_nodes)
-        Integrals of products of two shape functions over the covered part [area].
+        Integrals of products of two shape functions over the covered part of each facet, for each block [area].
     excluded : ndarray of bool (m,)
-        Nodes without an independent value.
+        Nodes that have no independent value.
+
+    Returns
+    -------
+    values : csr_array (m, k)
+        Map from independent to nodal values [-].
+    nodes : ndarray of int (k,)
+        Node of each independent value.
     """
     degrees = [field.degrees(mass) for field, mass in zip(fields, masses, strict=True)]
     kept = np.zeros(len(side.points), bool)
@@ -105,7 +116,10 @@ def determined(
 
 
 def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
-    """Make a node of each facet without independent ones independent, in place: where most of the facet takes part."""
+    """Make one node independent in each facet that has no independent node, by setting `kept` (m,) in place.
+
+    The node with the largest covered area is chosen.
+    """
     for row in np.flatnonzero(~kept[local].any(axis=1)):
         nodes = local[row]
         if not (kept[nodes].any() or excluded[nodes].all()):
@@ -115,9 +129,10 @@ def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) 
 def _interpolated(
     values: csr_array, fields: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
 ) -> csr_array:
-    """Return `values` (m, m), completed by rows of the nodes that are neither independent nor excluded.
+    """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
 
-    Corners take the mean of the independent nodes of their facets; other nodes interpolate linearly between corners.
+    The value at a corner is the mean of those at the independent nodes of its facets. The values at other nodes are
+    interpolated linearly between the corners.
     """
     m = len(with_value)
     pairs = []
@@ -135,11 +150,12 @@ def _interpolated(
 
 
 def _between_corners(fields: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
-    """Return the rows (m, m) of nodes between corners that are not `done` (m,), interpolated linearly."""
+    """Return rows (m, m) that interpolate linearly between corners, for mid nodes that are not marked in `done` (m,)."""
     between = lil_array((len(done), len(done)))
     for field, degree in zip(fields, degrees, strict=True):
         corners = len(field.to_corners)
         facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
         for nodes, node in zip(field.block.local[facet], k + corners, strict=True):
-            between[nodes[node], nodes[:corners]] = field.to_corners[:, node]  # the same from either side
+            # The facets on both sides of an edge give the same row.
+            between[nodes[node], nodes[:corners]] = field.to_corners[:, node]
     return csr_array(between)

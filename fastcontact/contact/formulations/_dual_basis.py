@@ -1,18 +1,19 @@
-r"""Dual shape functions: biorthogonal to the displacement shape functions on each facet.
+r"""Dual shape functions, which are biorthogonal to the shape functions of the displacements on each facet.
 
-For positive shape functions :math:`\tilde N` of a facet that sum to one, the dual functions
+Let :math:`\tilde N` be the vector of shape functions of a facet, which are positive and sum to one. The dual functions
 
 .. math:: \psi = \mathrm{diag}(w) M^{-1} \tilde N, \quad w = \int \tilde N, \quad M = \int \tilde N \tilde N^T
 
-obey :math:`\int \psi_j \tilde N_k = w_j \delta_{jk}` and sum to one (Wohlmuth, 2000). The integrals run over that part
-of the facet which faces the other side, so both properties hold there (Cichosz and Bischoff, 2011; Popp, Seitz, Gee and
-Wall, 2013). Where the covered part of a function nearly vanishes, M is nearly singular: that function is left out, and the
-others sum to one without it.
+satisfy :math:`\int \psi_j \tilde N_k = w_j \delta_{jk}` and sum to one (Wohlmuth, 2000). The integrals are taken over the
+part of the facet that faces the other side, so that both properties hold for this part (Cichosz and Bischoff, 2011; Popp,
+Seitz, Gee and Wall, 2013). If the weight of a function in this part nearly vanishes, M is nearly singular. This function is
+then left out, and the remaining dual functions sum to one without it.
 
-The corner functions of quadratic facets are not positive. Multiples of the mid-node functions are added to them (Popp,
-Wohlmuth, Gee and Wall, 2012), large enough for positivity everywhere, so that no part of a facet, however it is cut, has
-negative weight: on lines, triangles and nine-node quadrangles this gives the Bernstein polynomials. The coefficient of a
-corner function is the displacement of the corner; that of a mid node also involves the displacements of its edge's ends.
+The shape functions of the corners of quadratic facets are not positive. Multiples of the functions of the mid nodes are
+added to them (Popp, Wohlmuth, Gee and Wall, 2012), which are large enough for the sums to be positive everywhere. No part
+of a facet then has a negative weight. On lines, triangles and nine-node quadrangles the sums are Bernstein polynomials. In
+this basis the coefficient of a corner is the displacement of the corner, and the coefficient of a mid node also depends on
+the displacements of the ends of its edge.
 """
 
 from __future__ import annotations
@@ -25,15 +26,18 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
-# Fraction of a mid node's function added to either end of its edge: with 1/4, parabolas become Bernstein polynomials; without
-# a centre node, 3/8 is the smallest for which (a + b) / 4 + 1 / 2, a and b in [-1, 1], has no negative part.
+# Fraction of the function of a mid node that is added to the functions at both ends of its edge. With 1/4 the functions
+# become Bernstein polynomials. For quadrangles without a centre node, 3/8 is the smallest fraction for which all functions
+# are positive.
 SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
-# A function of which less than this fraction of its weight faces the other side has no dual function.
+# A function has no dual function if the fraction of its weight that faces the other side is less than this, and if the dual
+# functions of the facet would otherwise be ill conditioned.
 COVERED = 0.02
-# Fractions above this multiple of the largest one count as equal to it: on curved facets they differ by a few percent.
+# Covered fractions above this multiple of the largest one count as equal to it: on curved facets they differ by a few
+# percent.
 EQUAL = 0.9
-# Dual functions of whole facets have root mean squares up to 2.4 (nine nodes); beyond the first number, and where their
-# integral falls below the second fraction of their weight, they extrapolate more than they test.
+# Dual functions count as ill conditioned if the root mean square of one of them exceeds MOST, or if the integral of one of
+# them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine nodes).
 MOST, LEAST = 20.0, 0.2
 
 
@@ -55,12 +59,12 @@ def positive(name: str) -> Array:
 
 
 def _edges(element: elements.Element) -> tuple[tuple[int, int], ...]:
-    """Return the end nodes of the edge of each mid node."""
+    """Return the numbers of the two corners of the edge of each mid node."""
     return ((0, 1),) if element.dim == 1 else element.edges
 
 
 def _bernstein_square(element: elements.Element) -> Array:
-    """Return T of nine-node quadrangles: the product of two lines."""
+    """Return T (9, 9) of nine-node quadrangles, the tensor product of the matrices of two lines; see `positive`."""
     line = elements.get("line3")
     index = {-1.0: 0, 1.0: 1, 0.0: 2}
     at = np.array([[index[float(c)] for c in node] for node in element.nodes])
@@ -71,25 +75,27 @@ def _bernstein_square(element: elements.Element) -> Array:
 def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
     r"""Return the dual functions of facets of which an arbitrary part faces the other side.
 
+    If the dual functions of a facet are ill conditioned, functions are left out: first those with a small covered fraction,
+    then all but those with the largest fraction, and finally all but the first of the latter.
+
     Parameters
     ----------
     mass : ndarray (n_facets, k, k)
-        Integrals of products of positive shape functions that sum to one, over that part [area].
+        Integrals of products of the positive shape functions over the covered part [area].
     kept : ndarray of bool (n_facets, k)
-        Functions that may take part.
+        Functions that may have a dual function.
     fraction : ndarray (n_facets, k)
-        Weight of each function over that part, relative to its weight over the whole facet.
+        Integral of each function over the covered part, relative to its integral over the complete facet [-].
 
     Returns
     -------
-    dual, D
-        As by `biorthogonal`, for all functions kept where these are well conditioned. On a narrow strip functions of nearly
-        vanishing fraction are left out, and if that is not sufficient all but those of the largest, or the first of these.
+    dual, D : ndarray (n_facets, k, k)
+        See `biorthogonal`.
     """
     partial = kept & (fraction > 0.0)
     dual, D = biorthogonal(mass, partial)
     share = np.where(partial, fraction, -1.0)
-    # All of nearly equal fraction, or the first of them: the choice must not change as facets deform.
+    # Nearly equal fractions are treated as equal, so that the choice does not change as facets deform.
     large = share >= EQUAL * share.max(axis=1, keepdims=True)
     largest = np.argmax(large, axis=1)[:, None] == np.arange(partial.shape[1])
     for fewer in (partial & (fraction > COVERED), partial & large, partial & largest):
@@ -102,12 +108,16 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
 
 
 def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
-    """Return for which facets (n_facets,) the dual functions are bounded and positive on average."""
+    """Return for which facets (n_facets,) the dual functions are well conditioned, see MOST and LEAST.
+
+    Parameters are those of `biorthogonal`, with its result `dual`.
+    """
     area = np.maximum(mass.sum(axis=(1, 2)), TINY)
     weight = mass.sum(axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
         size = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
-        off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)  # the shape functions sum to one with no other coefficients
+        # The dual functions sum to one if all coefficients of their sum are one.
+        off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)
         share = np.where(partial, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
     return ((size <= MOST) & (off <= LENGTH_ROUND_OFF) & (share >= 0.0)) | ~partial.any(axis=1)
 
@@ -115,29 +125,29 @@ def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
 def biorthogonal(mass: Array, partial: Mask) -> tuple[Array, Array]:
     r"""Return the dual functions of facets, and their integrals with the positive shape functions.
 
+    Both are NaN for facets whose shape functions are linearly dependent to machine precision.
+
     Parameters
     ----------
     mass : ndarray (n_facets, k, k)
-        Integrals of products of positive shape functions that sum to one [area].
+        Integrals of products of the positive shape functions [area].
     partial : ndarray of bool (n_facets, k)
-        Functions that take part; the dual functions of the others are zero.
+        Functions that have a dual function; the dual functions of the others are zero.
 
     Returns
     -------
     dual : ndarray (n_facets, k, k)
-        Coefficients, :math:`\psi_j = \sum_k dual_{jk} \tilde N_k`; the sum over those that take part is one.
+        Coefficients of the dual functions, :math:`\psi_j = \sum_k dual_{jk} \tilde N_k` [-]. The dual functions sum to one.
     D : ndarray (n_facets, k, k)
-        :math:`\int \psi_j \tilde N_k` [area]; diagonal among those that take part.
-
-    Where the functions are linearly dependent to the last digit, both are NaN.
+        Integrals :math:`\int \psi_j \tilde N_k` [area]; diagonal among the functions that have a dual function.
     """
     k = mass.shape[1]
     rest = partial.sum(axis=1)[:, None, None]
-    # Functions left out are distributed evenly over the others, so that these still sum to one.
+    # Functions that are left out are added in equal parts to the others, so that these still sum to one.
     spanning = np.eye(k) * partial[:, :, None] + partial[:, :, None] * ~partial[:, None, :] / np.maximum(rest, 1)
     G = np.where(partial[:, :, None] & partial[:, None, :], spanning @ mass, np.eye(k))
     weight = np.where(partial, mass.sum(axis=2), 0.0)
-    # Rows and columns are scaled before the inversion: weights of cut facets may differ by orders.
+    # Rows and columns are scaled before the inversion, because the weights of cut facets may differ by orders of magnitude.
     scale = 1.0 / np.sqrt(np.einsum("fkk->fk", G))
     scaled = G * scale[:, :, None] * scale[:, None, :]
     regular: Mask = np.not_equal(np.linalg.det(scaled), 0.0)

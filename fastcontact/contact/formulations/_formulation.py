@@ -1,4 +1,4 @@
-"""The base of all contact formulations: from the configuration of a pair to its constraints."""
+"""The base class of contact formulations, which computes the constraints of a contact pair from its configuration."""
 
 from __future__ import annotations
 
@@ -40,18 +40,19 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# In 3D a body that slides leaves edges and planes of symmetry node by node, each at this overhang in facet lengths;
-# nodes that are dropped earlier alternate between in and out.
+# Default of `projection_tolerance` in 3D, in facet lengths. When a body slides beyond an edge or a plane of symmetry, its
+# nodes lose contact one after the other. With a smaller tolerance, nodes near the edge alternate between paired and
+# unpaired.
 LEAVING = 0.5
-# Sine of the angle to a plane of symmetry above which a surface has a corner there.
+# Sine of the angle between the normal of a surface and a plane of symmetry above which the surface has a corner at the plane.
 LEANING = 0.38
 
 
 @dataclass(eq=False)
 class Formulation(ABC):
-    """A contact formulation bound to one pair of surfaces; instances are immutable.
+    """A contact formulation for one pair of surfaces; instances are immutable.
 
-    Subclasses are dataclasses; their further fields are options of the formulation.
+    Subclasses are dataclasses. The fields that they add are options of the formulation.
 
     Parameters
     ----------
@@ -60,31 +61,35 @@ class Formulation(ABC):
     points : ndarray (n_points, dim)
         Reference coordinates [length].
     axisymmetric : bool
-        Integrals run over the full circle.
+        Whether the model is axisymmetric. Integrals then include the circumference.
     modulus : float
-        Typical stiffness of the bodies, E / (1 - nu^2) [pressure].
+        Plane-strain modulus of the bodies, E / (1 - nu^2), for scaling [pressure].
     friction : float
-        Coefficient of Coulomb friction, zero for none [-].
+        Coefficient of friction; zero means no friction [-].
     projection_tolerance : float, optional
-        Largest distance beyond the end of the primary side at which a point is still paired, in facet lengths. Small by
-        default, so that points at the very end do not alternate as the bodies strain; half a facet in 3D, where sliding
-        bodies leave edges and planes of symmetry point by point.
+        Largest distance beyond the end of the primary side at which a point is paired, in facet lengths [-]. In 2D the
+        default is small, but large enough that points at the end of the primary side stay paired as the bodies deform. In
+        3D it is 0.5, see LEAVING.
     normals : str or sequence of float, optional
-        Normals along which the gap is measured. ``"facet"``: normal of the primary facet at the projection; ``"averaged"``:
-        interpolated between nodal means. By default the former in 2D without `surface_smoothing`, and the latter in 3D,
-        where the pairing of a point opposite an edge may not converge. ``"secondary"``: opposite to the mean normal
-        of the secondary side at the point. A vector (dim,) of any length: one normal for the whole primary side, out of its
-        body; points are projected along it.
+        Normals along which the gap is measured.
+
+        - ``"facet"``: normal of the primary facet at the projection. Default in 2D without `surface_smoothing`.
+        - ``"averaged"``: normal interpolated between averaged nodal normals of the primary side. Default in all other cases,
+          because with discontinuous normals the pairing of a point opposite an edge may not converge.
+        - ``"secondary"``: opposite of the averaged normal of the secondary side at the point.
+        - A vector (dim,) of any length: a constant normal, which points out of the primary body. Points are projected along
+          it.
     slip : str
-        ``"symmetric"``: closing a gap along the mean of both sides' normals is no slip. ``"primary"``: slip is all relative
-        displacement along the tangents to the primary side, also while a gap closes obliquely, as in code_aster.
+        ``"symmetric"``: a relative displacement that closes a gap along the mean of the normals of both sides is no slip.
+        ``"primary"``: all relative displacement along the tangents of the primary side is slip, also if the gap closes
+        obliquely, as in code_aster.
     surface_smoothing : bool
-        Whether to measure the gap between the smooth surfaces that straight facets of curved sides approximate, see
-        `surface_smoothing`; the default for mortar.
+        Whether to measure the gap between the smooth surfaces that the facets of curved sides approximate, see
+        `surface_smoothing`. Mortar sets it by default.
     options : PairOptions
-        Options of the pair that do not depend on its formulation, e.g. its clearance.
+        Options of the pair that do not depend on its formulation, such as its clearance.
     held : HeldMotions, optional
-        Directions in which supports and multi-point constraints hold single nodes, where they are known.
+        Directions in which supports and multi-point constraints hold nodes.
     """
 
     secondary: Surface
@@ -102,8 +107,9 @@ class Formulation(ABC):
     held: HeldMotions | None = field(default=None, repr=False)
 
     name: ClassVar[str]
-    # Pair again after every active-set iteration (True), or after the active set has settled (False).
+    # Whether the surfaces are paired again after each active-set iteration, or only after the active set has converged.
     geometry_in_loop: ClassVar[bool]
+    # Whether the primary side may be a rigid obstacle.
     against_obstacles: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -128,7 +134,7 @@ class Formulation(ABC):
 
     @cached_property
     def smoothing(self) -> Smoothing | None:
-        """The smooth surfaces of both sides; None without smoothing, on flat sides, and with one normal for all points."""
+        """The smooth surfaces of both sides; None without smoothing, for flat sides, and with a constant normal."""
         if not self.surface_smoothing or self.options.tied or not isinstance(self.primary, Surface):
             return None
         if not isinstance(self.normals, str):
@@ -137,31 +143,47 @@ class Formulation(ABC):
 
     @property
     def slides(self) -> bool:
-        """Whether tangential motion matters: friction, tying or cohesion."""
+        """Whether the constraints need tangents, for friction, tying or cohesion."""
         cohesion = self.options.cohesion
         return bool(self.friction) or self.options.tied or not (cohesion is None or cohesion.reversible)
 
     @property
     def eliminable(self) -> bool:
-        """Whether iterative solvers can eliminate closed constraints; penalties do not prevent it, since they are springs."""
+        """Whether iterative solvers can eliminate closed constraints.
+
+        A penalty does not prevent this, because it acts as a spring for each constraint.
+        """
         return True
 
     @property
     def faceted(self) -> bool:
-        """Whether normals are those of single facets, so that the pairing of points may alternate between two."""
+        """Whether normals are discontinuous at edges, so that the pairing of a point may alternate between two facets."""
         return isinstance(self.primary, Surface) and self.normals == "facet" and not self.options.tied
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
-        """Return the class that implements this formulation in 2 or 3 dimensions with the options of a user."""
+        """Return the class that implements this formulation in `dim` dimensions with the `options` of a user."""
         return cls
 
     @abstractmethod
     def unilateral(self, at: Configuration) -> Constraints:
-        """Pair the two sides and return constraints that may open and close, without penalty."""
+        """Pair the two sides, and return the constraints of unilateral contact without penalty or cohesion.
+
+        Parameters
+        ----------
+        at : Configuration
+            Positions of both sides at which they are paired.
+        """
 
     def constraints(self, at: Configuration) -> Constraints:
-        """Pair the two sides and return the constraints of the pair's kind of contact.
+        """Pair the two sides, and return the constraints of the pair with all its options.
+
+        Options are tied contact, penalties, cohesion, fluid pressure, and constraints that never open.
+
+        Parameters
+        ----------
+        at : Configuration
+            Positions of both sides at which they are paired.
 
         Raises
         ------
@@ -182,7 +204,8 @@ class Formulation(ABC):
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
-            # Also at the beginning of the step: a penetration that only this iterate produces must not be ignored.
+            # A constraint is ignored only if it is far away at the beginning of the step, too. Otherwise a large penetration
+            # in an intermediate iterate would be ignored.
             away = np.minimum(np.abs(constraints.gaps(at.displacement)), np.abs(constraints.gaps(at.start)))
             constraints = constraints.without(away > self.options.search_distance)
         if self.options.cohesion is not None:
@@ -198,7 +221,7 @@ class Formulation(ABC):
         return wetted(constraints, at, areas, self.options.source[self.secondary.points])
 
     def _softened(self, constraints: Constraints, at: Configuration) -> Constraints:
-        """Return constraints with the compliance of normal and tangential penalties, if any."""
+        """Return the constraints with the compliances of normal and tangential penalties, if the pair has any."""
         normal, tangential, areas = self.options.penalty, self.options.tangential_penalty, constraints.areas
         if normal is None and tangential is None:
             return constraints
@@ -223,7 +246,7 @@ class Formulation(ABC):
 
     @cached_property
     def tied(self) -> TiedPair | None:
-        """The equations of a tied pair, on the undeformed bodies."""
+        """The equations of a tied pair, for the undeformed bodies; None for other pairs."""
         if not self.options.tied:
             return None
         constraints = self.unilateral(Configuration.undeformed(self.points))
@@ -235,7 +258,7 @@ class Formulation(ABC):
         return tied(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
-        """Return the `reduction` of the multipliers of a tied pair; None where supports hold no node on both sides."""
+        """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
         held = self._held_on_both_sides(Configuration.undeformed(self.points))
         if held is None or not constraints.tangents:
             return None
@@ -249,7 +272,7 @@ class Formulation(ABC):
         )
 
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
-        """Return the secondary node (q,), as an index on its side, of each row of the `moments_of` constraints (q, m)."""
+        """Return the secondary node (q,), numbered on its side, of each row of `moments`, see `tied.moments_of`."""
         points = self.secondary.points
         if constraints.nodes is None:
             return np.arange(len(points))
@@ -257,7 +280,7 @@ class Formulation(ABC):
         return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
 
     def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
-        """Return which constraints, by reference position (m, dim) [length], do not separate (m,); None if all may."""
+        """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]; None if all can."""
         if self.options.always_closed:
             return np.ones(len(positions), bool)
         if at.never_opening is None:
@@ -265,9 +288,9 @@ class Formulation(ABC):
         return np.asarray(_at_places(at.never_opening, positions))
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return the pairing of candidates on the deformed configuration, by the options of the pair.
+        """Return the pairing of candidates on the deformed configuration, with the options of the formulation.
 
-        `tolerance` replaces `projection_tolerance` where given.
+        If `tolerance` is given, it replaces `projection_tolerance`.
         """
         deformed = self.points + at.displacement
         beyond = self.projection_tolerance if tolerance is None else tolerance
@@ -280,7 +303,7 @@ class Formulation(ABC):
         return opposed(pairing, self._secondary_normals(candidates, deformed))
 
     def _secondary_normals(self, candidates: Candidates, deformed: Array) -> Array:
-        """Return unit means (n, dim) of the secondary facets' normals at candidates."""
+        """Return averaged unit normals (n, dim) of the secondary side at candidates."""
         local = np.zeros(len(deformed), np.intp)
         local[self.secondary.points] = np.arange(len(self.secondary.points))
         normal = np.einsum(
@@ -291,7 +314,10 @@ class Formulation(ABC):
     def assembled(
         self, candidates: Candidates, pairing: Pairing, compliance: Compliance | None, at: Configuration
     ) -> Constraints:
-        """Return the constraints of paired candidates, with tangential rows where there is friction."""
+        """Return the constraints of paired candidates, including tangents if `slides`.
+
+        `compliance` couples the constraints, see `Constraints.compliance`.
+        """
         B, gap0 = gap_rows(candidates, pairing, self.primary, self.points)
         gap0 += self.added_gap(candidates, pairing, at) - self.overlap_of_smooth(candidates, pairing, at)
         positions = candidates.positions(self.points)
@@ -305,7 +331,10 @@ class Formulation(ABC):
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
 
     def _held_at(self, candidates: Candidates) -> Array | None:
-        """Return projectors (n, dim, dim) on the directions in which all nodes of candidates are held; None without any."""
+        """Return projectors (n, dim, dim) onto the directions in which all nodes of a candidate are held.
+
+        None without friction, or if no node is held.
+        """
         if self.held is None or not len(self.held.nodes) or not self.friction:
             return None
         return spanned(
@@ -315,7 +344,10 @@ class Formulation(ABC):
     def _geometry(
         self, candidates: Candidates, pairing: Pairing, at: Configuration, directions: Sequence[Array] = ()
     ) -> Geometry | None:
-        """Return how gaps of paired candidates, and slips along tangents (n, dim), vary; None for secondary normals."""
+        """Return the derivatives of the gaps of paired candidates, and of their slips along k tangents (n, dim).
+
+        None if normals are those of the secondary side, for which derivatives are not implemented.
+        """
         if self.normals == "secondary":
             return None
         coordinates = self.points + at.displacement
@@ -346,14 +378,18 @@ class Formulation(ABC):
         return linearised
 
     def _sliding(self, mean: csr_array, directions: Array, tangential: Array, at: Configuration) -> Slips:
-        """Return the slips due to the relative motion `mean` (m, n_points) and an obstacle's, along tangents (k, m, dim)."""
+        """Return the slips of the load step along tangents (k, m, dim).
+
+        `mean` (m, n_points) maps displacements of points to displacements relative to the primary side. The motion of a rigid
+        obstacle in the step is subtracted. `tangential` (m, k) are the tangential forces [force].
+        """
         moved, turning = at.displacement - at.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
             total -= at.obstacle - at.obstacle_start
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
             turned = self.primary.turning(now, before, at.pose, at.pose_start)
-            if turned is not None:  # it is affine in the positions
+            if turned is not None:  # The motion by rotation is an affine function of the positions.
                 ends = np.vstack([np.zeros(now.shape[1]), np.eye(now.shape[1])])
                 varied = self.primary.turning(ends, ends[:1], at.pose, at.pose_start)
                 assert varied is not None
@@ -363,10 +399,23 @@ class Formulation(ABC):
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> tuple[tuple[csr_array, ...], Array | None]:
-        """Return rows (n, n_dofs) of the slip of candidates along k tangents (n, dim), and its constant part (k, n).
+        """Return the slips of candidates in the load step, as an affine function of the displacements.
 
-        The latter is the motion of a rigid primary side in the step, or minus the part that closes a gap [length]; None
-        for zero.
+        Parameters
+        ----------
+        candidates : Candidates
+        pairing : Pairing
+        directions : sequence of k ndarray (n, dim)
+            Unit tangents.
+        at : Configuration
+
+        Returns
+        -------
+        rows : tuple of k csr_array (n, n_dofs)
+            Derivatives of the slips along each tangent with respect to the displacements [-].
+        slip0 : ndarray (k, n) or None
+            Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
+            closes the gap, if `slip` is ``"symmetric"`` [length]. None stands for zero.
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0: Array | None = None
@@ -380,14 +429,14 @@ class Formulation(ABC):
         return along, slip0
 
     def added_gap(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return the contribution of clearances and wear to the gaps (n,) of candidates, zero if unpaired [length]."""
+        """Return the contribution (n,) of clearances and wear to the gaps of candidates; zero if unpaired [length]."""
         added = self.options.added_gap(candidates, pairing, self.primary, self.points, at.clearance_factor)
         if at.worn is None:
             return added
         return added + np.where(pairing.paired, np.einsum("nk,nk->n", candidates.shape, at.worn[candidates.nodes]), 0.0)
 
     def overlap_of_smooth(self, candidates: Candidates, pairing: Pairing, at: Configuration) -> Array:
-        """Return the reduction of the gaps (n,) of candidates by the smooth surfaces above their facets [length]."""
+        """Return by how much the smooth surfaces outside of the facets reduce the gaps (n,) of candidates [length]."""
         closer, rows = np.zeros(len(pairing.paired)), np.flatnonzero(pairing.paired)
         if (
             self.smoothing is None
@@ -406,18 +455,24 @@ class Formulation(ABC):
         return closer
 
     def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
-        """Return the displacement (n, dim) due to obstacle rotation of the points faced by candidates [length], or None."""
+        """Return the displacements (n, dim) of the points opposite to candidates by the rotation of an obstacle [length].
+
+        The rotation is that of the load step. None if the obstacle does not rotate.
+        """
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
         return self.primary.turning(now, before, at.pose, at.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
-        """The secondary nodes that supports hold, as indices on the side."""
+        """The secondary nodes that supports hold, numbered on the side."""
         return np.flatnonzero(np.isin(self.secondary.points, () if self.held is None else self.held.nodes))
 
     def _opposite_held(self, nodes: Indices, at: Configuration) -> tuple[Pairing, Array]:
-        """Return what secondary `nodes` (n,) face, and the mean projectors (n, dim, dim) on what is held there."""
+        """Return the pairing of secondary `nodes` (n,), and the directions in which their projections are held.
+
+        The directions are given by projectors (n, dim, dim), interpolated between the nodes of the opposite facets.
+        """
         assert self.held is not None
         candidates = Candidates(self.secondary.points[nodes][:, None], np.ones((len(nodes), 1)))
         pairing = self.facing(candidates, at, max(self.projection_tolerance or 0.0, BESIDE))
@@ -429,9 +484,9 @@ class Formulation(ABC):
         return pairing, theirs
 
     def _held_on_both_sides(self, at: Configuration) -> Array | None:
-        """Return projectors (n_nodes, dim, dim) on directions in which both sides are held; None without any.
+        """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held; None without such directions.
 
-        Facets all of whose nodes are held are left out.
+        Directions in which all nodes of a facet are held do not count.
         """
         nodes = self._held_nodes
         if not len(nodes) or self.held is None:
@@ -443,11 +498,16 @@ class Formulation(ABC):
         return held if held.any() else None
 
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
-        """Return directions (n_nodes, dim) in which both sides are held without relative motion, with the nodes (n_nodes,).
+        """Return directions in which supports hold both sides without relative motion.
 
-        This is the case in a plane of symmetry and on an axis: slip is zero there for every traction, so that the traction is
-        undetermined. Where one side is free, or driven past the other, friction acts. Facets with all nodes held are
-        left out.
+        In a plane of symmetry or on an axis, slip in these directions is zero for every traction, so that the traction is
+        undetermined. If one side is free, or is moved relative to the other, friction acts and determines it. Directions in
+        which all nodes of a facet are held do not count.
+
+        Returns
+        -------
+        list of (ndarray (n_nodes, dim), ndarray of bool (n_nodes,))
+            Unit vectors, each with the secondary nodes that are held in this direction.
         """
         nodes = self._held_nodes
         if not len(nodes) or self.held is None:
@@ -464,14 +524,15 @@ class Formulation(ABC):
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
-            # Where an inclined normal leads slightly past a held node, the motion of the other nodes there is ignored.
+            # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
+            # facet is ignored.
             beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])
             moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), beside)
             both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))
-        # Closing is no slip where the normal is held, too. Elsewhere it may be inclined, as at the edge of a plane of
-        # symmetry.
+        # Where the normal is held, a motion along it closes the gap and is no slip. Elsewhere the normal may be inclined to
+        # the held directions, such as at the edge of a plane of symmetry.
         closing = np.where(
             np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0
         )
@@ -482,7 +543,10 @@ class Formulation(ABC):
         return alike(_without_whole_facets(held, self.secondary), self.points[self.secondary.points])
 
     def _mirrored(self, side: Surface) -> Surface:
-        """Return a side whose averaged normals are those of the full model where its edge is held in a plane of symmetry."""
+        """Return a side whose averaged normals at planes of symmetry are those of the full model.
+
+        A plane of symmetry is recognised by supports along its normal at the edge of the side.
+        """
         if self.held is None or not np.isin(side.points, self.held.nodes).any():
             return side
         held = _without_whole_facets(self.held.at(side.points), side)
@@ -495,11 +559,12 @@ class Formulation(ABC):
     def _closing_slip(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
     ) -> Array:
-        """Return the slip (k, n) to add so that closing a gap causes none where the normal is inclined.
+        """Return the correction (k, n) of slips by which closing a gap causes no slip [length].
 
-        On curved surfaces, above all at the edge of the contact, the normal of one side is inclined to the direction in which
-        the gap closes, and a component of the closing motion would count as slip. Along the mean of both sides' normals,
-        mirrored bodies close their gaps without slip.
+        On curved surfaces, in particular at the edge of the contact, the normal of the primary side is inclined to the
+        direction in which the gap closes. A component of this motion would then count as slip. The correction assumes that
+        the gap closes along the mean of the normals of both sides; this is exact for two bodies that are mirror images of
+        each other.
         """
         assert isinstance(self.primary, Surface)
         deformed, start = self.points + at.displacement, self.points + at.start
@@ -520,10 +585,10 @@ class Formulation(ABC):
         return slip0
 
     def first_contact(self, at: Configuration) -> tuple[Array, Array]:
-        """Return the point of first contact [length], and the normal faced there [-], both (dim,).
+        """Return the point of first contact (dim,) [length], and the unit normal (dim,) of the primary side there [-].
 
-        The secondary node with the smallest gap before any displacement of the bodies; of equally close ones that nearest to
-        the origin.
+        The point is the secondary node with the smallest gap to the undeformed primary side. If several gaps are equal, it is
+        the node nearest to the origin.
         """
         positions = self.points[self.secondary.points]
         gap, normal = self.nodal_gap(replace(at, displacement=np.zeros_like(self.points)))
@@ -534,10 +599,23 @@ class Formulation(ABC):
     def nodal_gap(
         self, at: Configuration, with_clearance: bool = True, displacement: Array | None = None
     ) -> tuple[Array, Array]:
-        """Return the gaps (n_nodes,) of the secondary nodes [length], and the normals (n_nodes, dim) that they face [-].
+        """Return the gaps of the secondary nodes, and the opposite normals.
 
-        Infinite where a node faces no primary facet. Clearances are included unless `with_clearance` is False. Where
-        `displacement` (n_points, dim) is given, the gaps are those at this displacement in the pairing of `at` [length].
+        Parameters
+        ----------
+        at : Configuration
+            Positions of both sides at which the nodes are paired.
+        with_clearance : bool
+            Whether the gaps include clearances and wear.
+        displacement : ndarray (n_points, dim), optional
+            Displacements for which the gaps are evaluated; by default those of `at` [length].
+
+        Returns
+        -------
+        gap : ndarray (n_nodes,)
+            Gaps, infinite for nodes without an opposite facet [length].
+        normal : ndarray (n_nodes, dim)
+            Unit normals of the primary side [-].
         """
         nodes = Candidates.nodes_of(self.secondary)
         pairing = self.facing(nodes, at, max(self.projection_tolerance or 0.0, BESIDE))
@@ -550,7 +628,10 @@ class Formulation(ABC):
 
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:
-    """Return projectors (n_nodes, dim, dim) without the directions in which all nodes of a facet of a side are held."""
+    """Return projectors (n_nodes, dim, dim) without directions in which all nodes of a facet are held.
+
+    `held` (n_nodes, dim, dim) are the projectors onto the directions in which the nodes of `side` are held.
+    """
     span = np.zeros_like(held)
     for block in side.blocks:
         around = held[block.local]
@@ -562,6 +643,9 @@ def _without_whole_facets(held: Array, side: Surface) -> Array:
 
 
 def _at_places(known: tuple[Array, AnyArray], positions: Array) -> AnyArray:
-    """Return `known` values (k, ...) at the point (k, dim) [length] nearest to each of `positions`."""
+    """Return, for each of `positions` (m, dim), the value at the nearest known point.
+
+    `known` are k points (k, dim) [length] and values (k, ...).
+    """
     places_before, values = known
     return np.asarray(values[nearest(places_before, positions)[1]])

@@ -1,7 +1,7 @@
-"""Mortar integrals: products of shape functions over the overlap of two surfaces.
+"""Mortar integrals: integrals of products of shape functions over the overlap of two surfaces.
 
-`_cut_lines` and `_cut_faces` cut the facets of two meshed sides; against a rigid obstacle, Gauss points of whole facets
-suffice.
+`_cut_lines` and `_cut_faces` compute them for two meshed sides, whose facets are intersected. If the primary side is a rigid
+obstacle, Gauss quadrature over complete facets suffices, see `obstacle_overlap`.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from fastcontact.mesh import elements
 
 @dataclass(frozen=True, eq=False)
 class Coupling:
-    """Pairs of a secondary and a primary facet that face each other, each of one kind.
+    """Overlapping facets of a secondary and a primary block.
 
     Attributes
     ----------
     secondary, primary : FacetBlock
     pairs : ndarray of int (n, 2)
-        Rows of the facets in their blocks.
+        Numbers of the secondary and the primary facet of each pair, each in its block.
     integrals : ndarray (n, n_nodes, n_primary_nodes)
         Integrals of secondary times primary shape functions over the overlap [area].
     """
@@ -38,7 +38,17 @@ class Coupling:
 
 
 class OverlapPoints(NamedTuple):
-    """Integration points of a block: facet (n,), shape functions (n, k), reference area (n,), zero beside the overlap."""
+    """Integration points of a secondary block.
+
+    Attributes
+    ----------
+    facet : ndarray of int (n,)
+        Number of the facet of each point.
+    shape : ndarray (n, k)
+        Shape functions of the k nodes of the facet at the point [-].
+    area : ndarray (n,)
+        Undeformed area of the point, zero outside of the overlap [area].
+    """
 
     facet: Indices
     shape: Array

@@ -1,21 +1,25 @@
-r"""Base of formulations with a pressure field: contact status at integration points, pressures at nodes.
+r"""Base class of formulations with a pressure field: contact status at integration points, pressures at nodes.
 
-The multiplier field :math:`\lambda_h` has the order of the facets. At every integration point the pressure is
+The multiplier field :math:`\lambda_h` is interpolated with the shape functions :math:`N_j` of the secondary facets. With
+the gap g and a constant :math:`\rho > 0`, the pressure at an integration point is
 
-.. math:: p = [\lambda_h - \rho g]_+
+.. math:: p = \max(\lambda_h - \rho g, 0)
 
-and the field is its projection, :math:`\int (\lambda_h - p) N_j = 0` for every node j (Alart and Curnier, 1991; with
-integration points, Ben Dhia and Zarroug, 2002; code_aster, R5.03.52). Both are the stationarity of one augmented
-Lagrangian. With the point forces :math:`y = w p` as unknowns it becomes a linear complementarity problem
+and the field is the projection of p, :math:`\int (\lambda_h - p) N_j = 0` for every node j (Alart and Curnier, 1991; with
+integration points, Ben Dhia and Zarroug, 2002; code_aster, R5.03.52). Both equations are the stationarity conditions of an
+augmented Lagrangian. Let w be the areas of the integration points. With the point forces :math:`y = w p` as unknowns, the
+conditions become a linear complementarity problem
 
 .. math:: y \ge 0, \quad g + C y \ge 0, \quad y^T (g + C y) = 0, \quad
           C = \tfrac{1}{\rho} \left( W^{-1} - P (P^T W P)^{-1} P^T \right)
 
-with P the shape functions at the points and W their areas. C is positive semidefinite and vanishes on the fields that
-the shape functions can represent, so the multiplier itself is not regularised; C only acts on components finer than the
-field. The primal-dual active set solves this exactly (as a semismooth Newton method), for every rho > 0, with the
-pairing renewed in every iteration. All multipliers are determined as long as :math:`P^T W P` is regular: a facet needs at
-least as many weighted points as it has nodes. Integrals run over the reference surface.
+where P contains the shape functions at the points, and W is the diagonal matrix of their areas. C is positive semidefinite.
+It vanishes for point forces of a pressure field that the shape functions can represent, so that the field is not
+regularised. C acts only on the remaining components of the point forces.
+
+The primal-dual active set method, a semismooth Newton method, solves this problem exactly for every :math:`\rho > 0`. The
+surfaces are paired again in each iteration. The field is determined if :math:`P^T W P` is regular: a facet needs at least
+as many points with an area as it has nodes. Integrals are taken over the undeformed surface.
 """
 
 from __future__ import annotations
@@ -46,23 +50,24 @@ class PressureField(NodalField):
     Attributes
     ----------
     projection : Projection
-        From point forces to the independent values of the field.
+        Map from point forces to the independent values of the field.
     nodes : csr_array (n_nodes, k)
-        From the independent values to those at all nodes [-].
+        Map from the k independent values to the values at all nodes [-].
     independent : ndarray of int (k,)
-        Nodes of the independent values.
+        Node of each independent value, numbered on the secondary side.
     around : ndarray of int (m, n)
-        Nodes of the facet of each integration point, counted on the secondary side.
+        The n nodes of the facet of each of m integration points, numbered on the secondary side.
     shape : ndarray (m, n)
-        Their shape functions there [-].
+        Values of their shape functions at the point [-].
     renewed : bool
-        Whether every pairing creates new integration points.
+        Whether each pairing creates new integration points.
     nodal_areas : ndarray (n_nodes,)
-        Integrals of the nodes' shape functions over the whole secondary side, by the rule of the points [area].
+        Integrals of the shape functions over the complete secondary side, by quadrature at the integration points [area].
     covered_areas : ndarray (n_nodes,)
-        The same over the points that take part [area].
+        The same integrals over the points that can carry forces [area].
     axes : (ndarray (m, dim, dim), ndarray (n_nodes, dim, dim)), optional
-        At points and nodes, the axes (in columns) along which a vector field has components; None for those of the mesh.
+        Axes at points and at nodes, as columns, along which the components of a vector field are interpolated; by default
+        the axes of the mesh.
     """
 
     projection: Projection
@@ -80,9 +85,19 @@ class PressureField(NodalField):
         cls, points: tuple[Indices, Array], areas: tuple[Array, Array], rho: float,
         field: tuple[csr_array, Indices], renewed: bool,
     ) -> PressureField:  # fmt: skip
-        """Return the field of points in facets with nodes and shape functions (m, n); `field` are `nodes` and `independent`.
+        """Return the pressure field of m integration points.
 
-        `areas` are those of the points that take part, zero elsewhere, and of all points, both (m,) [area].
+        Parameters
+        ----------
+        points : (ndarray of int (m, n), ndarray (m, n))
+            `around` and `shape`.
+        areas : (ndarray (m,), ndarray (m,))
+            Areas of the points, first with zeros at points that cannot carry forces, then of all points [area].
+        rho : float
+            The constant of the augmented Lagrangian [pressure / length].
+        field : (csr_array (n_nodes, k), ndarray of int (k,))
+            `nodes` and `independent`.
+        renewed : bool
         """
         (around, shape), (nodes, independent), (taking_part, full_areas) = points, field, areas
         P = shapes_at(shape, around, nodes.shape[0])
@@ -94,15 +109,15 @@ class PressureField(NodalField):
 
     @property
     def areas(self) -> Array:
-        """Areas (m,) of the integration points; infinite for those that take no part [area]."""
+        """Areas (m,) of the integration points; infinite for points that cannot carry forces [area]."""
         return np.where(self.projection.areas > 0, self.projection.areas, np.inf)
 
     def pressure(self, force: Array) -> Array:
-        """Return the field at the nodes; it may be slightly negative beyond the edge of the contact."""
+        """Return the field (n_nodes,) at the nodes [pressure]; it may be slightly negative beyond the edge of the contact."""
         return self.nodes @ self.projection.field(force)
 
     def traction(self, force: Array) -> Array:
-        """See `NodalField`."""
+        """Return nodal tractions (n_nodes, dim) for point forces (m, dim); see `NodalField`."""
         if self.axes is None:
             return super().traction(force)
         at_points, at_nodes = self.axes
@@ -110,19 +125,20 @@ class PressureField(NodalField):
 
     @property
     def covered(self) -> Array:
-        """Covered part of the nodal areas; one for nodes without area."""
+        """Covered fractions (n_nodes,) of the nodal areas; one for nodes without area [-]."""
         areas = self.nodal_areas
         with_area = np.abs(areas) > LENGTH_ROUND_OFF * np.abs(areas).max(initial=0.0)
         return np.divide(self.covered_areas, areas, out=np.ones_like(areas), where=with_area)
 
     def shares(self, force: Array) -> Array:
-        """Return the field times the areas that take part."""
+        """Return the products (n_nodes,) of the field and the covered areas [force]."""
         return self.pressure(force) * self.covered_areas
 
     def weighted_gaps(self, gaps: Array) -> tuple[Array, Indices]:
-        """Return means of the gaps weighted by nodal shape functions: zero around closed points even if nodal gaps are not.
+        """Return the means of gaps, weighted by shape functions and areas; see `NodalField`.
 
-        Corners of quadratic faces without area have no mean, and no points belong to them.
+        The mean at a node is zero if the points around it are closed, although the gap at the node itself may be open. For
+        corners of quadratic facets that have no area, the mean is infinite, and no point belongs to them.
         """
         usable, n = np.isfinite(gaps), len(self.nodal_areas)
         weight = np.where(usable, self.projection.areas, 0.0)[:, None] * self.shape
@@ -133,12 +149,17 @@ class PressureField(NodalField):
         return np.divide(sums, total, out=np.full(n, np.inf), where=kept), self.around[np.arange(len(gaps)), near]
 
     def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
-        """Return the nodes with a pressure that are nearest to an active point; at least one per facet, if any has one.
+        """Return the nodes in contact; see `NodalField`.
 
-        The nodal gap is not used: between facets of different curvature, nodes of facets in contact have open gaps. A node
-        without area, at the corner of some quadratic faces, carries no force: the nearest node with an area is closed
-        instead. Nodes to which no point with an area is nearest, at an axis or beyond the end of the other side, follow
-        their facet.
+        A node is in contact if its pressure is positive and if it is the nearest node of an active point, with these
+        additions:
+
+        - Corners of some quadratic facets have no area and carry no force. The nearest node with an area is closed as well.
+        - A node that is not nearest to any point with an area, such as on an axis or beyond the end of the primary side, is
+          closed if its facet has an active point.
+        - If no node of a facet with an active point would be closed, all its nodes with a positive pressure are closed.
+
+        Nodal gaps are not used: between facets of different curvature, nodes of facets in contact have open gaps.
         """
         usual = self.nodal_areas > NO_AREA * self.nodal_areas.max(initial=0.0)
         near = _nearest(self.around[active], self.shape[active], len(gap))
@@ -149,13 +170,13 @@ class PressureField(NodalField):
         touched[self.around[active]] = True
         near |= touched & ~_nearest(self.around[seen], self.shape[seen], len(gap))
         near &= pressure > 0
-        # Forces at one end of a facet, opposite an edge, may put the nearest node in tension: then the others of its facet.
+        # Forces at one end of a facet, opposite an edge, may cause a negative pressure at the nearest node.
         isolated = self.around[active][~near[self.around[active]].any(axis=1)]
         near[isolated[pressure[isolated] > 0]] = True
         return near
 
     def initially_active(self, gap: Array, pressure: Array) -> Mask | None:
-        """Return the points where the field exceeds rho times the gap, if the points are new in this pairing."""
+        """Return the points (m,) at which the field exceeds rho times the gap; None if all pairings have the same points."""
         if not self.renewed:
             return None
         field = self.projection.P @ pressure[self.independent]
@@ -163,7 +184,11 @@ class PressureField(NodalField):
 
 
 def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
-    """Return the nodes (n_nodes,) with the largest shape functions (m, n) at any of the points; several where equal."""
+    """Return the nodes (n_nodes,) whose shape function is the largest one at any of m points.
+
+    `around` (m, n) are the nodes of the facet of each point, and `shape` (m, n) their shape functions. If several shape
+    functions are equally large, all of their nodes count.
+    """
     nearest = np.zeros(n_nodes, bool)
     nearest[around[shape >= shape.max(axis=1, keepdims=True, initial=-np.inf) - LENGTH_ROUND_OFF]] = True
     return nearest
@@ -171,12 +196,13 @@ def _nearest(around: Indices, shape: Array, n_nodes: int) -> Mask:
 
 @dataclass(eq=False)
 class PressureFieldFormulation(Formulation):
-    """A formulation with a pressure field; further parameters as in `Formulation`.
+    """A formulation with a pressure field. The parameters of `Formulation` apply as well.
 
     Parameters
     ----------
     augmentation : float
-        rho times the length of the shortest facet (the root of the smallest area) over the modulus of the bodies [-].
+        The constant rho of the augmented Lagrangian, multiplied by the size of the smallest facet (the length of a line, the
+        root of the area of a face) and divided by the modulus of the bodies [-].
     """
 
     augmentation: float = 1.0
@@ -185,9 +211,9 @@ class PressureFieldFormulation(Formulation):
 
     @property
     def eliminable(self) -> bool:
-        """See `Formulation`: forces outside the field are compliant, but the field values can be eliminated.
+        """Whether iterative solvers can eliminate closed constraints; see `Formulation`.
 
-        This holds in three dimensions without friction, which would couple them in all directions.
+        They can eliminate the values of the field in 3D without friction; friction would couple them in all directions.
         """
         return self.points.shape[1] == 3 and not self.friction
 
@@ -197,7 +223,11 @@ class PressureFieldFormulation(Formulation):
             raise ContactError(f"augmentation = {self.augmentation} must be positive; 1 suits most problems")
 
     def repeated(self, field: tuple[csr_array, Indices]) -> tuple[csr_array, Indices]:
-        """Return a field with one value for coincident nodes: the matrix to nodal values, and the independent nodes."""
+        """Return a field in which coincident nodes have a common value.
+
+        `field`, and the value returned, are the map (n_nodes, k) from independent to nodal values, and the nodes (k,) of the
+        independent values.
+        """
         same, (values, nodes) = self.options.same_place, field
         if same is None:
             return field
@@ -207,7 +237,11 @@ class PressureFieldFormulation(Formulation):
         return csr_array(values @ csr_array((np.ones(len(nodes)), (np.arange(len(nodes)), column)))), independent
 
     def nodes_of(self, constraints: Constraints, moments: csr_array) -> Indices:
-        """See `Formulation`: those of the field, and those nearest to points on an axis."""
+        """Return the node (q,) of each row of `moments`; see `Formulation`.
+
+        Rows belong to the independent nodes of the field, and then to single points on an axis, for which the nearest node is
+        returned.
+        """
         field = constraints.nodal
         assert isinstance(field, PressureField)
         alone = moments.indices[moments.indptr[len(field.independent) : -1]]
@@ -216,7 +250,7 @@ class PressureFieldFormulation(Formulation):
     def of_points(
         self, candidates: Candidates, pairing: Pairing, field: PressureField, at: Configuration
     ) -> Constraints:
-        """Return the constraints of paired integration points whose forces make up a pressure field."""
+        """Return the constraints of paired integration points, with the compliance C of the pressure field."""
         projection = replace(field.projection, eliminable=self.eliminable, quadratic=self.secondary.order > 1)
         constraints = self.assembled(candidates, pairing, projection, at)
         along, turning = constraints.directions, self.options.turning
@@ -230,9 +264,11 @@ class PressureFieldFormulation(Formulation):
         )  # fmt: skip
 
     def _undetermined(self, field: PressureField, directions: tuple[Array, ...], at: Configuration) -> Array | None:
-        """Return a compliance of tangential fields that do no work on any slip, where both sides are held.
+        """Return the factor of a compliance that determines tangential tractions at nodes where both sides are held.
 
-        `directions` are tangents in the axes of the field.
+        Supports prevent slip there, so that these tractions do no work, and no equation determines them. The compliance makes
+        them vanish. `directions` are the tangents (m, dim) in the axes of the field. See
+        `Constraints.low_rank_compliance`; None if no such node exists.
         """
         factors = []
         for held, nodes in self.without_slip(at):

@@ -1,11 +1,12 @@
-r"""Segment-based mortar contact in two dimensions with a multiplier field, integrated exactly over the segments.
+r"""Segment-based mortar contact in 2D with a multiplier field.
 
-Every secondary facet is cut in each pairing, see `_cut_lines`, and every segment gets its own Gauss points (Puso and
-Laursen, 2004). A uniform pressure is then transmitted exactly between non-matching meshes, which neither node-to-segment
-contact nor quadrature over whole facets achieves. Segments that face nothing carry nothing, and the pressure field is
-projected over the others: where the primary surface ends inside a facet, the pressure ends there too.
+In each pairing the secondary facets are divided into segments, see `_cut_lines`, and each segment gets Gauss points (Puso
+and Laursen, 2004). The integrals are thus exact, and a uniform pressure is transmitted exactly between non-matching meshes.
+Neither node-to-segment contact nor quadrature over complete facets achieves this.
 
-The pressure at a point and the complementarity are those of `_pressure_field`.
+Segments without an opposite facet carry no pressure, and the pressure field is projected over the other segments. If the
+primary surface ends within a secondary facet, the pressure ends at this point. The pressure at an integration point and the
+complementarity conditions are those of `_pressure_field`.
 """
 
 from __future__ import annotations
@@ -33,14 +34,14 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 @dataclass(eq=False)
 class SegmentMortar(PressureFieldFormulation):
-    """Mortar contact with exact integration over segments of lines; further parameters as in `PressureFieldFormulation`.
+    """Mortar contact of lines with standard multipliers. The parameters of `PressureFieldFormulation` apply as well.
 
     Parameters
     ----------
     n_gauss : int, optional
-        Gauss points per segment; by default 3 on linear and 4 on quadratic facets.
+        Number of Gauss points per segment; by default 3 on linear and 4 on quadratic facets.
     multipliers : str
-        ``"standard"``: the multiplier field is that of the facets.
+        ``"standard"``: the multiplier field is interpolated with the shape functions of the secondary facets.
     """
 
     projection_tolerance: float = SINGLE_PRECISION
@@ -63,7 +64,7 @@ class SegmentMortar(PressureFieldFormulation):
         self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Intersect the facets on the deformed configuration and return the gaps of the integration points."""
+        """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
         deformed = self.points + at.displacement
         assert isinstance(self.primary, Surface)
         block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
@@ -83,9 +84,18 @@ class SegmentMortar(PressureFieldFormulation):
         return self.of_points(candidates, pairing, field, at)
 
     def _pressure_field(self, facet: Indices, shape: Array, area: Array, whole: Array) -> PressureField:
-        """Set up the pressure field on the nodes of facets that take part, from points (m,), shapes (m, n), areas (m,).
+        """Return the pressure field of m integration points.
 
-        `area` is zero where a point takes no part, `whole` nowhere.
+        Parameters
+        ----------
+        facet : ndarray of int (m,)
+            Number of the facet of each point.
+        shape : ndarray (m, n)
+            Shape functions of the n nodes of the facet at the point [-].
+        area : ndarray (m,)
+            Areas of the points, zero if a point cannot carry forces [area].
+        whole : ndarray (m,)
+            Areas of all points [area].
         """
         n, k = self.secondary.facets.shape
         mass = np.zeros((n, k, k))

@@ -1,6 +1,6 @@
-r"""Continuous formulation: a multiplier field on the secondary facets, contact status at integration points.
+r"""Continuous formulation: a multiplier field on the secondary side, with the contact status at integration points.
 
-The integration points are fixed on the secondary facets; see `_pressure_field` for the equations.
+The integration points are fixed on the secondary facets. See `_pressure_field` for the equations.
 """
 
 from __future__ import annotations
@@ -31,20 +31,25 @@ RULES = ("gauss", "simpson", "node")
 
 @dataclass(eq=False)
 class Continuous(PressureFieldFormulation):
-    """Continuous contact with a multiplier field.
+    """Continuous contact with a multiplier field. The parameters of `PressureFieldFormulation` apply as well.
 
     Parameters
     ----------
     integration : str
-        ``"gauss"``, ``"simpson"`` (on each half or quarter of a quadratic facet) or ``"node"``, with which no node
-        penetrates the other side, not even on the axis, where its area is zero. On triangles a seven-point rule
-        replaces Simpson's. On six-node triangles and eight-node quadrangles, whose corners have no positive areas,
-        ``"node"`` is refused.
+        Quadrature rule of the integration points.
+
+        - ``"gauss"``: Gauss points.
+        - ``"simpson"``: Simpson's rule, on each half or quarter of a quadratic facet; a seven-point rule on triangles.
+        - ``"node"``: the nodes, so that no node penetrates the other side, including nodes on the axis, whose area is zero.
+        It
+          is refused for six-node triangles and eight-node quadrangles, whose corners have no positive areas.
     n_gauss : int, optional
-        Gauss points in each direction of a facet (on triangles, 2 to 5 stand for 3, 6, 12 or 16 points in total); by
-        default 3 on linear and 4 on quadratic facets. They must determine the pressure field.
+        Number of Gauss points in each direction of a facet; by default 3 on linear and 4 on quadratic facets. On triangles
+        the numbers 2 to 5 select rules with 3, 6, 12 and 16 points in total. Too few points to determine the pressure field
+        are refused.
     normals : str or sequence of float
-        ``"averaged"`` by default: with discontinuous normals, the pairing of a point opposite a node may not converge.
+        See `Formulation`. The default is ``"averaged"``, because with discontinuous normals the pairing of a point opposite a
+        node may not converge.
     """
 
     normals: Normals | None = "averaged"
@@ -77,6 +82,7 @@ class Continuous(PressureFieldFormulation):
         self._field = PressureField.of_points(points, (areas_of_points, all_areas), float(rho), field, renewed=False)
 
     def _rule(self, element: str) -> quadrature.Rule:
+        """Return the integration points and weights on the reference facet of an element type."""
         if self.integration not in RULES:
             raise ContactError(unknown("integration rule", self.integration, RULES))
         if self.integration == "simpson":
@@ -86,6 +92,7 @@ class Continuous(PressureFieldFormulation):
         return self._gauss(element)
 
     def _gauss(self, element: str) -> quadrature.Rule:
+        """Return the Gauss rule with `n_gauss` points in each direction of the reference facet."""
         reference = elements.get(element)
         smallest = reference.order + 1
         count = reference.order + 2 if self.n_gauss is None else self.n_gauss
@@ -99,10 +106,10 @@ class Continuous(PressureFieldFormulation):
         return gauss_rule(element, count)
 
     def _areas(self, block: FacetBlock, xi: Array, weights: Array) -> Array:
-        """Return the area (n_facets * n_q,) of each integration point.
+        """Return the area (n_facets * n_q,) of each integration point [area].
 
-        At the nodes these are the integrals of the shape functions, so that a pressure field and its point forces have
-        the same resultant also where the radius varies along the facet.
+        If the points are the nodes, the areas are the integrals of the shape functions. A pressure field and its point forces
+        then have the same resultant, also in axisymmetric models, where the radius varies along the facet.
         """
         if self.integration != "node":
             measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
@@ -115,10 +122,11 @@ class Continuous(PressureFieldFormulation):
         return areas.ravel()
 
     def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
-        """Return the matrix (n_nodes, k) from independent to nodal values of the field, and the nodes (k,) of the former.
+        """Return the matrix (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
-        This is the identity, except for a quadratic line that ends on the axis when the points are the nodes: that end has no
-        area, and its value no equation. The field is even about the axis, which determines it from the two other nodes.
+        All nodal values are independent, with one exception: if the integration points are the nodes, the end of a quadratic
+        line on the axis has no area, and no equation determines its value. Since the field is an even function of the radius,
+        its value follows from those at the two other nodes of the line.
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
@@ -136,21 +144,22 @@ class Continuous(PressureFieldFormulation):
         return csr_array((values.tocsr() @ spread(self.secondary, excluded, kept))[:, kept]), kept
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Pair the integration points on the displaced configuration and return their gaps."""
+        """Pair the integration points on the deformed configuration, and return one constraint per point."""
         pairing = self.facing(self._candidates, at)
         areas = self._field.projection.areas
         at_axis = self._at_axis
         pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
         constraints = self.of_points(self._candidates, pairing, self._field, at)
-        if constraints.friction is not None and at_axis.any():  # nothing slides at the axis
+        if constraints.friction is not None and at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
         return constraints
 
     @cached_property
     def _at_axis(self) -> Mask:
-        """The points (m,) that are nodes on the axis: without area, but no other point prevents their penetration.
+        """The integration points (m,) that are nodes on the axis.
 
-        None with a penalty, which acts on areas.
+        They have no area, but only their own constraint prevents their penetration. With a penalty, which is proportional to
+        areas, the result is False for all points.
         """
         areas = self._field.projection.areas
         if self.integration != "node" or not self.axisymmetric or self.options.penalty is not None:
@@ -159,7 +168,11 @@ class Continuous(PressureFieldFormulation):
 
 
 def _simpson(element: str) -> quadrature.Rule:
-    """Return a closed rule on a facet: Simpson's on lines, its product on quadrangles, seven points on triangles."""
+    """Return a quadrature rule that includes the corners of a facet.
+
+    It is Simpson's rule on lines, its tensor product on quadrangles, and a seven-point rule on triangles. Quadratic facets
+    are subdivided.
+    """
     reference = elements.get(element)
     if reference.n_corners == 3:
         closed = quadrature.triangle_7_closed()
@@ -169,7 +182,7 @@ def _simpson(element: str) -> quadrature.Rule:
 
 
 def _at_nodes(element: str) -> quadrature.Rule:
-    """Return the nodes of a facet with the integrals of their shape functions over the reference facet."""
+    """Return the nodes of the reference facet, with the integrals of their shape functions as weights."""
     reference = elements.get(element)
     xi, weights = fine_rule(element)
     areas = weights @ reference.shape(xi)

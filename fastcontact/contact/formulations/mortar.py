@@ -1,7 +1,7 @@
-"""Mortar contact: gaps integrated exactly over the segments where two facets overlap.
+"""Mortar contact: gaps are integrated over the segments in which two facets overlap.
 
-Two methods share this name. With standard multipliers in two dimensions contact is decided at integration points, see
-`_segment_mortar`; between faces in 3D, and with dual multipliers, each node has one weighted gap, see `_weighted_mortar`.
+There are two methods of this name. In 2D with standard multipliers, the contact status is determined at integration points,
+see `_segment_mortar`. In 3D, or with dual multipliers, each secondary node has one weighted gap, see `_weighted_mortar`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
 
 
 class Mortar(SegmentMortar):
-    """Mortar formulation as named by the user; `variant` selects the method."""
+    """The formulation ``"mortar"`` of users; `variant` selects the method."""
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
-        """Return the method for lines or faces and for the kind of multipliers."""
+        """Return the class of the method for `dim` dimensions and the option `multipliers`."""
         weighted = dim == 3 or str(options.get("multipliers", "standard")) != "standard"
         return WeightedMortar if weighted else SegmentMortar
 

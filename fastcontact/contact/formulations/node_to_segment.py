@@ -1,10 +1,12 @@
-"""Node-to-segment contact: no secondary node penetrates the primary facet it projects onto.
+"""Node-to-segment contact: no secondary node penetrates the primary facet onto which it projects.
 
-One constraint per secondary node, enforced exactly; the multiplier is the nodal contact force. The pairing, the
-normal of the primary facet and the projection are fixed during an active-set solution (code_aster, R5.03.50, formulation
-DISCRETE with ALGO_CONT='CONTRAINTE'). It does not pass the patch test on non-matching meshes, and oscillates on quadratic
-facets: there, the continuous formulation is the better choice. Under a uniform pressure the corner forces of six-node
-triangles vanish and those of eight-node quadrangles are tensile: both are refused.
+There is one constraint per secondary node. It is enforced exactly, and its multiplier is the nodal contact force. The
+pairing, the projections and the normals are constant while the active set is solved for (code_aster, R5.03.50, formulation
+DISCRETE with ALGO_CONT='CONTRAINTE').
+
+The formulation does not pass the patch test on non-matching meshes, and its pressures oscillate on quadratic facets. Under
+a uniform pressure, the forces at the corners of six-node triangles vanish, and those at the corners of eight-node
+quadrangles are tensile. Secondary sides with such facets are refused.
 """
 
 from __future__ import annotations
@@ -33,13 +35,13 @@ OPPOSITE = ("facet", "node")
 
 @dataclass(eq=False)
 class NodeToSegment(Formulation):
-    """Node-to-segment contact; further parameters as in `Formulation`.
+    """Node-to-segment contact. The parameters of `Formulation` apply as well.
 
     Parameters
     ----------
     opposite : str
-        ``"facet"``: gap to the opposite primary facet. ``"node"``: gap to the nearest primary node, for matching
-        meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
+        ``"facet"``: the gap is measured to the opposite primary facet. ``"node"``: it is measured to the nearest primary
+        node, for matching meshes with little sliding (APPARIEMENT='NODAL' of code_aster).
     """
 
     opposite: str = "facet"
@@ -59,7 +61,7 @@ class NodeToSegment(Formulation):
         self._candidates = Candidates.nodes_of(self.secondary)
 
     def _check_areas(self, element: str) -> None:
-        """Refuse facets whose nodal forces under a uniform pressure are not all compressive."""
+        """Check that a uniform pressure on a facet has compressive forces at all nodes; raise a ContactError otherwise."""
         if not all_nodes_carry(element):
             raise ContactError(
                 f"node_to_segment cannot have facets of {element} on its secondary side '{self.secondary.group}', "
@@ -67,7 +69,7 @@ class NodeToSegment(Formulation):
             )
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
-        """Return the pairing of candidates with facets, or with the nearest primary nodes."""
+        """Return the pairing of candidates with facets or, by the option `opposite`, with the nearest primary nodes."""
         pairing = super().facing(candidates, at, tolerance)
         if self.opposite == "facet":
             return pairing
@@ -75,14 +77,14 @@ class NodeToSegment(Formulation):
         deformed, nodes = self.points + at.displacement, Candidates.nodes_of(self.primary)
         rows = nearest(deformed[self.primary.points], candidates.positions(deformed))[1]
         normal = pairing.normal
-        if self.normals in ("facet", "averaged"):  # normals of the primary side: the means of the facets there
+        if self.normals in ("facet", "averaged"):  # The normal at a node is the mean over its facets.
             normal = nodal_normals(self.primary, deformed)[rows]
         assert nodes.facet is not None
         assert nodes.xi is not None
         return replace(pairing, facet=nodes.facet[rows], xi=nodes.xi[rows], normal=normal, beyond=None)
 
     def unilateral(self, at: Configuration) -> Constraints:
-        """Pair on the displaced configuration and return one gap per secondary node."""
+        """Pair the nodes on the deformed configuration, and return one constraint per secondary node."""
         pairing = self.facing(self._candidates, at)
         pairing.paired[self.options.out(self._candidates)] = False
         areas = self._nodal.nodal_areas
@@ -102,22 +104,25 @@ class NodeToSegment(Formulation):
 
 @dataclass(frozen=True, eq=False)
 class NodalForces(NodalField):
-    """Pressures from the contact forces of the nodes; see `constraints.NodalField`.
+    """Map from nodal contact forces to nodal pressures; see `constraints.NodalField`.
 
     Attributes
     ----------
     nodal_areas : ndarray (n_nodes,)
-        Integrals of the nodes' shape functions [area].
+        Integrals of the shape functions of the nodes [area].
     mass : SuperLU, optional
-        Factors of the mass matrix of quadratic facets: their nodal areas are not positive (zero at the axis), so that
-        division by them is meaningless.
+        Factors of the mass matrix of the surface [area]. They are used for quadratic facets, whose nodal areas are not all
+        positive, for example zero on the axis, so that forces cannot be divided by them.
     """
 
     nodal_areas: Array
     mass: SuperLU | None = None
 
     def pressure(self, force: Array) -> Array:
-        """Return nodal forces over nodal areas; on quadratic facets, solve with the mass matrix of the surface instead."""
+        """Return nodal pressures (n_nodes,) [pressure] for nodal forces (n_nodes,) [force].
+
+        They are the forces divided by the nodal areas or, for quadratic facets, the solution with the mass matrix.
+        """
         return force / self.nodal_areas if self.mass is None else self.mass.solve(force)
 
 

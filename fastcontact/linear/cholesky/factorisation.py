@@ -1,4 +1,7 @@
-"""Cholesky factorisation with the contact unknowns last: elimination order, symbolic and numeric factorisation."""
+"""Sparse Cholesky factorisation: elimination order, symbolic factorisation, and numeric factorisation.
+
+Unknowns that contact constraints involve are eliminated last, see `linear.factor_solver`.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,7 @@ from fastcontact.linear.cholesky import elimination_tree_kernels, factorisation_
 from fastcontact.linear.cholesky.symmetric_factors import LowerTriangle, SymmetricFactors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest fraction of explicit zeros in merged supernodes, by their width.
+# Largest fraction of explicit zeros in merged supernodes: SHARES for widths up to each of WIDTHS, and beyond.
 WIDTHS, SHARES = np.array([4, 16, 48]), np.array([0.8, 0.5, 0.1, 0.05])
 
 
@@ -26,15 +29,16 @@ def singular() -> ModelError:
 
 
 def fill_reducing(K: bsr_array, last: Indices) -> Indices:
-    """Return the unknowns (n,) in a fill-reducing elimination order, those in `last` (m,) at the end.
+    """Return the unknowns (n,) of K in a fill-reducing elimination order, with the unknowns `last` (m,) at the end.
 
-    The order of the points is that of minimum degree on the pattern of K (Liu, 1985). SciPy only provides it as part of
-    SuperLU's factorisations; an incomplete one that drops every entry costs little more than the ordering.
+    Nodes are ordered by the minimum degree algorithm for the pattern of K (Liu, 1985). SciPy only provides this order as a
+    part of the factorisations of SuperLU. An incomplete factorisation that drops all entries costs little more than the
+    ordering.
     """
     size = K.blocksize[0]
     n = K.shape[0] // size
     pattern = csc_array((np.ones(len(K.indices)), K.indices, K.indptr), shape=(n, n))
-    # A dominant diagonal prevents pivoting; one column at a time, because almost nothing is computed.
+    # A dominant diagonal prevents pivoting. Panels of one column suffice, because almost nothing is computed.
     pattern = csc_array(pattern + 2.0 * n * eye_array(n))
     incomplete = spilu(
         pattern, drop_tol=1.0, fill_factor=1.0, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, panel_size=1,
@@ -53,9 +57,16 @@ def reordered(K: bsr_array, order: Indices) -> csc_array:
 
 
 class Kept(NamedTuple):
-    """Data of the last factorisation: entries of the matrix, offsets of the update matrices that are kept, by supernode.
+    """Data of the last factorisation that the next one may reuse.
 
-    `factors` are L, D and these update matrices; see `factorisation_kernels`.
+    Attributes
+    ----------
+    entries : ndarray (nnz,)
+        Entries of the matrix.
+    offsets : ndarray of int (n_supernodes,)
+        Offset of the update matrix of each supernode, if it is stored.
+    factors : tuple of three ndarray
+        Entries of L, of D, and of the stored update matrices; see `factorisation_kernels`.
     """
 
     entries: Array
@@ -67,10 +78,11 @@ NO_FACTORS = np.empty(0), np.empty(0), np.empty(0)
 
 
 class SymbolicFactors:
-    """Symbolic factorisation of symmetric matrices with a common pattern.
+    """Symbolic factorisation of symmetric matrices with the same pattern.
 
-    From the second matrix on, those parts of the last factors are reused whose entries of the matrix are the same, such as
-    the elastic region around a plastic zone: the result is that of a complete factorisation, to the bit.
+    From the second matrix on, parts of the last factors are reused if the entries of the matrix on which they depend have
+    not changed, for example in the elastic region around a plastic zone. The result is bitwise equal to that of a complete
+    factorisation.
 
     Parameters
     ----------
@@ -97,12 +109,12 @@ class SymbolicFactors:
         self._kept = Kept(np.empty(0), np.empty(0, np.int64), NO_FACTORS)
 
     def serves(self, K: bsr_array, last: Indices) -> bool:
-        """Return whether a matrix has the pattern."""
+        """Return whether the matrix K has the pattern of this factorisation, and the same unknowns are eliminated last."""
         return all(map(np.array_equal, (*self._pattern, self._last), (K.indptr, K.indices, last)))
 
     @on_one_blas_thread
     def factors(self, K: bsr_array) -> SymmetricFactors:
-        """Return the factors of a matrix K (n, n) with the pattern [force / length].
+        """Return the factors of a matrix K (n, n) with the pattern of this factorisation [force / length].
 
         Raises
         ------
@@ -128,7 +140,7 @@ class SymbolicFactors:
         return SymmetricFactors(LowerTriangle(start, values, *nodes), d, self._position, self._last)
 
     def _planned(self, A: csc_array) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
-        """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and room for the update matrices."""
+        """Return `source` and `target` (n_supernodes,) of `factorisation_kernels.plan`, and an array for update matrices."""
         nodes, kept, size = self._nodes, self._kept, 0
         source, target = np.full(len(self._above), factorisation_kernels.ANEW), np.full(len(self._above), -1)
         if len(kept.entries):
@@ -151,7 +163,17 @@ class SymbolicFactors:
 
 
 class Tree(NamedTuple):
-    """Elimination tree: postorder, its inverse, and parents and column counts in this order, all (n,)."""
+    """Elimination tree of a matrix (n, n).
+
+    Attributes
+    ----------
+    order, place : ndarray of int (n,)
+        Postorder of the columns, and its inverse.
+    parent : ndarray of int (n,)
+        Parent of each column in postorder, -1 for roots.
+    entries : ndarray of int (n,)
+        Number of entries of each column of L, in postorder.
+    """
 
     order: Numbers
     place: Numbers
@@ -160,7 +182,17 @@ class Tree(NamedTuple):
 
 
 class Supernodes(NamedTuple):
-    """First columns of supernodes, offsets of the rows below, and these rows; see `triangular_kernels`."""
+    """Supernodes: sets of consecutive columns of L with the same rows below; see `triangular_kernels`.
+
+    Attributes
+    ----------
+    first : ndarray of int (n_supernodes + 1,)
+        First column of each supernode.
+    begin : ndarray of int (n_supernodes + 1,)
+        Offset of the rows of each supernode in `rows`.
+    rows : ndarray of int
+        Rows below the columns of the supernodes.
+    """
 
     first: NDArray[np.int64]
     begin: NDArray[np.int64]

@@ -1,11 +1,13 @@
-"""Inverse of the pivot columns: small independent blocks, or a factorisation where constraints of many nodes are coupled.
+"""Inverse of the matrix P of the pivot columns: by small independent blocks, or by a factorisation if many nodes are coupled.
 
-Gaps weighted with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is full. Its
-factors are sparse: a solution is cheap compared with a product with the stiffness. Preconditioners need sparse weights and
-use a sparse inverse instead, with one block per node and the same effect on translations.
+Weighted gaps with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is a full
+matrix. Its factors, however, are sparse, so that a solution costs little compared with a product with the stiffness matrix.
+Preconditioners need sparse weights. They use a sparse approximation of the inverse, with one block per node, that is exact
+for translations.
 
-Whether a factorised matrix is nearly singular shows in a few solutions (`condition`). The diagonal of triangular factors is
-no indicator: for two equal rows among many it may be as large as for the others.
+Near singularity of a factorised matrix is detected by an estimate of its condition number, which takes a few solutions
+(`condition`). The diagonal of the triangular factors is not sufficient: if two rows of many are equal, all its entries may be
+large.
 """
 
 from __future__ import annotations
@@ -22,13 +24,13 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Entries are lumped into nodal blocks where at least this fraction of them does not cancel.
+# Smallest admissible ratio of the sums of absolute values of a row after and before its entries are lumped into nodal blocks.
 LUMPED = 0.3
 Apply = Callable[[Array], Array]
 
 
 class RepeatedError(ConvergenceError):
-    """Constraints are linearly dependent."""
+    """Raised if constraints are linearly dependent."""
 
     def __init__(self) -> None:
         super().__init__(
@@ -38,7 +40,7 @@ class RepeatedError(ConvergenceError):
 
 
 class CoupledError(RepeatedError):
-    """Equations of many nodes share unknowns in a way that cannot be eliminated."""
+    """Raised if equations of many nodes involve the same unknowns and cannot be eliminated."""
 
     def __init__(self) -> None:
         ConvergenceError.__init__(
@@ -50,18 +52,19 @@ class CoupledError(RepeatedError):
 
 @dataclass(frozen=True, eq=False)
 class SparseInverse:
-    """The inverse of the pivot columns where it is sparse.
+    """The inverse of P, if it is a sparse matrix.
 
     Attributes
     ----------
     matrix : csr_array (m, m)
+        P^-1.
     """
 
     matrix: csr_array
 
     @property
     def sparse(self) -> SparseInverse:
-        """The inverse itself."""
+        """The inverse itself, as for `CoupledPivots`."""
         return self
 
     def solve(self, b: Array) -> Array:
@@ -74,25 +77,26 @@ class SparseInverse:
 
 
 class CoupledPivots:
-    """The factors of the pivot columns P (m, m) where their inverse is full.
+    """The LU factors of P (m, m), if its inverse is a full matrix.
 
     Parameters
     ----------
     P : csr_array (m, m)
+        Columns of the equations that belong to the pivots.
     pivots : ndarray of int (m,)
-        The unknowns of its columns.
+        The unknown of each column.
     size : int
-        Unknowns of a node.
+        Number of unknowns of a node.
 
     Attributes
     ----------
     sparse : SparseInverse
-        Close enough to the inverse for a preconditioner: that of `lumped`.
+        Inverse of the `lumped` matrix, which approximates P^-1 in a preconditioner.
 
     Raises
     ------
     CoupledError
-        If P is singular or nearly so, or has no such sparse inverse.
+        If P is singular or nearly singular, or if lumping cancels most of a row.
     """
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
@@ -105,7 +109,7 @@ class CoupledPivots:
             self._factors = splu(csc_array(P))
         except RuntimeError:  # exactly singular
             raise CoupledError() from None
-        if not condition(P, self.solve, self.solve_transposed) < 1.0 / SINGLE_PRECISION:  # errors would grow
+        if not condition(P, self.solve, self.solve_transposed) < 1.0 / SINGLE_PRECISION:
             raise CoupledError()
 
     def solve(self, b: Array) -> Array:
@@ -121,10 +125,10 @@ Inverse = SparseInverse | CoupledPivots
 
 
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
-    """Return P (m, m) with the entries of each row lumped into the block of its node, by direction.
+    """Return P (m, m) with the entries of each row added up in the diagonal block of its node, separately by direction.
 
-    Translations of the pivots, with `size` components per node, then need the same forces. Entries in directions that have no
-    pivot at the node of the row are left out.
+    The product with a translation of all pivots is unchanged. Entries in directions in which the node of the row has no pivot
+    are left out. `pivots` (m,) are the unknowns of the columns, and `size` is the number of unknowns of a node.
     """
     node, direction = pivots // size, pivots % size
     column = np.full((node.max() + 1) * size, -1, np.intp)
@@ -136,12 +140,12 @@ def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
 
 
 def block_inverse(A: csr_array) -> csr_array:
-    """Return the inverse of a sparse matrix (m, m) of small independent blocks, all blocks of a size at once.
+    """Return the inverse of a sparse matrix (m, m) that consists of small independent blocks after a permutation.
 
     Raises
     ------
     RepeatedError
-        If a block is singular.
+        If a block is singular to machine precision.
     """
     m = A.shape[0]
     label = connected_components(A, directed=False)[1]
@@ -168,7 +172,7 @@ def block_inverse(A: csr_array) -> csr_array:
 
 
 def _inverses(blocks: Array) -> Array:
-    """Return the inverses of `blocks` (n, k, k)."""
+    """Return the inverses (n, k, k) of `blocks` (n, k, k); raise a RepeatedError if one of them is singular."""
     try:
         inverses = np.asarray(np.linalg.inv(blocks), np.float64)
     except np.linalg.LinAlgError:
@@ -179,16 +183,17 @@ def _inverses(blocks: Array) -> Array:
 
 
 def condition(P: csr_array, solve: Apply, solve_transposed: Apply) -> float:
-    """Return an estimate of the condition number ``max(|P^-1| |P| 1)`` of P (m, m) (Skeel, 1979).
+    """Return an estimate of the componentwise condition number of P (m, m) (Skeel, 1979).
 
-    It is independent of the scaling of the rows. The estimate is a lower bound, seldom less than a third of it (Hager, 1984;
-    Higham, 1988), and NaN where products overflow.
+    It is the largest component of ``abs(P^-1) @ abs(P) @ ones`` and does not depend on the scaling of the rows. The
+    estimate is a lower bound, which is seldom less than a third of the number (Hager, 1984; Higham, 1988). It is NaN if
+    products overflow.
 
     Parameters
     ----------
     P : csr_array (m, m)
     solve, solve_transposed : callable
-        Return ``P^-1 b`` and ``P^-T b``, shape (m,).
+        Functions that return ``P^-1 b`` and ``P^-T b`` (m,) for b (m,).
     """
     rows = np.asarray(abs(P).sum(axis=1), np.float64).ravel()
     product = LinearOperator(

@@ -1,4 +1,8 @@
-"""Elimination of linear constraints ``B u = c``: each pivot is a weighted sum of other unknowns plus an offset."""
+"""Elimination of linear equations ``B u = c``.
+
+One unknown per equation, its pivot, is expressed as a weighted sum of the other unknowns plus an offset. With the columns P
+of B that belong to the pivots, and the remaining columns R, this is ``u[pivots] = P^-1 (c - R u[others])``.
+"""
 
 from __future__ import annotations
 
@@ -16,24 +20,29 @@ NONE = SparseInverse(csr_array((0, 0)))
 
 @dataclass(frozen=True, eq=False)
 class Elimination:
-    """``u[pivots] = weights @ u + offset``, or ``u[pivots] = P^-1 (weights @ u) + offset`` where pivots are coupled.
+    """Elimination of m equations from n unknowns.
+
+    The eliminated unknowns are ``u[pivots] = weights @ u + offset``. If pivots are coupled, so that P^-1 is a full matrix,
+    they are ``u[pivots] = P^-1 (weights @ u) + offset`` instead. Multipliers of the equations have the forces
+    ``F.T @ multiplier`` on the unknowns; F is B unless `eliminate` gets `force_rows`.
 
     Attributes
     ----------
     pivots : ndarray of int (m,)
         The eliminated unknown of each equation.
     weights : csr_array (m, n)
-        Weights of the other unknowns; those of pivots are zero.
+        Weights of the other unknowns, zero in the columns of the pivots [-].
     offset : ndarray (m,)
+        Values of the pivots if all other unknowns are zero [length].
     force_weights : csr_array (m, n)
-        Fractions of the force at each pivot that are moved to the other unknowns: `weights`, unless multipliers act through
-        other rows than B.
+        Fractions of the force at each pivot that act on the other unknowns after the elimination; equal to `weights` if F
+        is B [-].
     inverse : SparseInverse or CoupledPivots
-        Inverse of the pivots' columns of the rows that multipliers act through.
+        Inverse of the columns of F that belong to the pivots.
     own : SparseInverse or CoupledPivots
-        Inverse of the pivots' columns of the equations. Where these are coupled, the weights do not include it.
+        P^-1, the inverse of the columns of B that belong to the pivots.
     compliance : ndarray (m,), optional
-        Compliance of the equations: ``B u + compliance * multiplier = c`` [length / force].
+        Compliance of the equations, ``B u + compliance * multiplier = c`` [length / force].
     """
 
     pivots: Indices
@@ -46,19 +55,19 @@ class Elimination:
 
     @property
     def coupled(self) -> bool:
-        """Whether equations of many nodes share pivots."""
+        """Whether pivots are coupled: equations of many nodes involve the pivots of each other."""
         return isinstance(self.own, CoupledPivots)
 
     def shifted(self, c: Array) -> Array:
-        """Return the change of the pivots (m,) for a change c (m,) of the right-hand sides."""
+        """Return the change (m,) of the pivots [length] due to a change c (m,) of the right-hand sides [length]."""
         return self.own.solve(c)
 
     def multiplier(self, forces: Array) -> Array:
-        """Return the multiplier (m,) with ``B.T multiplier = forces`` at the pivots; forces = (K u - f)[pivots]."""
+        """Return the multipliers (m,) [force] whose forces at the pivots are `forces` (m,), ``(K u - f)[pivots]`` [force]."""
         return self.inverse.solve_transposed(forces)
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
-        """Set the pivots of `x` (n,) to their weighted sums, plus `offset` (m,)."""
+        """Set the pivots of `x` (n,), in place, to the weighted sums of the other unknowns, plus `offset` (m,)."""
         elimination_kernels.complete(self.pivots, self.weights.indptr, self.weights.indices, self.weights.data, x)
         if self.coupled:
             x[self.pivots] = self.own.solve(x[self.pivots])
@@ -66,14 +75,14 @@ class Elimination:
             x[self.pivots] += offset
 
     def move_forces(self, r: Array) -> None:
-        """Move the forces `r` (n,) at the pivots to the other unknowns."""
+        """Replace the forces `r` (n,), in place, by those on the other unknowns after the elimination; zero at the pivots."""
         W = self.force_weights
         if isinstance(self.inverse, CoupledPivots):
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
         elimination_kernels.move_forces(self.pivots, W.indptr, W.indices, W.data, r)
 
     def full_weights(self) -> csr_array:
-        """Return the weights (m, n) of the other unknowns, a full matrix where pivots are coupled."""
+        """Return the matrix W (m, n) of ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""
         if not self.coupled:
             return self.weights
         columns = np.unique(self.weights.indices)
@@ -81,7 +90,10 @@ class Elimination:
         return csr_array((full.data, columns[full.indices], full.indptr), shape=self.weights.shape)
 
     def with_sparse_weights(self) -> Elimination:
-        """Return this elimination or, where pivots are coupled, an approximation with sparse weights for a preconditioner."""
+        """Return an elimination with sparse weights for a preconditioner.
+
+        If pivots are coupled, it is an approximation, otherwise this elimination.
+        """
         if not self.coupled:
             return self
         weights = _weighted(self.own.sparse, self.weights)
@@ -91,23 +103,25 @@ class Elimination:
 def eliminate(
     B: csr_array, c: Array, force_rows: csr_array | None = None, nodes: Indices | None = None, size: int = 1
 ) -> Elimination:
-    """Choose the unknowns to eliminate from ``B u = c`` and express them in terms of the others; see `pivot_order`.
+    """Choose the pivots of the equations ``B u = c``, see `pivot_order`, and express them by the other unknowns.
 
     Parameters
     ----------
     B : csr_array (m, n)
+        Matrix of the equations [-].
     c : ndarray (m,)
+        Right-hand sides [length].
     force_rows : csr_array (m, n), optional
-        Rows that multipliers act through, ``K u = f + force_rows.T multiplier``; B by default.
+        Matrix F of the equilibrium ``K u = f + F.T multiplier``; B by default [-].
     nodes : ndarray of int (m,), optional
-        The node of each equation; equations of one node may share unknowns.
+        The node of each equation. Equations of the same node may involve the same unknowns.
     size : int
-        Unknowns of a node.
+        Number of unknowns of a node.
 
     Raises
     ------
     RepeatedError
-        If constraints are linearly dependent, so that there is no pivot for each.
+        If the equations are linearly dependent.
     """
     B = csr_array(B, copy=True)
     if not B.has_canonical_format:
@@ -122,7 +136,7 @@ def eliminate(
 
 
 def _weights(B: csr_array, pivots: Indices, inverse: Inverse) -> csr_array:
-    """Return the weights (m, n) of the other unknowns, given the inverse of the pivots' columns."""
+    """Return `Elimination.weights` (m, n), given the inverse of the columns of B that belong to the pivots."""
     is_pivot = np.zeros(B.shape[1], bool)
     is_pivot[pivots] = True
     rest = csr_array((np.where(is_pivot[B.indices], 0.0, -B.data), B.indices, B.indptr), shape=B.shape, copy=True)
@@ -131,6 +145,7 @@ def _weights(B: csr_array, pivots: Indices, inverse: Inverse) -> csr_array:
 
 
 def _weighted(inverse: SparseInverse, rest: csr_array) -> csr_array:
+    """Return the product (m, n) of the inverse of the pivot columns and the negative remaining columns `rest` (m, n)."""
     weights = csr_array(inverse.matrix @ rest)
     weights.sort_indices()
     return weights

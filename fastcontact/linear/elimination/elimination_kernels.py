@@ -1,5 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Eliminated unknowns in long vectors: ``x[pivots] = W x``, W in compressed rows that may involve pivots."""
+"""Kernels for eliminated unknowns, ``x[pivots] = W x`` with a sparse matrix W (m, n) in CSR format.
+
+W is given by `indptr`, `indices` and `weights`; it may have entries in the columns of pivots.
+"""
 
 import numpy as np
 
@@ -8,7 +11,7 @@ from fastcontact._jit.decorators import kernel
 
 @kernel
 def complete(pivots, indptr, indices, weights, x):
-    """Set ``x[pivots] = W x``."""
+    """Set ``x[pivots]`` (m,) to ``W x`` for x (n,), in place."""
     sums = np.zeros(pivots.shape[0], x.dtype)
     for p in range(pivots.shape[0]):
         s = x[0] * 0
@@ -21,7 +24,7 @@ def complete(pivots, indptr, indices, weights, x):
 
 @kernel
 def move_forces(pivots, indptr, indices, weights, r):
-    """Move the forces at the pivots to the other unknowns: ``r += W.T r[pivots]``, then ``r[pivots] = 0``."""
+    """Move forces r (n,) from the pivots to the other unknowns, in place: ``r += W.T r[pivots]``, then ``r[pivots] = 0``."""
     forces = np.empty(pivots.shape[0], r.dtype)
     for p in range(pivots.shape[0]):
         forces[p] = r[pivots[p]]

@@ -1,4 +1,4 @@
-"""Common part of iterative solvers: linear constraints, eliminated where possible, and tolerances that may be lowered."""
+"""Common part of iterative solvers: solution under linear equations, which are eliminated if possible, and tolerances."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from fastcontact.linear.protocol import LinearSolver, Monitor
 from fastcontact.round_off import SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Target of the residual relative to its admissible value.
+# Factor by which a reduced tolerance is smaller than necessary for the residual to reach its bound.
 LEFT = 0.1
 
 
 class LoadedIteration:
-    """See `linear.protocol.Loaded`.
+    """A prepared matrix of an iterative solver with a right-hand side; see `linear.protocol.Loaded`.
 
     Parameters
     ----------
     solver : object
-        With ``columns``, columns of K^-1 (`InverseColumns`), and two methods for an `Elimination` or None:
-        ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,), ``multiplier(elimination, u, f)`` the
-        multipliers (m,) of the equations.
+        The solver. It has an attribute ``columns``, the `InverseColumns` of K, and two methods, which take an `Elimination`
+        or None: ``solution(f, elimination, guess, monitor, tolerance)`` returns u (n,) [length], and
+        ``multiplier(elimination, u, f)`` returns the multipliers (m,) of the equations [force].
     f : ndarray (n,)
-        [force]
+        Right-hand side [force].
     """
 
     def __init__(self, solver: Any, f: Array) -> None:
@@ -41,14 +41,18 @@ class LoadedIteration:
 
     @functools.cached_property
     def _free(self) -> Array:
-        """Displacement (n,) without equations."""
+        """Solution (n,) without equations [length]."""
         return np.asarray(self._solver.solution(self._f, None, None))
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`: linearly dependent constraints, and those with a compliance, go through columns of K^-1."""
+        """Return the solution and the multipliers, see `Loaded`.
+
+        If equations are linearly dependent or have a compliance, they are not eliminated. The Delassus operator is formed
+        instead, from columns of K^-1.
+        """
         solver = self._solver
         if C is None or not B.shape[0]:
             try:
@@ -79,7 +83,10 @@ class LoadedIteration:
 
 
 def tighten(solver: LinearSolver, excess: float) -> bool:
-    """Lower the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`; False at the lower limit."""
+    """Reduce the tolerance of `solver`, whose residual exceeds its bound by the factor `excess`.
+
+    Return False if the tolerance has its smallest value already, which round-off limits.
+    """
     tolerance = max(solver.tolerance * LEFT / excess, SUM_ROUND_OFF)
     if not tolerance < solver.tolerance:
         return False
@@ -93,7 +100,7 @@ def tighten(solver: LinearSolver, excess: float) -> bool:
 
 
 def put_back_tolerance(solver: LinearSolver, snapshot: Mapping[str, Any]) -> None:
-    """Restore the tolerance of a snapshot, lowered or not."""
+    """Restore the tolerance that `solver` had at the time of a `snapshot`, see `linear.protocol.LinearSolver`."""
     requested = solver.tolerance if solver.asked is None else solver.asked
     solver.tolerance = snapshot.get("tolerance", requested)
     solver.asked = None if solver.tolerance == requested else requested

@@ -1,9 +1,14 @@
-"""Choice of the pivot of each constraint, and the inverse of the pivot columns.
+"""Choice of the unknown to eliminate from each linear equation, its pivot, and inverse of the pivot columns.
 
-The pivots of a node's equations, or of single equations, are unknowns that no other equations involve, or none of a later
-layer (`of_groups`). If there are too few, pivots are sufficiently large entries in the unknowns of that node (`of_nodes`), or
-the remaining equations are assigned unknowns (`of_most_groups`, `assigned`). The columns of the pivots are inverted in small
-blocks, independent or in layers, or factorised where equations of many nodes share unknowns otherwise (`coupled_pivots`).
+Equations are grouped by nodes, or each equation is a group. Pivots are chosen by the first of these rules that succeeds:
+
+1. unknowns that no other group involves, or no other group of the same and later layers (`of_groups`);
+2. sufficiently large entries among the unknowns of the node of an equation (`of_nodes`);
+3. the unknowns of rule 1 as far as they suffice, and a matching for the remaining equations (`of_most_groups`);
+4. a matching of all equations with unknowns (`assigned`).
+
+The pivot columns are inverted by small blocks, which are independent or coupled in one direction. If equations of many
+nodes are coupled in another way, they are factorised (`coupled_pivots`).
 """
 
 from __future__ import annotations
@@ -23,36 +28,38 @@ from fastcontact.linear.elimination.coupled_pivots import (
     block_inverse,
 )
 
-# Smallest pivot over the largest entry of the equation.
+# Smallest ratio of a pivot to the largest entry of its equation.
 SMALLEST = 0.25
-# Largest number of equations with shared unknowns that are inverted as a block, and the same if they cannot be factorised,
-# which is also the largest number that are assigned pivots by a dense factorisation.
+# Largest size of a block that is inverted instead of factorised, and largest size of a block that is inverted if it cannot be
+# factorised. The latter is also the largest number of equations whose pivots are chosen by a dense QR factorisation.
 LARGEST_BLOCK, FULL_UP_TO = 64, 500
-# Number of layers beyond which the sum of products costs more than it saves.
+# Largest number of layers of equations: the inverse is a sum of that many products of sparse matrices.
 MOST_LAYERS = 4
 
 
 def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[Indices, Inverse]:
-    """Return the pivot of every equation and the inverse of their columns, ``B[:, pivots]^-1``.
+    """Return the pivot of each equation, and the inverse of the pivot columns.
 
     Parameters
     ----------
     B : csr_array (m, n)
-        Equations, in canonical format, without stored zeros.
+        Matrix of the equations, in canonical format, without stored zeros.
     nodes : ndarray of int (m,), optional
         The node of each equation.
     size : int
-        Unknowns of a node.
+        Number of unknowns of a node.
 
     Returns
     -------
     pivots : ndarray of int (m,)
+        The unknown that is eliminated from each equation.
     inverse : SparseInverse or CoupledPivots
+        Inverse of ``B[:, pivots]`` (m, m).
 
     Raises
     ------
     RepeatedError
-        If constraints are linearly dependent.
+        If the equations are linearly dependent.
     """
     if not B.shape[0]:
         return np.empty(0, np.intp), SparseInverse(csr_array((0, 0)))
@@ -65,12 +72,14 @@ def chosen(B: csr_array, nodes: Indices | None = None, size: int = 1) -> tuple[I
 
 
 def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
-    """Return the inverse of the columns `pivots` (m,) of B as small blocks or factors; a node has `size` unknowns.
+    """Return the inverse of ``B[:, pivots]`` (m, m), as a sparse matrix or by LU factors.
+
+    B (m, n) are the equations, `pivots` (m,) the chosen unknowns, and `size` is the number of unknowns of a node.
 
     Raises
     ------
     RepeatedError
-        If they are singular.
+        If the matrix is singular.
     """
     P = csr_array(B[:, pivots])
     if (inverse := _triangular_inverse(P, LARGEST_BLOCK, MOST_LAYERS)) is not None:
@@ -88,7 +97,10 @@ def inverse_of(B: csr_array, pivots: Indices, size: int) -> Inverse:
 
 
 def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInverse | None:
-    """Return the inverse of a block triangular matrix with blocks up to `largest` and up to `layers`; None for others."""
+    """Return the inverse of P (m, m) if P is block triangular after a permutation, None otherwise.
+
+    The diagonal blocks must have at most `largest` rows, and the inverse must be a sum of at most `layers` terms.
+    """
     label = connected_components(P, connection="strong")[1]
     if np.bincount(label).max(initial=0) > largest:
         return None
@@ -103,27 +115,38 @@ def _triangular_inverse(P: csr_array, largest: int, layers: int) -> SparseInvers
 
 
 def of_groups(B: csr_array, groups: Indices, layers: int = MOST_LAYERS) -> Indices | None:
-    """Return the unknown (m,) of each row among the exclusive ones of its group; None where there are too few.
+    """Return the pivots (m,), chosen among the exclusive unknowns of groups; None if a group has too few of them.
 
-    Exclusive unknowns of a group are those that no other group of its own and later layers involves, with up to `layers`
-    layers. An example are weighted gaps of quadratic facets with dual multipliers: no other mid node involves the unknowns of
-    a mid node, and without the mid nodes the same holds for corners.
+    An unknown is exclusive to a group if no other group of the same and of later layers involves it. The first layer are
+    the groups with enough exclusive unknowns among all groups, the second layer those with enough among the remaining ones,
+    and so on, up to `layers` layers. An example are weighted gaps of quadratic facets with dual multipliers: no other mid
+    node involves the unknowns of a mid node, and without the mid nodes the same holds for the corners.
+
+    Parameters
+    ----------
+    B : csr_array (m, n)
+        Equations.
+    groups : ndarray of int (m,)
+        Number of the group of each equation.
+    layers : int
+        Largest number of layers.
     """
     pivots = _in_layers(B, groups, layers)
     return pivots if (pivots >= 0).all() else None
 
 
 def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
-    """Return the unknown (m,) of each row: as in `of_groups` where there are enough, assigned otherwise.
+    """Return the pivots (m,), chosen as by `of_groups` as far as possible, and by `assigned` for the remaining equations.
 
-    Assigned rows are, for example, slips at supported nodes that stick to a moving side: they have no exclusive
-    unknowns. None where all rows are of that kind, or too many.
+    An example of the latter are slips at supported nodes that stick to a moving side, which have no exclusive unknowns.
+    None if no group has enough exclusive unknowns, or if more than FULL_UP_TO equations remain. Parameters as in
+    `of_groups`.
     """
     pivots = _in_layers(B, groups, MOST_LAYERS)
     left = np.flatnonzero(pivots < 0)
     if len(left) == len(pivots):
         return None
-    # Unknowns of earlier layers are excluded. Single rows of a group with too few unknowns may still have exclusive ones.
+    # A single equation may have an exclusive unknown although its group has too few of them.
     pivots[left] = _in_layers(csr_array(B[left]), np.arange(len(left)), layers=1)
     left = left[pivots[left] < 0]
     if len(left) > FULL_UP_TO:
@@ -134,7 +157,7 @@ def of_most_groups(B: csr_array, groups: Indices) -> Indices | None:
 
 
 def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
-    """Return the unknown (m,) of each row in up to `layers` layers, see `of_groups`; -1 where there is none."""
+    """Return the pivots (m,) in up to `layers` layers, -1 for equations without one; see `of_groups`."""
     m, n = B.shape
     group, row = np.unique(groups, return_inverse=True)[1], np.repeat(np.arange(m), np.diff(B.indptr))
     pivots = np.full(m, -1, np.intp)
@@ -151,17 +174,26 @@ def _in_layers(B: csr_array, groups: Indices, layers: int) -> Indices:
 
 
 def of_nodes(B: csr_array, nodes: Indices, size: int) -> Indices | None:
-    """Return the unknown (m,) of each row among those of its node; None where entries there are too small."""
+    """Return the pivots (m,), chosen among the unknowns of the node of each equation; None if entries are too small."""
     row = np.repeat(np.arange(B.shape[0]), np.diff(B.indptr))
     pivots = _pivots_in_groups(B, np.unique(nodes, return_inverse=True)[1], B.indices // size == nodes[row])
     return pivots if (pivots >= 0).all() else None
 
 
 def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
-    """Return pivots (m,) among the entries of B that are exclusive to their groups (`is_own`).
+    """Return the pivots (m,) by complete pivoting within each group, in all groups simultaneously.
 
-    Complete pivoting in all groups simultaneously; a pivot is at least SMALLEST times the largest entry of its row.
-    Groups with fewer pivots than rows get none, -1.
+    A pivot must be at least SMALLEST times the largest entry of its row. If a group has fewer pivots than rows, all its
+    rows get -1.
+
+    Parameters
+    ----------
+    B : csr_array (m, n)
+        Equations.
+    group : ndarray of int (m,)
+        Number of the group of each equation.
+    is_own : ndarray of bool (nnz,)
+        Entries of B that may be pivots: no other group may have entries in their columns.
     """
     m, n = B.shape
     row, entries = np.repeat(np.arange(m), np.diff(B.indptr)), np.flatnonzero(is_own)
@@ -188,7 +220,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
         failed[left[~good]] = True
         left, r, c, i, pivot = (array[good] for array in (left, r, c, i, pivot))
         pivots[i] = unknown[left, c]
-        # The row of the pivot is eliminated, too, so that it is not selected again.
+        # The row of the pivot is eliminated as well, so that it is not selected again.
         factor = table[left, :, c] / pivot[:, None]
         table[left] -= factor[:, :, None] * table[left, r][:, None]
     pivots[failed[group]] = -1
@@ -196,7 +228,7 @@ def _pivots_in_groups(B: csr_array, group: Indices, is_own: Mask) -> Indices:
 
 
 def _place_in_group(group: Indices) -> Indices:
-    """Return, for each entry of `group`, the number of earlier entries of equal value."""
+    """Return, for each entry of `group` (m,), the number (m,) of earlier entries with the same value."""
     order = np.argsort(group, kind="stable")
     position = np.empty(len(group), np.intp)
     position[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
@@ -204,9 +236,10 @@ def _place_in_group(group: Indices) -> Indices:
 
 
 def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> SparseInverse | None:
-    """Return the inverse of a matrix that couples every row to deeper layers only: a finite Neumann series.
+    """Return the inverse of a block triangular matrix (m, m) as a finite Neumann series.
 
-    `inner` is the inverse of the diagonal blocks, `beyond` the coupling between layers. None with more than `layers` layers.
+    `inner` is the inverse of the diagonal blocks, and `beyond` contains the other blocks. None if the series has more than
+    `layers` terms.
     """
     total = term = inner
     for _ in range(layers):
@@ -218,7 +251,16 @@ def _layered_inverse(inner: csr_array, beyond: csr_array, layers: int) -> Sparse
 
 
 def assigned(B: csr_array) -> Indices:
-    """Return the unknown assigned to each row, so that the matrix to invert is as well conditioned as possible."""
+    """Return pivots (m,) of the equations B (m, n) for which the pivot columns are well conditioned.
+
+    They are chosen by a QR factorisation with column pivoting or, for more than FULL_UP_TO equations, by the bipartite
+    matching with the largest product of entries.
+
+    Raises
+    ------
+    RepeatedError
+        If there are no m different pivots.
+    """
     if B.shape[0] <= FULL_UP_TO:
         columns = np.unique(B.indices)
         if len(columns) < B.shape[0]:

@@ -1,7 +1,7 @@
-"""Conjugate gradients and conjugate residuals on compiled vector kernels.
+"""Conjugate gradient method and conjugate residual method, with compiled vector kernels.
 
-Both update an iterate `x` and its residual `r` step by step, so that the caller can examine the iterate, stop, modify the
-problem slightly and continue.
+Both methods update an iterate x and its residual r one step at a time, so that the caller can examine the iterate, stop, or
+modify the problem slightly and continue.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from fastcontact.arrays import AnyArray, Array
 from fastcontact.linear.krylov import krylov_kernels
 from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 
-# ``multiply(p, q)`` fills q (n,) with ``A p``; ``precondition(r, norm, z)`` fills z (n,) with an approximation of ``A^-1 r``,
-# given the 2-norm of r.
+# Function ``multiply(p, q)`` that fills q (n,) with ``A @ p``, and function ``precondition(r, norm, z)`` that fills z (n,)
+# with an approximation of ``A^-1 r``, given the 2-norm of r.
 Multiply = Callable[[Array, Array], None]
 Precondition = Callable[[Array, float, Array], None]
-# Number of earlier search directions of conjugate residuals that a new one is orthogonalised against.
+# Number of earlier search directions of the conjugate residual method to which a new one is made orthogonal.
 KEPT = 20
-# A step of conjugate residuals fails if the residual stays above this fraction.
+# A step of the conjugate residual method fails if the norm of the residual stays above this fraction of the last one.
 LOST = 0.98
 
 
 def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
-    """Fill `b` (n,) with ``factor a``, in the precision of b."""
+    """Fill `b` (n,) with ``factor * a``, in the precision of b."""
     spread(krylov_kernels.scaled, len(a), WORK_OF_NUMBER, factor, a, b)
 
 

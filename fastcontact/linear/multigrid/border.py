@@ -1,8 +1,8 @@
-"""Saddle-point system of constraints ``B u + C multiplier = c`` that are not eliminated.
+"""Saddle-point system of equations ``B u + C multiplier = c`` that are not eliminated.
 
-The matrix of displacements and multipliers, ``[A, -B.T; B, C]``, is bordered and not positive definite. Conjugate residuals
-solve it, preconditioned by its lower triangle: multigrid for A, and for the multipliers ``C + B D^-1 B.T``, D the diagonal of
-A, softer by the compliance of their neighbours.
+The matrix of the system for displacements and multipliers, ``[A, -B.T; B, C]``, is not symmetric positive definite. It is
+solved by the conjugate residual method. The preconditioner is block lower triangular, with multigrid for A and the factors
+of ``C + SOFTER * B D^-1 B.T`` for the multipliers, where D is the diagonal of A.
 """
 
 from __future__ import annotations
@@ -17,18 +17,21 @@ from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 from fastcontact.round_off import ROUND_OFF
 
-# Compliance of displacements over the inverse diagonal of their matrix.
+# Estimated compliance of an unknown relative to the reciprocal of its diagonal entry: neighbouring nodes deform as well.
 SOFTER = 2.0
 
 
 class Border:
-    """The equations of the module.
+    """Equations that are not eliminated.
 
     Parameters
     ----------
     rows : csr_array (e, n)
+        Matrix B.
     right : ndarray (e,)
+        Right-hand sides c.
     compliance : csr_array (e, e)
+        Compliance C.
     """
 
     def __init__(self, rows: csr_array, right: Array, compliance: csr_array) -> None:
@@ -42,13 +45,16 @@ class Border:
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
         S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
         diagonal_of_S = S.diagonal()
-        # Residuals of these equations are scaled to forces.
+        # Factor that converts the residuals of the equations to forces.
         self.stiffness = 1.0 / diagonal_of_S
-        # Some multipliers are linearly dependent.
+        # The equations may be linearly dependent; a small shift keeps the matrix regular.
         self._factors = splu(csc_array(S + diags_array(ROUND_OFF * diagonal_of_S)))
 
     def multiply(self, multiply: Multiply, move_forces: Callable[[Array], None]) -> Multiply:
-        """Return the product with the bordered matrix, from that with A; forces (n,) move from eliminated unknowns."""
+        """Return the function that computes products with the bordered matrix.
+
+        `multiply` is the function for A. `move_forces` moves forces (n,) from eliminated unknowns to the others, in place.
+        """
         n = self.rows.shape[1]
 
         def product(p: Array, q: Array) -> None:
@@ -61,7 +67,7 @@ class Border:
         return product
 
     def precondition(self, precondition: Precondition) -> Precondition:
-        """Return the preconditioner, from that of A."""
+        """Return the preconditioner of the bordered matrix, given the preconditioner of A."""
         n = self.rows.shape[1]
 
         def solve(r: Array, norm: float, z: Array) -> None:

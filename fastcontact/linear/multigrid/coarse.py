@@ -1,4 +1,7 @@
-"""The coarsest level of a multigrid hierarchy: a dense Cholesky factor, or SuperLU where aggregation stops early."""
+"""Direct solver of the coarsest level of a multigrid hierarchy.
+
+It uses a dense Cholesky factor or, if aggregation stopped early so that the level is large, sparse factors by SuperLU.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +15,12 @@ from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.round_off import ROUND_OFF
 
-# Number of unknowns above which a dense factor costs more than a sparse one.
+# Number of unknowns above which a dense factorisation costs more than a sparse one.
 DENSE_UP_TO = 1500
 
 
 class Coarse:
-    """Solver for a symmetric positive semidefinite matrix; unknowns without stiffness stay at zero.
+    """Direct solver for a symmetric positive semidefinite matrix; unknowns without stiffness are set to zero.
 
     Parameters
     ----------
@@ -26,7 +29,7 @@ class Coarse:
     Attributes
     ----------
     matrix : csc_array (n, n)
-        `A`, without the last change.
+        The matrix A without the change by `set`.
     """
 
     def __init__(self, A: csc_array) -> None:
@@ -39,11 +42,11 @@ class Coarse:
 
     @property
     def nbytes(self) -> int:
-        """Memory [bytes]."""
+        """Memory of the factors [bytes]."""
         return self._factor.nbytes if self._lu is None else 12 * int(self._lu.nnz)
 
     def set(self, change: csc_array | None) -> None:
-        """Factorise the matrix plus the symmetric `change`."""
+        """Factorise the sum of the matrix and the symmetric matrix `change` (n, n); None stands for zero."""
         if change is None and not self._changed:
             return
         self._changed = change is not None
@@ -60,7 +63,7 @@ class Coarse:
         self._lu = splu(csc_array(K), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def solve(self, b: AnyArray, x: AnyArray) -> None:
-        """Fill `x` with the solution for the right-hand side `b`, both (n,)."""
+        """Fill `x` (n,) with the solution for the right-hand side `b` (n,)."""
         if self._lu is None:
             cycle_kernels.solve_dense(self._factor, self._reciprocal, b, self._work, x)
             return

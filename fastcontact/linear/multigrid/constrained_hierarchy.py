@@ -1,10 +1,12 @@
-"""Multigrid hierarchy under eliminated constraints: local updates of its levels, applied and undone.
+"""Multigrid hierarchy under eliminated equations, by local changes of its levels that can be undone.
 
-The prolongators are those without equations, except for the rows of the eliminated unknowns, the pivots. Only Galerkin
-products near the pivots change. The changes are stored separately from the matrices of the levels, which are not modified. On
-the finest level only diagonal blocks are formed: products with the matrix move displacements and forces at the pivots
-instead. Springs between unknowns, such as penalties and those of sliding contacts, are added on all levels: for smooth
-displacements, which coarser levels correct, they are far stiffer than the bodies.
+The prolongators are those without equations, except for the rows of the eliminated unknowns, the pivots. Therefore, only
+the blocks of the Galerkin products that are near pivots change. The changes are stored separately, and the matrices of the
+levels are not modified. On the finest level only the changes of diagonal blocks are computed, for the smoother; products
+with the matrix move displacements and forces between the pivots and the other unknowns instead.
+
+Springs between unknowns, such as penalties and the springs of sliding contact, are added on all levels: for the smooth
+displacements that coarser levels correct, they are much stiffer than the bodies.
 """
 
 from __future__ import annotations
@@ -24,28 +26,28 @@ from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions, composed, 
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.springs import Springs
 
-# Largest eigenvalue of the finest level, over its diagonal, above which the spectrum is wide; 3 to 4 on well-shaped
+# Largest eigenvalue of ``D^-1 A`` on the finest level above which its spectrum counts as wide. It is 3 to 4 for well-shaped
 # hexahedra.
 WIDE = 6.0
-# For nodes that equations stiffen by more than this factor, the smoother, its bounds, and the coarser levels of K do
-# not suffice.
+# Factor by which equations stiffen a node above which the smoother and the coarser levels are corrected, see
+# `stiffened_nodes`.
 MUCH = 4.0
 
 
 class ConstrainedHierarchy:
-    """Hierarchy whose levels are modified for equations, and restored.
+    """A multigrid hierarchy whose levels are changed for eliminated equations and springs.
 
     Parameters
     ----------
     hierarchy : Hierarchy
     A : BlockMatrix
-        Its finest matrix in full precision.
+        Matrix of the finest level in double precision.
 
     Attributes
     ----------
     stiffening : float
-        Largest factor by which equations stiffen a node: large where pivots belong to a much stiffer body than the unknowns
-        that they follow, for which the prolongators of K are unsuitable.
+        Largest factor by which equations stiffen a node [-]. It is large if pivots belong to a much stiffer body than the
+        unknowns that they follow. The prolongators of the hierarchy are then unsuitable.
     """
 
     def __init__(self, hierarchy: Hierarchy, A: BlockMatrix) -> None:
@@ -54,9 +56,9 @@ class ConstrainedHierarchy:
         self._kept: list[tuple[Level, Indices, AnyArray]] = []
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """Change the hierarchy to that of the matrix with the equations eliminated; None: without equations.
+        """Change the hierarchy to that of the matrix with `springs` added and the equations eliminated.
 
-        `springs` are added to the matrix of the hierarchy.
+        None stands for no equations, or no springs. Earlier changes are undone.
         """
         self._undo()
         self.stiffening = 0.0
@@ -65,20 +67,21 @@ class ConstrainedHierarchy:
         added = springs
         if springs is not None and elimination is not None:
             added = springs.under(elimination.pivots, elimination.weights)
-        if added is not None and not added.rows.nnz:  # slips that supports prevent, or that only involve pivots
+        if added is not None and not added.rows.nnz:  # The springs act on supported unknowns or on pivots only.
             added = None
         if elimination is None and added is None:
             self.hierarchy.coarse.set(None)
             self.hierarchy.set_bounds()
             return
         self._change_levels(elimination, added)
-        # Equations widen the spectrum of coarser levels, and that of the finest where they or springs stiffen its nodes, or
-        # where it is already wide: on flat and on nearly incompressible cells.
+        # Equations widen the spectrum of the coarser levels. They also widen that of the finest level if it is wide
+        # already, as for flat or nearly incompressible cells, or if nodes are stiffened by equations or springs.
         self.hierarchy.set_bounds()
         finest = added is not None or self.stiffening > MUCH or self.hierarchy.bounds[0] > WIDE
         self.hierarchy.set_bounds(range(0 if finest else 1, len(self.hierarchy.levels) - 1))
 
     def _change_levels(self, elimination: Elimination | None, springs: Springs | None) -> None:
+        """Change all levels for the equations, and for springs after the elimination."""
         top = self.hierarchy.levels[0]
         kind = top.b.dtype
         changes = []
@@ -96,7 +99,7 @@ class ConstrainedHierarchy:
         stiffened = None if elimination is None else self._stiffened(diagonals[0], elimination)
         self._change_diagonal(top, merged(*diagonals))
         if elimination is not None and stiffened is not None and len(stiffened):
-            changes = self._turned_round(elimination, springs, stiffened, diagonals[1:])
+            changes = self._exchange_roles(elimination, springs, stiffened, diagonals[1:])
         change = merged(*(change.on_coarse(top.P) for change in changes))
         for level in self.hierarchy.levels[1:]:
             if level.P is None:
@@ -107,6 +110,7 @@ class ConstrainedHierarchy:
             change = change.coarser(level.P)
 
     def _undo(self) -> None:
+        """Restore the levels of the hierarchy without equations and springs."""
         for level, nodes, old in self._kept:
             level.inverse.reshape(-1, old.shape[1])[nodes] = old
         self._kept.clear()
@@ -115,7 +119,10 @@ class ConstrainedHierarchy:
             level.followers = level.free_motions = None
 
     def _stiffened(self, change: LocalChange, elimination: Elimination) -> Indices:
-        """Return the nodes without pivots that equations stiffen strongly, and set `stiffening`."""
+        """Return the nodes without pivots that equations stiffen by more than the factor MUCH, and set `stiffening`.
+
+        `change` is the change of the diagonal blocks by the equations.
+        """
         size = change.size
         of_all = self.hierarchy.levels[0].diagonal.reshape(-1, size * size)[change.nodes]
         trace, more = (np.einsum("kii->k", blocks.reshape(-1, size, size)) for blocks in (of_all, change.diagonal()))
@@ -123,12 +130,16 @@ class ConstrainedHierarchy:
         self.stiffening = float(by.max(initial=0.0))
         return change.nodes[(by > MUCH) & ~np.isin(change.nodes, elimination.pivots // size)]
 
-    def _turned_round(
+    def _exchange_roles(
         self, elimination: Elimination, springs: Springs | None, stiffened: Indices, of_springs: list[LocalChange]
     ) -> list[SymmetricChange]:
-        """Make stiffened nodes follow the pivots on coarser levels; return the changes there. See `stiffened_nodes`."""
+        """Let stiffened nodes follow the pivots in corrections from coarser levels, and return the changes of these levels.
+
+        `stiffened` (k,) are the numbers of the nodes, and `of_springs` the changes of diagonal blocks by springs. See
+        `stiffened_nodes`.
+        """
         top, size = self.hierarchy.levels[0], len(self.A.rows)
-        top.free_motions = FreeMotions(elimination.weights, stiffened, self._own_inverses(stiffened, of_springs))
+        top.free_motions = FreeMotions(elimination.weights, stiffened, self._inverse_blocks(stiffened, of_springs))
         following = followers(elimination, stiffened, size)
         rounded = following.weights.astype(top.b.dtype)
         top.followers = replace(following, weights=rounded, force_weights=rounded)
@@ -137,8 +148,11 @@ class ConstrainedHierarchy:
             changes.append(SymmetricChange.of_springs(springs.under(following.pivots, following.weights), size))
         return changes
 
-    def _own_inverses(self, nodes: Indices, of_springs: list[LocalChange]) -> Array:
-        """Return the inverses (k, size, size) of finest diagonal blocks of some nodes, with springs, without equations."""
+    def _inverse_blocks(self, nodes: Indices, of_springs: list[LocalChange]) -> Array:
+        """Return the inverses (k, size, size) of the diagonal blocks of `nodes` (k,) on the finest level.
+
+        The blocks include springs, but not the effect of equations.
+        """
         size = len(self.A.rows)
         blocks = np.zeros((self.hierarchy.n // size, size**2))
         blocks[nodes] = self.hierarchy.levels[0].diagonal.reshape(-1, size**2)[nodes]
@@ -149,7 +163,7 @@ class ConstrainedHierarchy:
         return inverses.reshape(-1, size, size)
 
     def _change_diagonal(self, level: Level, change: LocalChange) -> None:
-        """Add the diagonal blocks of a change to those of a level, and save the previous inverses."""
+        """Add the diagonal blocks of a change to those of a level in the inverses of the smoother; save the old inverses."""
         size, nodes = len(level.A.rows), change.nodes
         blocks = level.diagonal.reshape(-1, size**2)[nodes].astype(float).ravel() + change.diagonal()
         inverse = np.empty(blocks.size, level.inverse.dtype)

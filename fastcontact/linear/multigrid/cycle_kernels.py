@@ -1,12 +1,12 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Products with block matrices, smoothing steps and dense factors for the multigrid cycle.
+"""Kernels of the multigrid cycle: products with block matrices, smoothing steps, and dense Cholesky factors.
 
-A block matrix comes as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), see
-`matrix.BlockMatrix`. The block size comes as two tuples of zeros, ``rows`` of length m and ``cols`` of length n: lengths of
-tuples are known to the compiler. Views of blocks inside the loops would cost four times as much.
+A block matrix is passed as ``indptr`` (n_rows + 1,), ``indices`` (n_blocks,) and ``data`` (n_blocks * m * n,), see
+`matrix.BlockMatrix`. The block size (m, n) is passed as two tuples of zeros, ``rows`` of length m and ``cols`` of length n,
+because the compiler knows the lengths of tuples. Array views of blocks within the loops would cost four times as much.
 
-Kernels with `low` and `high` compute these rows, see `_jit.parallel.spread`. Every row is summed by one thread in a fixed
-order, so results are the same for any number of threads.
+Kernels with the arguments `low` and `high` compute the block rows from `low` to `high`, see `_jit.parallel.spread`. Each
+row is summed by one thread in a fixed order, so that results do not depend on the number of threads.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from fastcontact.linear.multigrid.block_products import row_times
 
 @kernel
 def _dot(a, at, x, j, length):
-    """Return the sum of ``a[at + c] x[j + c]``."""
+    """Return the sum of ``a[at + c] * x[j + c]`` over c, from 0 to the length of the tuple `length`."""
     s = a[at] * x[j]
     for c in range(1, len(length)):
         s += a[at + c] * x[j + c]
@@ -27,7 +27,7 @@ def _dot(a, at, x, j, length):
 
 @kernel
 def _part(share, z, i):
-    """Return ``share * z[i]``; z need not be initialised if `share` is zero."""
+    """Return ``share * z[i]``. If `share` is zero, z need not be initialised."""
     return share * z[i] if share != 0.0 else share
 
 
@@ -35,7 +35,7 @@ def _part(share, z, i):
 def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, cols):
     """Fill `y` (n_rows * m,) with ``share * z + factor * A @ x``; z and y may be the same array.
 
-    The `numbers` are the entries of A, as a tuple of arrays, one or two: see `split_matrix_kernels`.
+    The `numbers` are the entries of A, as a tuple of one or two arrays, see `split_matrix_kernels`.
     """
     m = len(rows)
     for i in range(low, high):
@@ -48,9 +48,9 @@ def multiply(low, high, indptr, indices, numbers, x, factor, share, z, y, rows, 
 def relax(low, high, inverse, r, first, second, d, x, rows, begin):
     """Make one step of a Chebyshev iteration: ``d = first * d + second * D^-1 r`` and ``x = x + d``, with the residual r.
 
-    `inverse` (n_rows * m * m,) are the inverted diagonal blocks. With ``first = 0``, d need not be initialised; with
-    `begin`, x starts from zero and need not be either (Saad, Iterative Methods for Sparse Linear Systems, 2003,
-    algorithm 12.1).
+    `inverse` (n_rows * m * m,) are the inverses of the diagonal blocks D. If `first` is zero, d need not be initialised. With
+    `begin`, the iteration starts at x = 0, and x need not be initialised (Saad, Iterative Methods for Sparse Linear Systems,
+    2003, algorithm 12.1).
     """
     m = len(rows)
     for i in range(low, high):
@@ -69,8 +69,8 @@ def relax(low, high, inverse, r, first, second, d, x, rows, begin):
 def factorise_dense(A, reciprocal):
     """Replace the lower triangle of a symmetric positive semidefinite `A` (n, n) by its Cholesky factor.
 
-    `reciprocal` (n,) receives the inverses of its diagonal; for unknowns without stiffness, or linearly dependent on
-    earlier ones, it is zero, and so is their solution.
+    `reciprocal` (n,) receives the reciprocals of the diagonal of the factor. It is zero for unknowns without stiffness, and
+    for unknowns that are linearly dependent on earlier ones; `solve_dense` then sets these unknowns to zero.
     """
     n = A.shape[0]
     largest = 0.0
@@ -88,7 +88,10 @@ def factorise_dense(A, reciprocal):
 
 @kernel
 def solve_dense(L, reciprocal, b, work, x):
-    """Fill `x` (n,) with the solution for the right-hand side `b`, from `factorise_dense`; `work` (n,) is scratch."""
+    """Fill `x` (n,) with the solution for the right-hand side `b` (n,).
+
+    `L` and `reciprocal` are the results of `factorise_dense`, and `work` (n,) is overwritten.
+    """
     n = L.shape[0]
     for i in range(n):
         work[i] = (b[i] - stretch_dot(L[i], work, FIRST, i)) * reciprocal[i]
@@ -101,9 +104,10 @@ def solve_dense(L, reciprocal, b, work, x):
 
 @kernel
 def subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
-    """Subtract ``A x`` from the block rows `numbers` of `y`, all different, for a matrix A of square blocks.
+    """Subtract ``A x`` from the block rows `numbers` of `y`, in place, for a matrix A of square blocks.
 
-    `indices` number the blocks of x; `data` come as a tuple, as in `multiply`.
+    The `numbers` (n_rows,) must be different. `indices` are numbers of blocks of x. `data` is a tuple of arrays, as
+    `numbers` in `multiply`.
     """
     m = len(rows)
     for i in range(low, high):
@@ -116,7 +120,7 @@ def subtract_rows(low, high, numbers, indptr, indices, data, x, y, rows):
 def invert_blocks(blocks, size, out):
     """Fill `out` (n * size * size,) with the inverses of symmetric positive semidefinite `blocks` (n * size * size,).
 
-    Unknowns without stiffness get rows and columns of zeros: Gauss-Jordan elimination skips them.
+    Gauss-Jordan elimination skips unknowns without stiffness, whose rows and columns of the inverse are set to zero.
     """
     a = np.empty((size, 2 * size))
     for i in range(blocks.shape[0] // (size * size)):

@@ -1,11 +1,12 @@
-"""A multigrid hierarchy of smoothed aggregation and its V-cycle, on compiled block kernels.
+"""Smoothed-aggregation multigrid: hierarchy and V-cycle.
 
-Neighbouring nodes form aggregates, whose tentative prolongator consists of rigid-body modes. One step of block Jacobi smooths
-it (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the Galerkin product. The smoother of the levels is a Chebyshev
-iteration (`smoother`).
+Neighbouring nodes form aggregates. The tentative prolongator of an aggregate consists of the rigid-body modes, restricted
+to its nodes. One step of the block Jacobi method smooths it (Vanek, Mandel and Brezina, 1996), and the coarse matrix is the
+Galerkin product. The levels are smoothed by a Chebyshev iteration (`smoother`).
 
-Two functions are pyamg's: `standard_aggregation` forms the aggregates and `fit_candidates` computes an orthonormal basis
-of the rigid-body modes of each. Everything else is our own. `linear.solvers.pyamg` is pyamg's own multigrid, for comparison.
+Two functions come from pyamg: `standard_aggregation` forms the aggregates, and `fit_candidates` computes an orthonormal
+basis of the rigid-body modes of each aggregate. `linear.solvers.pyamg` uses the complete multigrid method of pyamg, for
+comparison.
 """
 
 from __future__ import annotations
@@ -26,20 +27,30 @@ from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointe
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
-# Largest number of unknowns of the coarsest level, and largest ratio of unknowns from one level to the next.
+# Number of unknowns up to which a level is not coarsened, and largest ratio of the numbers of unknowns of a level and the
+# next finer one. If aggregation does not reach this ratio, coarsening stops.
 COARSEST = 200
 STAGNANT = 0.7
 
 
 class Hierarchy:
-    """Multigrid for a symmetric positive definite matrix; see the module.
+    """Multigrid hierarchy of a symmetric positive definite matrix.
 
     Parameters
     ----------
     A : BlockMatrix
-        Matrix of square blocks. Its `data` have the precision of the cycle; the set-up is done in double precision.
+        Matrix (n, n) of square blocks. The precision of its `data` is that of the cycle. The set-up uses double precision.
     modes : ndarray (n, n_modes)
-        Near null space, zero at supported unknowns.
+        Rigid-body modes, which span the near null space; zero at supported unknowns.
+
+    Attributes
+    ----------
+    n : int
+        Number of unknowns of the finest level.
+    levels : list of Level
+        Levels, beginning with the finest.
+    coarse : Coarse
+        Direct solver of the coarsest level.
     """
 
     def __init__(self, A: BlockMatrix, modes: Array) -> None:
@@ -60,6 +71,7 @@ class Hierarchy:
         self.set_bounds()
 
     def _level(self, A: BlockMatrix) -> Level:
+        """Return the level of a matrix, without transfer operators."""
         size = len(A.rows)
         matrix = replace(A, data=A.data.astype(self.dtype, copy=False), low=None)
         diagonal = matrix.diagonal_part(matrix.data)
@@ -70,7 +82,7 @@ class Hierarchy:
         return level
 
     def _coarsened(self, A: BlockMatrix, level: Level, modes: Array) -> tuple[BlockMatrix, BlockMatrix, Array] | None:
-        """Return the prolongator, the coarse matrix and its modes; None where aggregates do not help."""
+        """Return the prolongator, the coarse matrix and its rigid-body modes; None if aggregation stagnates (STAGNANT)."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 
@@ -101,8 +113,8 @@ class Hierarchy:
             count,
         )
         indptr, widest = pointers(count), int(count.max(initial=0))
-        # In the precision of the cycle from the start, so that the coarse matrix is the exact product of the
-        # prolongators used.
+        # The prolongator is stored in the precision of the cycle before the coarse matrix is computed, so that the latter is
+        # the Galerkin product with the prolongator that the cycle uses.
         columns, blocks = np.empty(indptr[-1], np.int32), np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
         spread(
             galerkin_kernels.smooth_prolongator, n, WORK_OF_ROW, A.indptr, A.indices, A.storage, A.exact, level.inverse,
@@ -118,18 +130,18 @@ class Hierarchy:
 
     @property
     def complexity(self) -> float:
-        """Entries of the matrices of all levels over those of the finest."""
+        """Operator complexity: entries of the matrices of all levels, relative to those of the finest level [-]."""
         entries = [len(level.A.indices) * len(level.A.rows) ** 2 for level in self.levels]
         return sum(entries) / entries[0]
 
     @property
     def nbytes(self) -> int:
-        """Memory [bytes]."""
+        """Memory of the hierarchy [bytes]."""
         return sum(level.nbytes for level in self.levels) + self.coarse.nbytes
 
     @property
     def bounds(self) -> list[float]:
-        """Bounds of the smoothers by level."""
+        """Upper bounds of the eigenvalues of ``D^-1 A`` that the smoothers assume, by level [-]."""
         return [level.bound for level in self.levels]
 
     @bounds.setter
@@ -139,18 +151,24 @@ class Hierarchy:
         self._factors = [chebyshev(bound, DEGREE) for bound in values]
 
     def raise_bounds(self, factor: float) -> None:
-        """Raise the bounds of the smoothers, until the next `set_bounds`."""
+        """Multiply the bounds of the smoothers by `factor`, until the next call of `set_bounds`."""
         self.bounds = [factor * bound for bound in self.bounds]
 
     def set_bounds(self, anew: Sequence[int] = ()) -> None:
-        """Set the bounds of the smoothers to those of K, except for levels `anew`, where they are estimated again."""
+        """Set the bounds of the smoothers to those without equations and springs.
+
+        On the levels numbered `anew` the bounds are estimated for the current matrices, and used if they are larger.
+        """
         self.bounds = [
             max(bound, SAFETY * largest_eigenvalue(level)) if number in anew else bound
             for number, (level, bound) in enumerate(zip(self.levels, self._free_bounds, strict=True))
         ]
 
     def cycle(self, number: int = 0) -> None:
-        """Apply one V-cycle to ``levels[number].b``, starting at zero; the result is in ``levels[number].x``."""
+        """Apply one V-cycle, beginning at a level and with a zero initial guess.
+
+        The right-hand side is ``levels[number].b``, and the result is stored in ``levels[number].x``.
+        """
         level = self.levels[number]
         if level.P is None:
             self.coarse.solve(level.b, level.x)
@@ -171,7 +189,7 @@ class Hierarchy:
 
 
 def graph(A: BlockMatrix) -> tuple[Numbers, Numbers]:
-    """Return the offsets and columns of the nonzero off-diagonal blocks of A."""
+    """Return the graph of A: offsets (n_rows + 1,) and column numbers of the off-diagonal blocks that are not zero."""
     n = len(A.indptr) - 1
     arguments, count = (A.indptr, A.indices, A.storage, A.data, len(A.rows) ** 2), np.empty(n, np.int32)
     spread(galerkin_kernels.count_near, n, WORK_OF_ROW, *arguments, widest_row(A.indptr), count)
@@ -182,14 +200,24 @@ def graph(A: BlockMatrix) -> tuple[Numbers, Numbers]:
 
 
 def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
-    """Return the offsets of the blocks of each of n block columns, their rows, ascending, and their numbers."""
+    """Return the blocks of P by columns.
+
+    Returns
+    -------
+    start : ndarray of int (n + 1,)
+        Offsets of the n block columns.
+    rows : ndarray of int (n_blocks,)
+        Row of each block, in ascending order within a column.
+    numbers : ndarray of int (n_blocks,)
+        Number of each block in P.
+    """
     numbers = np.arange(len(P.indices), dtype=np.int32)
     columns = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
     return columns.indptr, columns.indices, columns.data
 
 
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
-    """Return ``P.T A P`` for a symmetric A; `index` from `by_columns`."""
+    """Return the Galerkin product ``P.T A P`` for a symmetric matrix A; `index` is ``by_columns(P, n)``."""
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = WORK_OF_ROW * len(A.indptr) // max(1, n_coarse)

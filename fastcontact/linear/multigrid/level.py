@@ -1,4 +1,4 @@
-"""A level of the multigrid hierarchy: matrix, smoother, transfer operators, work space."""
+"""A level of the multigrid hierarchy: matrix, smoother, and transfer to the next coarser level."""
 
 from __future__ import annotations
 
@@ -18,32 +18,34 @@ from fastcontact.linear.springs import Springs
 
 @dataclass(eq=False)
 class Level:
-    """A matrix of the hierarchy with its smoother, the transfer to the next coarser level, and work space.
+    """A level of the multigrid hierarchy, with n unknowns in blocks of `size` unknowns per node.
 
     Attributes
     ----------
     A : BlockMatrix
+        Matrix (n, n) of the level.
     diagonal, inverse : ndarray (n_nodes * size * size,)
-        Diagonal blocks, and their inverses for the smoother.
+        Diagonal blocks D of the matrix, and their inverses for the smoother.
     bound : float
-        Upper bound of the eigenvalues of ``D^-1 A``.
+        Upper bound of the eigenvalues of ``D^-1 A`` [-].
     P : BlockMatrix or None
-        Prolongator; None on the coarsest level.
+        Prolongator from the next coarser level; None on the coarsest level.
     R : Restriction or None
-        Its transpose.
+        The transpose of P.
     eliminated : Elimination or None
-        Equations on the finest level: weights in the precision of the cycle, the same for forces.
+        Eliminated equations, only on the finest level. The weights are stored in the precision of the cycle.
     change : tuple of ndarray, or None
-        Contribution of eliminated equations and springs to the matrix on coarser levels: the block rows that change (k,), and
-        the change as `indptr`, `indices` and `data` of a `BlockMatrix`.
+        Contribution of eliminated equations and springs to the matrix, only on coarser levels: the numbers (k,) of the block
+        rows that change, and the change in these rows as `indptr`, `indices` and `data` of a `BlockMatrix`.
     springs : Springs or None
-        Springs on the finest level, under the equations.
+        Springs that are added to the matrix after the elimination of equations, only on the finest level.
     followers : Elimination or None
-        Unknowns that follow the eliminated ones in corrections from coarser levels, on the finest level.
+        Unknowns that follow the eliminated ones in corrections from coarser levels, see `stiffened_nodes`; only on the finest
+        level.
     free_motions : FreeMotions or None
-        Correction of the smoother at nodes that equations stiffen strongly, on the finest level.
+        Correction of the smoother at nodes that equations stiffen strongly, see `stiffened_nodes`; only on the finest level.
     b, x, r, d : ndarray (n,)
-        Right-hand side, iterate, residual and step of the cycle.
+        Right-hand side, iterate, residual, and last step of the smoother.
     """
 
     A: BlockMatrix
@@ -72,7 +74,7 @@ class Level:
         return len(self.b)
 
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
-        """Make a Chebyshev step: see `cycle_kernels.relax`."""
+        """Make one Chebyshev step for the residual r (n,), see `cycle_kernels.relax`; equations stay satisfied."""
         kind = r.dtype.type
         self.scale(r, kind(first), kind(second), self.d, self.x, begin)
         if self.free_motions is not None:
@@ -83,7 +85,7 @@ class Level:
     def scale(
         self, r: AnyArray, first: np.floating, second: np.floating, d: AnyArray, x: AnyArray, begin: bool
     ) -> None:
-        """Make the part of `relax` that scales by the inverse diagonal blocks, for other vectors `d` and `x`."""
+        """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
         rows = self.A.rows
         spread(
             cycle_kernels.relax, self.n // len(rows), WORK_OF_BLOCK, self.inverse, r, first, second, d, x, rows, begin
@@ -94,7 +96,7 @@ class Level:
         self.subtract_product(self.x, self.b, self.r)
 
     def subtract_product(self, x: AnyArray, b: AnyArray, r: AnyArray) -> None:
-        """Fill `r` with ``b - A x``, eliminated equations included."""
+        """Fill `r` (n,) with ``b - A x``, where A includes the effects of eliminated equations and springs."""
         self.A.combine(-1.0, x, 1.0, b, r)
         if self.eliminated is not None:
             self.eliminated.move_forces(r)
@@ -116,14 +118,14 @@ class Level:
             )
 
     def restrict(self, coarse: AnyArray) -> None:
-        """Restrict the residual `r`, which is overwritten, to the right-hand side of the next coarser level."""
+        """Fill `coarse`, the right-hand side of the next coarser level, with the restricted residual; `r` is overwritten."""
         assert self.R is not None
         if self.followers is not None:
             self.followers.move_forces(self.r)
         self.R.multiply(self.r, coarse)
 
     def correct(self, coarse: AnyArray) -> None:
-        """Add the correction of the next coarser level."""
+        """Add the prolongated correction `coarse` of the next coarser level to `x`."""
         assert self.P is not None
         if self.followers is None:
             self.P.combine(1.0, coarse, 1.0, self.x, self.x)
@@ -137,6 +139,6 @@ class Level:
 
     @property
     def nbytes(self) -> int:
-        """Memory [bytes]."""
+        """Memory of the level [bytes]."""
         total = self.A.nbytes + self.diagonal.nbytes + self.inverse.nbytes + 4 * self.b.nbytes
         return total + sum(A.nbytes for A in (self.P, self.R) if A is not None)

@@ -1,7 +1,7 @@
-"""Multigrid solution under linear constraints, some of which have a compliance.
+"""Multigrid solution under linear equations, some of which have a compliance.
 
-An equation with a compliance is a spring along its row. Springs not much stiffer than the body become part of the matrix
-and of the hierarchy; stiffer ones are eliminated like exact equations, see `reduced`.
+An equation with a compliance is equivalent to a spring along its row. Springs that are not much stiffer than the body are
+added to the matrix and to the hierarchy. Stiffer ones are eliminated like equations without compliance, see `reduced`.
 """
 
 from __future__ import annotations
@@ -24,22 +24,26 @@ from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
-# Equations whose stiffness exceeds that of their unknowns by this factor are eliminated: as springs they need 1.5 times the
-# iterations at this ratio, and more with its square root beyond.
+# Equations with a compliance are eliminated if they are stiffer than their unknowns by more than this factor. As springs
+# they need 1.5 times as many iterations at this ratio, and for larger ratios the number increases with the square root of
+# the ratio.
 STIFF = MILD
 
 
 class LoadedMultigrid(LoadedIteration):
-    """See `LoadedIteration`; its solver is a `Multigrid`."""
+    """A matrix prepared by a `Multigrid` solver, with a right-hand side; see `LoadedIteration`."""
 
-    # Values of a pressure field at the edge of the contact in the last pairing.
+    # Values of the pressure field at the edge of the contact in the last solution, from which the next one begins.
     _at_edge: Array = np.empty(0)
 
     def solve(
         self, B: csr_array, c: Array, C: Array | FieldCompliance | None = None, guess: Array | None = None,
         monitor: Monitor | None = None, tolerance: float | None = None, nodes: Indices | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """See `Loaded`: constraints with a full compliance, and linearly dependent ones, go through columns of K^-1."""
+        """Return the solution and the multipliers, see `Loaded`.
+
+        If equations are linearly dependent or have a full compliance matrix, the Delassus operator is formed.
+        """
         parts: _Parts | None = None
         if C is not None and len(c) and (isinstance(C, FieldCompliance) or C.ndim == 1):
             try:
@@ -84,7 +88,7 @@ class LoadedMultigrid(LoadedIteration):
         monitor: Monitor | None,
         tolerance: float | None,
     ) -> tuple[Array, Array]:
-        """Return u and multipliers under equations (m,) whose multipliers act through their own rows."""
+        """Return u (n,) [length] and the multipliers (m,) [force] under equations without friction."""
         solver, elimination, springs, f = self._solver, parts.elimination, parts.springs, parts.pushed(self._f, c)
 
         def watch(u: Array, multiplier: Array, error: float) -> bool:
@@ -98,7 +102,7 @@ class LoadedMultigrid(LoadedIteration):
         self, B: csr_array, c: Array, C: FieldCompliance, guess: Array | None, monitor: Monitor | None,
         tolerance: float | None,
     ) -> tuple[Array, Array]:  # fmt: skip
-        """Return u and the point forces (m,); see `field_compliance`."""
+        """Return u (n,) [length] and the point forces (m,) [force] for a pressure field; see `field_compliance`."""
         solver = self._solver
         parts = _FieldParts.of(B, c, C, solver.K.blocksize[0])
         elimination, springs, f, border = parts.elimination, parts.springs, parts.pushed(self._f, c), parts.border()
@@ -124,12 +128,14 @@ class LoadedMultigrid(LoadedIteration):
     def _parts(
         self, B: csr_array, c: Array, C: Array | None, nodes: Indices | None, through: csr_array | None = None
     ) -> _Parts:
-        """Split constraints into eliminated ones and springs; multipliers act `through` rows, B by default.
+        """Return the equations, divided into eliminated ones and springs.
+
+        `through` (m, n) is the matrix F of the forces ``F.T @ multiplier``; B by default.
 
         Raises
         ------
         RepeatedError
-            If exact constraints are linearly dependent.
+            If equations without compliance are linearly dependent.
         """
         size = self._solver.K.blocksize[0]
         if C is None or not C.any():
@@ -146,7 +152,17 @@ class LoadedMultigrid(LoadedIteration):
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """Equations (m,) as an elimination of those that are `stiff`, and springs for the others."""
+    """Equations, divided into eliminated ones and springs.
+
+    Attributes
+    ----------
+    stiff : ndarray of bool (m,)
+        The equations that are eliminated.
+    elimination : Elimination or None
+        Their elimination.
+    springs : Springs or None
+        The other equations, as springs.
+    """
 
     stiff: Mask
     elimination: Elimination | None
@@ -157,14 +173,18 @@ class _Parts:
         cls, B: csr_array, c: Array, C: Array, stiff: Mask, nodes: Indices | None, size: int,
         through: csr_array | None,
     ) -> _Parts:  # fmt: skip
-        """Return the parts of ``B u + C multiplier = c``; RepeatedError if stiff ones are linearly dependent."""
+        """Return the equations ``B u + C multiplier = c``, of which those marked in `stiff` (m,) are eliminated.
+
+        For parameters see `eliminate` and `LoadedMultigrid._parts`. A RepeatedError is raised if the eliminated ones are
+        linearly dependent.
+        """
         if stiff.all():
             elimination = eliminate(B, c, through, nodes, size) if len(c) else None
         else:
             rows, acting = csr_array(B[stiff]), None if through is None else csr_array(through[stiff])
             of_rows = None if nodes is None else nodes[stiff]
             elimination = eliminate(rows, c[stiff], acting, of_rows, size) if stiff.any() else None
-        if elimination is not None and C[stiff].any():  # excesses take the places of pivots
+        if elimination is not None and C[stiff].any():
             elimination = dataclasses.replace(elimination, compliance=C[stiff])
         if stiff.all():
             return cls(stiff, elimination, None)
@@ -172,14 +192,14 @@ class _Parts:
         return cls(stiff, elimination, Springs(csr_array(B[~stiff]), 1.0 / C[~stiff], acting))
 
     def pushed(self, f: Array, c: Array) -> Array:
-        """Return forces f (n,) plus those of the springs at u = 0."""
+        """Return the forces f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
         if self.springs is None:
             return f
         acting = self.springs.rows if self.springs.through is None else self.springs.through
         return f + acting.T @ (self.springs.stiffness * c[~self.stiff])
 
     def multiplier(self, u: Array, of_stiff: Array, c: Array) -> Array:
-        """Return all multipliers (m,), given those of the eliminated equations."""
+        """Return the multipliers (m,) of all equations [force], given those of the eliminated ones, `of_stiff`."""
         if self.springs is None:
             return of_stiff
         multiplier = np.empty(len(c))
@@ -190,7 +210,19 @@ class _Parts:
 
 @dataclass(frozen=True, eq=False)
 class _FieldParts:
-    """Equations of points (m,) as those of a field, and springs; see `field_compliance`."""
+    """Equations of m points as equations of a pressure field, and springs; see `field_compliance`.
+
+    Attributes
+    ----------
+    field : FieldEquations
+        Equations of the values of the field.
+    elimination : Elimination or None
+        Elimination of the equations that are not at the edge of the contact.
+    springs : Springs
+        Springs at the points, for the part of the compliance that the field does not represent.
+    weights : ndarray (m,)
+        Areas of the points [area].
+    """
 
     field: FieldEquations
     elimination: Elimination | None
@@ -199,7 +231,10 @@ class _FieldParts:
 
     @classmethod
     def of(cls, B: csr_array, c: Array, C: FieldCompliance, size: int) -> _FieldParts:
-        """Return the parts; RepeatedError if exact constraints are linearly dependent."""
+        """Return the equations ``B u + C multiplier = c`` of the points.
+
+        `size` is the number of unknowns of a node. A RepeatedError is raised if equations are linearly dependent.
+        """
         field, elimination = C.of_field(B, c), None
         if not field.edge.all():
             rows = csr_array(field.rows[~field.edge])
@@ -208,23 +243,26 @@ class _FieldParts:
         return cls(field, elimination, Springs(springs, C.stiffness), C.weights)
 
     def border(self) -> Border | None:
-        """Return the equations at the edge of the contact."""
+        """Return the equations at the edge of the contact, which are not eliminated; None if there are none."""
         field = self.field
         if not field.edge.any():
             return None
         return Border(csr_array(field.rows[field.edge]), field.right[field.edge], field.compliance)
 
     def pushed(self, f: Array, c: Array) -> Array:
-        """See `_Parts`."""
+        """Return the forces f (n,) plus the forces of the springs at u = 0 [force]; c (m,) are the right-hand sides."""
         return f + self.springs.rows.T @ (self.springs.stiffness * c)
 
     def multiplier(self, u: Array, inside: Array, at_edge: Array, c: Array) -> Array:
-        """Return the forces (m,) of the points, given the multipliers of the equations of the field."""
+        """Return the forces (m,) of the points [force].
+
+        `inside` and `at_edge` are the multipliers of the equations of the field, eliminated or at the edge of the contact.
+        """
         p = np.empty(len(self.field.right))
         p[~self.field.edge], p[self.field.edge] = inside, at_edge
         return self.weights * (self.field.P @ p) + self.springs.stiffness * (c - self.springs.rows @ u)
 
 
 def _nodes(rows: csr_array, size: int) -> Indices:
-    """Return the node (m,) with the largest entry in each row; a node has `size` unknowns."""
+    """Return the node (m,) of the entry with the largest absolute value in each row; a node has `size` unknowns."""
     return np.asarray(abs(rows).argmax(axis=1), np.intp).ravel() // size

@@ -14,14 +14,14 @@ from fastcontact.linear.multigrid.matrix import BlockMatrix, diagonal_blocks
 
 @dataclass(frozen=True, eq=False)
 class LocalChange:
-    """Update of the blocks among some nodes.
+    """Symmetric change of a block matrix that is restricted to the rows and columns of k nodes.
 
     Attributes
     ----------
     nodes : ndarray of int (k,)
-        Ascending.
+        Numbers of the nodes, in ascending order.
     blocks : bsr_array (k * size, k * size)
-        Symmetric, in canonical format; `size` unknowns a node.
+        The change, in canonical format; each node has `size` unknowns.
     """
 
     nodes: Indices
@@ -29,42 +29,45 @@ class LocalChange:
 
     @classmethod
     def of_diagonal(cls, nodes: Indices, blocks: Array) -> LocalChange:
-        """Return a change of the diagonal `blocks` (k, size, size) only."""
+        """Return the change that consists of the diagonal `blocks` (k, size, size) of `nodes` (k,)."""
         n = blocks.shape[0] * blocks.shape[1]
         return cls(nodes, bsr_array((blocks, np.arange(len(nodes)), np.arange(len(nodes) + 1)), shape=(n, n)))
 
     @property
     def size(self) -> int:
-        """Unknowns of a node."""
+        """Number of unknowns of a node."""
         return int(self.blocks.blocksize[0])
 
     def diagonal(self) -> AnyArray:
-        """Return the diagonal blocks (k * size * size,)."""
+        """Return the diagonal blocks (k * size * size,) of the change."""
         return diagonal_blocks(self.blocks.indptr, self.blocks.indices, self.blocks.data, self.size)
 
     def rows(self, kind: DTypeLike) -> tuple[AnyArray, ...]:
-        """Return the nodes, and `indptr`, `indices` (of all nodes) and `data` of their block rows, in a given precision."""
+        """Return the change as block rows: `nodes`, `indptr`, `indices` and `data` as in `BlockMatrix`.
+
+        `indices` are numbers of nodes of the complete matrix. `kind` is the data type of `data`.
+        """
         columns = self.nodes[self.blocks.indices].astype(np.int32)
         return self.nodes, self.blocks.indptr, columns, self.blocks.data.astype(kind).ravel()
 
     def coarser(self, P: BlockMatrix) -> LocalChange:
-        """Return the Galerkin product ``P.T change P``."""
-        P_own = block_rows(P, self.nodes, (int(P.indices.max()) + 1) * len(P.cols))
-        below, columns = np.unique(P_own.indices, return_inverse=True)
-        P_own = bsr_array((P_own.data, columns, P_own.indptr), shape=(P_own.shape[0], len(below) * len(P.cols)))
-        product = bsr_array(P_own.T @ self.blocks @ P_own)
+        """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
+        rows = block_rows(P, self.nodes, (int(P.indices.max()) + 1) * len(P.cols))
+        coarse_nodes, columns = np.unique(rows.indices, return_inverse=True)
+        rows = bsr_array((rows.data, columns, rows.indptr), shape=(rows.shape[0], len(coarse_nodes) * len(P.cols)))
+        product = bsr_array(rows.T @ self.blocks @ rows)
         product.sort_indices()
-        return LocalChange(below, product)
+        return LocalChange(coarse_nodes, product)
 
     def scattered(self, n: int) -> csc_array:
-        """Return the change on all n unknowns."""
+        """Return the change as a matrix (n, n) of all unknowns."""
         change, count = self.blocks, np.zeros(n // self.size, np.intp)
         count[self.nodes] = np.diff(change.indptr)
         indptr = np.r_[0, np.cumsum(count)]
         return bsr_array((change.data, self.nodes[change.indices], indptr), shape=(n, n)).tocsc()
 
     def spread(self, nodes: Indices) -> bsr_array:
-        """Return the blocks on a superset `nodes` (l,), ascending."""
+        """Return `blocks` with zero rows and columns added for a superset `nodes` (l,), in ascending order."""
         index = np.searchsorted(nodes, self.nodes)
         count = np.zeros(len(nodes), np.intp)
         count[index] = np.diff(self.blocks.indptr)
@@ -73,7 +76,7 @@ class LocalChange:
 
 
 def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
-    """Return the sum of changes."""
+    """Return the sum of several changes of the same matrix."""
     for other in others:
         nodes = np.union1d(change.nodes, other.nodes)
         total = bsr_array(change.spread(nodes) + other.spread(nodes))
@@ -83,7 +86,7 @@ def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
 
 
 def block_rows(A: BlockMatrix, nodes: Indices, n: int) -> bsr_array:
-    """Return the block rows `nodes` of a matrix with n columns, in double precision."""
+    """Return the block rows `nodes` (k,) of a matrix A with n columns, in double precision."""
     rows, cols = len(A.rows), len(A.cols)
     count = np.diff(A.indptr)[nodes]
     indptr = np.concatenate([[0], np.cumsum(count)])

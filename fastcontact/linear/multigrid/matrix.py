@@ -1,9 +1,9 @@
-"""Block matrices of multigrid, and the stiffness matrix stored once for two precisions.
+"""Block matrices of multigrid, and the stiffness matrix K, which is stored once for two precisions.
 
-The multigrid cycle uses K in single precision, the outer iteration in double precision. Each number of K is therefore
-stored as two numbers in single precision, a high and a low part (see `split_matrix_kernels`): the cycle reads the high
-part, exact products use both. This takes 8 instead of 12 bytes per number. K is symmetric: most of its blocks are
-stored, and read, once for both triangles (see `symmetric_storage_kernels`).
+The multigrid cycle uses K in single precision, and the outer iteration uses it in double precision. Each number of K is
+therefore stored as the sum of two numbers in single precision, a high and a low part (see `split_matrix_kernels`). The
+cycle reads the high part only. This takes 8 bytes per number instead of 12. Since K is symmetric, most of its blocks are
+stored only once for both triangles (see `symmetric_storage_kernels`).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ FEW_ROWS, FEW_NUMBERS = 256, 4096
 
 @dataclass(eq=False)
 class BlockMatrix:
-    """A sparse matrix of dense blocks, row by row.
+    """A sparse matrix of dense blocks of the same size, stored by block rows.
 
     Attributes
     ----------
@@ -63,22 +63,22 @@ class BlockMatrix:
 
     @property
     def exact(self) -> tuple[AnyArray, ...]:
-        """The numbers in full precision, as arguments of kernels: (data,) or (high part, low part)."""
+        """The numbers in full precision, as arguments of kernels: (data,), or (high part, low part) of a split matrix."""
         return (self.data,) if self.low is None else (self.data, self.low)
 
     @property
     def nbytes(self) -> int:
-        """Memory without the low part [bytes]."""
+        """Memory of the matrix, without its low part [bytes]."""
         return (
             self.indptr.nbytes + self.indices.nbytes + self.data.nbytes + sum(part.nbytes for part in self.storage[:3])
         )
 
     def multiply(self, x: AnyArray, y: AnyArray) -> None:
-        """Fill `y` with ``A x``."""
+        """Fill `y` with ``A @ x``."""
         self.combine(1.0, x, 0.0, y, y)
 
     def combine(self, factor: float, x: AnyArray, share: float, z: AnyArray, y: AnyArray) -> None:
-        """Fill `y` with ``share z + factor A x``, in the precision of x; x and y are different arrays."""
+        """Fill `y` with ``share * z + factor * A @ x``, in the precision of x; x and y must be different arrays."""
         kind = x.dtype.type
         numbers = (self.data,) if x.dtype == self.data.dtype else self.exact
         if self.storage is not ALL:
@@ -107,7 +107,7 @@ class BlockMatrix:
         return data.reshape(-1, size * size)[self.storage[1] - 1].ravel()
 
     def row_sums(self, u: Array) -> Array:
-        """Return ``|A| |u|``, shape (n,), of a square matrix, from its high part."""
+        """Return ``abs(A) @ abs(u)`` (n,) for a square matrix, computed with its high part."""
         out = np.empty(len(u))
         spread(
             symmetric_storage_kernels.row_sums, len(self.indptr) - 1, WORK_OF_ROW, self.indptr, self.indices, self.storage,
@@ -116,7 +116,7 @@ class BlockMatrix:
         return out
 
     def rows_of(self, dofs: Indices) -> csr_array:
-        """Return rows `dofs` (m,) of a symmetric matrix, in double precision."""
+        """Return the rows `dofs` (m,) of a symmetric matrix, in double precision."""
         size, node = len(self.rows), dofs // len(self.rows)
         count = np.diff(self.indptr)[node]
         starts = np.concatenate([[0], np.cumsum(count)])
@@ -128,7 +128,7 @@ class BlockMatrix:
         return rows
 
     def to_scipy(self) -> bsr_array:
-        """Return a square matrix as SciPy's, in double precision."""
+        """Return a square matrix as a SciPy matrix, in double precision."""
         size, n = len(self.rows), len(self.indptr) - 1
         data = np.empty(len(self.indices) * size * size)
         spread(
@@ -206,7 +206,7 @@ class ScaledMatrix:
         return K
 
     def combine(self, factor: float, x: Array, share: float, z: Array, y: Array) -> None:
-        """Fill `y` (n,) with ``share z + factor K x``."""
+        """Fill `y` (n,) with ``share * z + factor * K @ x``."""
         self.scaled.combine(factor / self.unit, x, share, z, y)
 
     def __matmul__(self, u: Array) -> Array:
@@ -215,7 +215,7 @@ class ScaledMatrix:
         return out
 
     def forces_at(self, dofs: Indices, u: Array, f: Array) -> Array:
-        """Return ``(K u - f)[dofs]``, shape (m,) [force]."""
+        """Return ``(K @ u - f)[dofs]`` (m,) [force]."""
         A, out = self.scaled, np.empty(len(dofs))
         split_matrix_kernels.forces_at(
             dofs, A.indptr, A.indices, A.storage, A.exact, 1.0 / self.unit, len(A.rows), u, f, out
@@ -223,12 +223,12 @@ class ScaledMatrix:
         return out
 
     def diagonal(self) -> Array:
-        """Return the diagonal (n,) [force / length]."""
+        """Return the diagonal (n,) of K [force / length]."""
         size = range(self.blocksize[0])
         return self.scaled.diagonal_blocks()[:, size, size].ravel() / self.unit
 
     def row_sums(self, u: Array) -> Array:
-        """Return ``|K| |u|``, shape (n,) [force]."""
+        """Return ``abs(K) @ abs(u)`` (n,) [force]."""
         return self.scaled.row_sums(u) / self.unit
 
 

@@ -1,10 +1,10 @@
-"""Reduced operator of the iteration: K and springs under eliminated constraints, with or without compliance.
+"""Operator of the iteration: the matrix K and springs, after the elimination of equations with or without compliance.
 
-Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like exact ones, but their pivots have the
-additional displacement ``P^-1 s``, P the pivots' columns of B. Their excess ``s = B u - c = -C multiplier`` is an
-unknown with the stiffness ``1 / C``, which replaces the pivot in the vectors of the iteration. Even a large stiffness
-costs no digits and no iterations, since it is solved for separately; the stiffer, the weaker its coupling with the other
-unknowns.
+Equations ``B u + C multiplier = c`` with a diagonal compliance C are eliminated like equations without compliance. Their
+violation ``s = B u - c = -C multiplier``, called excess, adds the displacement ``P^-1 s`` to the pivots, where P are the
+columns of B that belong to the pivots. The excess is an unknown with the stiffness ``1 / C``. It replaces the pivot in the
+vectors of the iteration. Since the preconditioner treats it separately, even a large stiffness costs neither accuracy nor
+iterations: the stiffer an equation, the weaker is the coupling of its excess with the other unknowns.
 """
 
 from __future__ import annotations
@@ -20,21 +20,23 @@ from fastcontact.linear.springs import Springs
 
 
 class Reduced:
-    """Operator of the iteration: K and springs under eliminated constraints.
+    """Operator of the iteration: the sum of K and springs, after the elimination of equations.
 
     Parameters
     ----------
     K : ScaledMatrix
-        Shape (n, n) [force / length].
+        Stiffness matrix (n, n) [force / length].
     elimination : Elimination, optional
+        Eliminated equations; none by default.
     springs : Springs, optional
-        Added to K.
+        Springs that are added to K; none by default.
     diagonal : ndarray (n,), optional
-        Diagonal of K [force / length], where equations have a compliance.
+        Diagonal of K, which is required if equations have a compliance [force / length].
 
     Attributes
     ----------
-    elimination, springs
+    elimination : Elimination or None
+    springs : Springs or None
     """
 
     def __init__(
@@ -48,7 +50,10 @@ class Reduced:
             self._excess = _Excess(diagonal, elimination, elimination.compliance)
 
     def begin(self, x: Array, f: Array, r: Array) -> None:
-        """Convert the displacement x (n,) [length] to a vector of the iteration, and fill r (n,) with its residual."""
+        """Convert displacements x (n,) [length], in place, to a vector of the iteration, and fill r (n,) with its residual.
+
+        f (n,) is the right-hand side [force].
+        """
         if self._excess is not None:
             self._excess.begin(x, self.multiplier(x, f) if x.any() else None)
         elif self.elimination is not None:
@@ -56,9 +61,10 @@ class Reduced:
         self._subtract(self.displacement(x), f, x, r)
 
     def displacement(self, x: Array, moved: bool = True) -> Array:
-        """Return the displacement (n,) of a vector of the iteration or, if not `moved`, of an increment of it.
+        """Return the displacements (n,) of a vector x (n,) of the iteration [length].
 
-        Valid until the next call: it may be work space, or x itself.
+        If `moved` is False, x is an increment, and the offsets of the pivots are not added. The result may be x itself or an
+        array that the next call overwrites.
         """
         if self._excess is None:
             return x
@@ -66,7 +72,7 @@ class Reduced:
         return self._excess.displacement(x, self.elimination.offset if moved else None)
 
     def multiply(self, p: Array, q: Array) -> None:
-        """Fill q (n,) with the product with p (n,)."""
+        """Fill q (n,) with the product of the operator and p (n,)."""
         u = self.displacement(p, moved=False)
         self._K.combine(1.0, u, 0.0, q, q)
         if self.springs is not None:
@@ -74,7 +80,11 @@ class Reduced:
         self._reduce(p, q, 1.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
-        """Fill z (n,) with an approximate solution for r (n,), of 2-norm `norm`; `cycle` is for exact equations."""
+        """Fill z (n,) with an approximate solution for r (n,).
+
+        `norm` is the 2-norm of r. `cycle` is the preconditioner for equations without compliance, with the arguments (r,
+        norm, z).
+        """
         if self._excess is None:
             cycle(r, norm, z)
             if self.elimination is not None:
@@ -83,17 +93,21 @@ class Reduced:
             self._excess.precondition(r, norm, z, cycle)
 
     def multiplier(self, u: Array, f: Array) -> Array:
-        """Return the multipliers (m,) [force] of the equations at the displacement u (n,)."""
+        """Return the multipliers (m,) of the equations [force], see the function `multiplier`."""
         return multiplier(self._K, self.elimination, self.springs, u, f)
 
     def _subtract(self, u: Array, f: Array, x: Array, r: Array) -> None:
+        """Fill r (n,) with the residual for the displacements u (n,) of the vector x (n,), and the right-hand side f (n,)."""
         self._K.combine(-1.0, u, 1.0, f, r)
         if self.springs is not None:
             self.springs.subtract_forces(u, r)
         self._reduce(x, r, -1.0)
 
     def _reduce(self, x: Array, r: Array, sign: float) -> None:
-        """Move forces r (n,) from the pivots; add those of the excesses in x times `sign` there."""
+        """Move the forces r (n,) from the pivots to the other unknowns, in place.
+
+        The entries of compliant equations become the forces on their excesses, with `sign` times those of their stiffness.
+        """
         if self._excess is not None:
             self._excess.reduce(x, r, sign)
         elif self.elimination is not None:
@@ -101,7 +115,10 @@ class Reduced:
 
 
 def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Springs | None, u: Array, f: Array) -> Array:
-    """Return the multipliers (m,) [force] of the equations at the displacement u (n,)."""
+    """Return the multipliers (m,) of the equations of `elimination` [force].
+
+    They balance the forces at the pivots, for displacements u (n,) [length] and the right-hand side f (n,) [force].
+    """
     if elimination is None:
         return np.empty(0)
     if springs is not None:
@@ -111,23 +128,24 @@ def multiplier(K: ScaledMatrix, elimination: Elimination | None, springs: Spring
 
 
 class _Excess:
-    """Violation of compliant constraints, an unknown in place of each pivot. See `Reduced` for parameters."""
+    """The excesses of compliant equations, which replace the pivots as unknowns. For parameters see `Reduced`."""
 
     def __init__(self, diagonal: Array, elimination: Elimination, compliance: Array) -> None:
         self._elimination, self._pivots = elimination, elimination.pivots
         compliant, self._compliance = compliance > 0.0, compliance
         self._stiffness = np.divide(1.0, compliance, out=np.zeros(len(compliance)), where=compliant)
-        # Stiffness of the excess plus that of the pivot; exact equations are unchanged.
+        # Diagonal of the operator at the excesses: the stiffness of the equation plus that of the pivot.
         of_pivots = elimination.own.sparse.matrix.power(2).T @ diagonal[self._pivots]
         self._inverse = np.where(compliant, 1.0 / (self._stiffness + of_pivots), 0.0)
         self._compliant = compliant
         self._u = np.empty(len(diagonal))
 
     def begin(self, x: Array, multiplier: Array | None) -> None:
-        """Replace pivots by the violations that balance the forces there; constraints that were open start with zero."""
+        """Replace the pivots of x (n,), in place, by the excesses that belong to multipliers (m,); None stands for zero."""
         x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
 
     def displacement(self, x: Array, offset: Array | None) -> Array:
+        """Return the displacements (n,) of x (n,), with the `offset` (m,) of the pivots or without one [length]."""
         moved = self._elimination.shifted(x[self._pivots])
         u = self._u
         u[:] = x
@@ -135,11 +153,13 @@ class _Excess:
         return u
 
     def reduce(self, x: Array, r: Array, sign: float) -> None:
+        """See `Reduced._reduce`."""
         multiplier = self._elimination.multiplier(r[self._pivots]) + sign * self._stiffness * x[self._pivots]
         self._elimination.move_forces(r)
         r[self._pivots] = np.where(self._compliant, multiplier, 0.0)
 
     def precondition(self, r: Array, norm: float, z: Array, cycle: Callable[[Array, float, Array], None]) -> None:
+        """See `Reduced.precondition`; excesses are preconditioned by their diagonal."""
         residual = r[self._pivots]
         r[self._pivots] = 0.0
         cycle(r, norm, z)

@@ -1,7 +1,9 @@
 """Chebyshev smoother, preconditioned by the diagonal blocks.
 
-It smooths the eigenvalues of ``D^-1 A`` in [SMOOTHED bound, bound], D the diagonal blocks (Adams, Brezina, Hu and Tuminaro,
-2003). Unlike Gauss-Seidel it is bitwise reproducible for any number of threads. `Level.relax` makes one of its steps.
+Let A be the matrix of a level, D its diagonal blocks, and `bound` an upper bound of the eigenvalues of ``D^-1 A``. The
+smoother reduces the components of the error that belong to eigenvalues between ``SMOOTHED * bound`` and `bound` (Adams,
+Brezina, Hu and Tuminaro, 2003). Unlike with the Gauss-Seidel method, results do not depend on the number of threads.
+`Level.relax` makes one step.
 """
 
 from __future__ import annotations
@@ -11,15 +13,19 @@ import numpy as np
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.round_off import ROUND_OFF
 
-# Lanczos steps for the largest eigenvalue, safety margin of the estimate, and the fraction of the spectrum that is smoothed.
+# Number of Lanczos steps for the largest eigenvalue, and safety factor of its estimate.
 LANCZOS_STEPS = 8
 SAFETY = 1.08
+# Lower end of the interval of eigenvalues that is smoothed, relative to its upper end; number of Chebyshev steps.
 SMOOTHED = 1 / 24
 DEGREE = 3
 
 
 def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
-    """Return the factors (of the last step, of the residual) of a Chebyshev iteration for [SMOOTHED bound, bound]."""
+    """Return the coefficients of `degree` Chebyshev steps for eigenvalues between ``SMOOTHED * bound`` and `bound`.
+
+    The two coefficients of a step multiply the last step and the preconditioned residual, see `cycle_kernels.relax`.
+    """
     centre, half = 0.5 * (1 + SMOOTHED) * bound, 0.5 * (1 - SMOOTHED) * bound
     factors = [(0.0, 1.0 / centre)]
     rho = half / centre
@@ -31,9 +37,10 @@ def chebyshev(bound: float, degree: int) -> list[tuple[float, float]]:
 
 
 def largest_eigenvalue(level: Level) -> float:
-    """Return an estimate, from below, of the largest eigenvalue of ``D^-1 A`` from the Lanczos process.
+    """Return a lower estimate of the largest eigenvalue of ``D^-1 A`` by the Lanczos method.
 
-    The process is that behind conjugate gradients with preconditioner D (Golub and Van Loan, section 11.3).
+    The tridiagonal matrix of the Lanczos method follows from the coefficients of the conjugate gradient method with the
+    preconditioner D (Golub and Van Loan, Matrix Computations, 2013, section 11.3).
     """
     r = np.random.default_rng(0).normal(size=level.n).astype(level.b.dtype)
     z, q, p = np.empty_like(r), np.empty_like(r), np.zeros_like(r)

@@ -1,8 +1,8 @@
-"""Conjugate gradients preconditioned by multigrid, with the rigid-body modes as near null space.
+"""Conjugate gradient method with multigrid as preconditioner.
 
-Aggregates and prolongators are those of K and are used in the whole analysis. Equations ``B u = c`` are eliminated: the
-iterates satisfy them, forces at the eliminated unknowns, the pivots, are moved to the other unknowns, and the hierarchy is
-updated near the pivots.
+The aggregates and prolongators of the stiffness matrix K are used in the complete analysis. Equations ``B u = c`` are
+eliminated: the iterates satisfy them, the forces at the eliminated unknowns, the pivots, are moved to the other unknowns,
+and the multigrid hierarchy is changed near the pivots.
 """
 
 from __future__ import annotations
@@ -34,57 +34,58 @@ from fastcontact.linear.springs import Springs
 
 log = logging.getLogger("fastcontact")
 MAX_ITERATIONS = 1000
-# Number of columns of K^-1, one solution each, up to which they cost less than a factorisation.
+# Largest number of columns of K^-1, each of which takes one solution, before a factorisation costs less.
 MOST_COLUMNS = 300
-# Iterations between two calls of a monitor.
+# Number of iterations between two calls of a monitor.
 WATCH_EVERY = 2
-# Iterations before the first call where contrasts are large: after fewer, errors of soft parts are unknown.
+# Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
+# known.
 WATCH_CONTRAST_FROM = 6
-# Equations with the same pivots whose weights differ by less than this share a hierarchy.
+# The hierarchy is not changed for new equations with the same pivots if all weights differ by at most this much.
 ALIKE = 0.02
-# Cost of an update of the hierarchy, including the elimination of its equations, in iterations.
+# Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations.
 CHANGE = 15
-# A warm start of a nonsymmetric solution is improved by the first factor, but at most to the second fraction of its
-# tolerance, and by at most this many iterations once the tolerance is met. With much stiffer pivots the number is
-# doubled, up to LONGEST_WARM, each time that the next start is not better by STOOD.
+# A nonsymmetric solution whose initial guess is accurate already is iterated further: until the residual has fallen by the
+# factor WARM, or to WARM_LEAST times its tolerance, with at most MOST_WARM iterations after the tolerance is reached. If
+# equations stiffen nodes strongly, the latter number is doubled, up to LONGEST_WARM, each time that the residual at the
+# next start is larger than STOOD times the residual at the last start.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
 STOOD, LONGEST_WARM = 0.2, 40
-# If the smoother amplifies a vector, its bound of the spectrum is raised by the first number, at most as often as the
-# second.
+# If the smoother amplifies a vector, the upper bounds of the eigenvalues are multiplied by RAISE, at most RAISES times.
 RAISE, RAISES = 1.3, 4
 
 
 class StallError(ConvergenceError):
-    """The iteration does not reach its tolerance."""
+    """Raised if the iteration does not reach its tolerance."""
 
 
 class TooManyIterationsError(StallError):
-    """The work done so far costs more than another solution method."""
+    """Raised if the iterations cost more than is allowed, so that a different solution method is cheaper."""
 
 
 class Multigrid:
-    """Smoothed-aggregation multigrid as preconditioner of conjugate gradients.
+    """Conjugate gradient method with smoothed-aggregation multigrid as preconditioner.
 
     Parameters
     ----------
     tolerance : float
-        The residual is reduced below this fraction of the right-hand side (2-norms).
+        Tolerance of the 2-norm of the residual, relative to the 2-norm of the right-hand side [-].
     precision : {"single", "double"}
-        Precision of the multigrid cycle; the outer iteration is in double precision.
+        Precision of the multigrid cycle. The outer iteration always uses double precision.
 
     Attributes
     ----------
-    contrast
+    contrast : float
         See `LinearSolver`.
     work : int
-        Iterations so far, with updates of the hierarchy converted to iterations.
+        Number of iterations so far, plus CHANGE for each change of the hierarchy.
     allowed : int, optional
-        Largest work; None for unlimited.
+        Largest `work`; None means unlimited.
 
     Raises
     ------
     ModelError
-        If there is no such precision.
+        If the precision is neither "single" nor "double".
     """
 
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
@@ -103,14 +104,14 @@ class Multigrid:
 
     @property
     def nbytes(self) -> int:
-        """Memory of the hierarchy and the work space, without K [bytes]."""
+        """Memory of the hierarchy and of the vectors of the iteration, without K [bytes]."""
         return self.hierarchy.nbytes + self._cg.nbytes + (self._residuals.nbytes if self._residuals is not None else 0)
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
         n = K.shape[0]
         self.K = ScaledMatrix(K, self.precision, release)
-        self._modes = rigid_modes.astype(np.float32)  # for a second set-up: single precision suffices
+        self._modes = rigid_modes.astype(np.float32)  # for `build_in`; single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
@@ -118,29 +119,31 @@ class Multigrid:
         self.columns = InverseColumns(n, self._solve_many, MOST_COLUMNS)
 
     def _build(self, rigid_modes: Array) -> None:
+        """Build the hierarchy of the stored matrix."""
         self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
-        # The current equations and springs, and those of the hierarchy.
+        # Current equations and springs of the iteration; then the equations and springs for which the hierarchy was changed.
         self._reduced = Reduced(self.K, None)
         self._hierarchy_equations: Elimination | None = None
         self._hierarchy_springs: Springs | None = None
         self.counters.setups += 1
 
     def build_in(self, precision: str) -> None:
-        """Rebuild the hierarchy in another precision."""
+        """Rebuild the hierarchy in a different precision."""
         self.precision = precision
-        del self._constrained, self.hierarchy  # avoids two hierarchies in memory
+        del self._constrained, self.hierarchy  # so that there are never two hierarchies in memory
         self.K.change(precision)
         self._build(self._modes.astype(float))
 
     def _solve_many(self, F: Array) -> Array:
+        """Return ``K^-1 F`` (n, k) [length] for right-hand sides F (n, k) [force]."""
         return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
-        """Change the hierarchy to that of the eliminated matrix, `springs` included.
+        """Set the equations and springs of the iteration, and change the hierarchy for them.
 
-        A hierarchy for the same pivots with nearly the same weights is kept: it preconditions equally well, since only the
-        neighbourhood of the pivots matters. Coupled pivots have sparse weights there.
+        If the pivots are the same and the weights nearly so, the hierarchy is kept, because it is an equally good
+        preconditioner. For coupled pivots the hierarchy uses sparse weights, see `Elimination.with_sparse_weights`.
         """
         if elimination is not self._reduced.elimination or springs is not self._reduced.springs:
             sparse = elimination and elimination.with_sparse_weights()
@@ -153,7 +156,7 @@ class Multigrid:
             self._reduced = Reduced(self.K, elimination, springs, self.diagonal() if compliant else None)
 
     def _change_hierarchy(self, sparse: Elimination | None, springs: Springs | None) -> None:
-        """Change the hierarchy to that under equations with sparse weights and springs."""
+        """Change the hierarchy for equations with sparse weights, and for springs."""
         self._constrained.constrain(sparse, None if springs is None else springs.scaled(self.K.unit))
         self._hierarchy_equations, self._hierarchy_springs = sparse, springs
 
@@ -161,9 +164,21 @@ class Multigrid:
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,
         tolerance: float | None = None, springs: Springs | None = None,
     ) -> Array:  # fmt: skip
-        """Solve ``K u = f``, `springs` added to K, under the equations of `elimination`.
+        """Return the solution (n,) [length] of ``(K + S) u = f`` under the equations of `elimination`.
 
-        The residual is reduced to the solver's tolerance, or to a larger one.
+        Parameters
+        ----------
+        f : ndarray (n,)
+            Right-hand side [force].
+        elimination : Elimination or None
+        guess : ndarray (n,) or None
+            Initial guess; zero if None [length].
+        monitor : callable, optional
+            See `linear.protocol.Monitor`.
+        tolerance : float, optional
+            Relative residual at which the iteration stops, if it is larger than that of the solver [-].
+        springs : Springs, optional
+            Springs with the matrix S (n, n); none by default.
 
         Raises
         ------
@@ -202,23 +217,24 @@ class Multigrid:
     def nonsymmetric_solution(
         self, f: Array, elimination: Elimination | None, springs: Springs | None, guess: Array, tolerance: float
     ) -> Array:
-        """Solve ``K u + S u = f + F.T multiplier`` and ``B u = c``, F the rows that multipliers act through.
+        """Return the solution u (n,) [length] of ``K u + S u = f + F.T multiplier`` and ``B u = c``.
 
-        A sliding contact keeps its gap closed, but its force also has a tangential component. Unknowns are eliminated as
-        without friction, forces move along the rows F; the reduced matrix is not symmetric. The hierarchy of the
-        equations and springs without F preconditions it.
+        In sliding contact the gap stays closed, but the contact force also has a tangential component, so that F differs
+        from B. The pivots are eliminated as without friction, but the forces at the pivots are moved to the other unknowns
+        according to F. The reduced matrix is therefore not symmetric. The preconditioner is the hierarchy for F = B.
 
         Parameters
         ----------
         f : ndarray (n,)
-            [force]
+            Right-hand side [force].
         elimination : Elimination or None
+            Elimination of the equations B, with force weights according to F.
         springs : Springs or None
-            S is their matrix.
+            Springs with the matrix S (n, n).
         guess : ndarray (n,)
-            [length]
+            Initial guess [length].
         tolerance : float
-            Relative residual, where larger than the solver's own.
+            Relative residual at which the iteration stops, if it is larger than that of the solver [-].
 
         Raises
         ------
@@ -233,7 +249,8 @@ class Multigrid:
         enough = self._enough(tolerance) * scale
         iteration.x[:] = guess
         self._begin(iteration, f)
-        # With much stiffer parts the solver's own tolerance leaves errors that pairings would reduce one by one.
+        # If some parts are much stiffer than others, the tolerance of the solver leaves errors in the soft parts. Later
+        # pairings would reduce them only slowly.
         aim = tolerance / self._contrast * scale
         self._reduce(iteration, enough, self._reduced.multiply, self.precondition, aim)
         return self._reduced.displacement(iteration.x).copy()
@@ -244,8 +261,21 @@ class Multigrid:
     ) -> tuple[Array, Array]:  # fmt: skip
         """Solve ``K u + S u = f + G.T multiplier`` and ``G u + C multiplier = d`` under the equations of `elimination`.
 
-        G, C and d are those of the border; returns u (n,) and its multipliers (e,), which begin at `start`. See
-        `nonsymmetric_solution` for the others.
+        Parameters
+        ----------
+        f, elimination, springs, guess, tolerance
+            See `solution`.
+        border : Border
+            The equations with G (e, n), C (e, e) and d (e,), which are not eliminated.
+        start : ndarray (e,)
+            Initial guess of their multipliers [force].
+
+        Returns
+        -------
+        u : ndarray (n,)
+            [length].
+        multiplier : ndarray (e,)
+            Multipliers of the equations of the border [force].
 
         Raises
         ------
@@ -278,9 +308,10 @@ class Multigrid:
         self, iteration: ConjugateResiduals, enough: float, multiply: Multiply, precondition: Precondition,
         aim: float = np.inf,
     ) -> None:  # fmt: skip
-        """Iterate until the residual is `enough` [force]; a warm start is improved further, to `aim` if that is smaller.
+        """Iterate until the norm of the residual is at most `enough` [force].
 
-        It may satisfy the tolerance while the forces of a small contact are still inaccurate.
+        An initial guess may satisfy this tolerance although the forces of a small contact are still inaccurate. The iteration
+        therefore continues for some iterations, see WARM, or until the norm of the residual is `aim`, if that is smaller.
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
         begun = iteration.norm
@@ -301,22 +332,24 @@ class Multigrid:
             self._count()
 
     def _count(self) -> None:
+        """Count one iteration."""
         self.counters.iterations += 1
         self._worked(1)
 
     def _worked(self, iterations: int) -> None:
+        """Add a number of iterations to `work`; raise TooManyIterationsError if it exceeds `allowed`."""
         self.work += iterations
         if self.allowed is not None and self.work > self.allowed:
             raise TooManyIterationsError("the work allowed is done")
 
     def diagonal(self) -> Array:
-        """Return the diagonal (n,) of K."""
-        if self._diagonal is None:  # only needed with friction
+        """Return the diagonal (n,) of K [force / length]."""
+        if self._diagonal is None:  # computed on demand, because only friction and compliances need it
             self._diagonal = self.K.diagonal()
         return self._diagonal
 
     def _strengthen(self, times: int) -> None:
-        """Make the preconditioner positive definite again: with higher bounds, at last in double precision."""
+        """Make the preconditioner positive definite again: by larger bounds, and at the last attempt by double precision."""
         if times < RAISES or self.precision == "double":
             self.hierarchy.raise_bounds(RAISE)
             return
@@ -331,7 +364,7 @@ class Multigrid:
         iteration.start()
 
     def _scale(self, f: Array, elimination: Elimination | None) -> float:
-        """Return the norm of the right-hand side, constraint forces included."""
+        """Return the 2-norm of the right-hand side, including forces due to the offsets of eliminated unknowns [force]."""
         square = self._cg.dot(f, f)
         if elimination is not None and elimination.offset.any():
             moved = np.zeros(len(f))
@@ -341,12 +374,15 @@ class Multigrid:
         return float(np.sqrt(square))
 
     def _enough(self, tolerance: float) -> float:
-        """Return the relative residual to reach: `tolerance`, but not less than the solver's own."""
+        """Return the relative residual at which to stop, for a requested `tolerance`: at least that of the solver [-]."""
         return max(self.tolerance, tolerance / self._contrast)
 
     @property
     def _contrast(self) -> float:
-        """Factor by which relative errors may exceed residuals: in softer bodies beside stiffer pivots, and in shear."""
+        """Factor by which relative errors of displacements may exceed relative residuals [-].
+
+        It includes the stiffening of soft bodies by equations, and the contrast within cells, see `LinearSolver`.
+        """
         return max(1.0, self._constrained.stiffening) * (self.contrast if self.contrast > MILD else 1.0)
 
     def precondition(self, r: Array, norm: float, z: Array) -> None:
@@ -354,13 +390,14 @@ class Multigrid:
         self._reduced.precondition(r, norm, z, self._cycle)
 
     def _cycle(self, r: Array, norm: float, z: Array) -> None:
+        """Fill z (n,) with the result of one V-cycle for r (n,), scaled by its 2-norm to the range of single precision."""
         top = self.hierarchy.levels[0]
         scaled(1.0 / norm, r, top.b)
         self.hierarchy.cycle()
         scaled(norm * self.K.unit, top.x, z)
 
     def multiplier(self, elimination: Elimination | None, u: Array, f: Array, springs: Springs | None = None) -> Array:
-        """Return the multipliers (m,) of the equations at the displacement `u`."""
+        """Return the multipliers (m,) of the equations [force] at the displacements `u` (n,), see `reduced.multiplier`."""
         return multiplier(self.K, elimination, springs, u, f)
 
 

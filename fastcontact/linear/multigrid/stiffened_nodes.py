@@ -1,15 +1,15 @@
-"""Nodes constrained to a much stiffer body: corrections of the smoother and of coarser levels.
+"""Nodes that equations couple to a much stiffer body: corrections of the smoother and of the coarser levels.
 
-Equations make the unknowns of one side, the pivots, follow those of the other. If the pivots' side is much stiffer, nodes of
-the other side inherit its stiffness, with two consequences:
+Equations make the unknowns of one side, the pivots, follow the unknowns of the other side: ``u = T u``. If the body of the
+pivots is much stiffer, the nodes of the other side get its stiffness. This has two consequences:
 
-- Motions that move no pivot are as soft as their own body, while the smoother treats them as stiff. `FreeMotions`
-corrects these
-  with the stiffness of their body alone.
-- Aggregates with softer neighbours would move the stiff body: such coarse motions have far too much energy, and coarse levels
-  correct neither side. In coarse corrections the roles are therefore exchanged: the unknowns of stiffened nodes follow the
-  pivots, ``u = S u`` (`followers`), and the pivots then follow them as usual, ``u = T u``. Coarse matrices are Galerkin
-  products with ``T S P`` (`composed`).
+- Motions of these nodes that move no pivot are as soft as their body, but the smoother treats them as stiff. `FreeMotions`
+  corrects them with the stiffness of their body alone.
+- Aggregates of these nodes and their softer neighbours would move the stiff body. Such motions have far too much energy, so
+that
+  coarse levels would correct neither side. In corrections from coarser levels the roles are therefore exchanged: the
+  unknowns of the stiffened nodes follow the pivots, ``u = S u`` (`followers`), and the pivots then follow these unknowns as
+  usual. With the prolongator P, the coarse matrices are Galerkin products with ``T S P`` (`composed`).
 """
 
 from __future__ import annotations
@@ -22,24 +22,26 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Unknowns follow the pivots if translations of their side move these by at least this fraction.
+# An unknown follows the pivots of its equations if a unit translation of its side moves them by at least this much on
+# average.
 LEAST = 0.3
 
 
 class FreeMotions:
     """Corrections of motions of stiffened nodes that move no pivot.
 
-    With the weights W of the pivots on these nodes and the diagonal blocks D of their body's stiffness, the correction for a
-    residual r is ``D^-1 r - D^-1 W.T (W D^-1 W.T)^-1 W D^-1 r``: the solution with D under ``W u = 0``.
+    Let W be the weights by which the pivots depend on the stiffened nodes, and D the diagonal blocks of the stiffness
+    matrix at these nodes, without equations. The correction for a residual r is
+    ``D^-1 r - D^-1 W.T (W D^-1 W.T)^-1 W D^-1 r``, the solution of ``D u = r`` under the constraints ``W u = 0``.
 
     Parameters
     ----------
     weights : csr_array (m, n)
-        Weights of the pivots.
+        Weights of all m pivots on all n unknowns [-].
     nodes : ndarray of int (k,)
-        Those stiffened, without pivots of their own.
+        The stiffened nodes, none of which has a pivot.
     inverse : ndarray (k, size, size)
-        Inverses of the diagonal blocks of these nodes without equations.
+        Inverses of the diagonal blocks D.
     """
 
     def __init__(self, weights: csr_array, nodes: Indices, inverse: Array) -> None:
@@ -51,12 +53,12 @@ class FreeMotions:
         self._moves = csr_array(self._yielding @ W.T)
         self._pulls = csr_array(self._moves.T)  # stored by rows for fast products
         compliance = csr_array(W @ self._moves)
-        # Some are linearly dependent on the stiffened nodes, as far as the cycle's precision tells.
+        # Rows of W may be linearly dependent in the precision of the cycle; a small shift keeps the matrix regular.
         shifted = compliance + diags_array(SINGLE_PRECISION * compliance.diagonal(), format="csr")
         self._factors = splu(csc_array(shifted), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
 
     def correct(self, r: AnyArray, factor: float, step: AnyArray, x: AnyArray) -> None:
-        """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,)."""
+        """Add `factor` times the correction for the residual r (n,) to the last `step` (n,) and to x (n,), in place."""
         residual = r[self._at].astype(float)
         correction = self._yielding @ residual - self._moves @ self._factors.solve(self._pulls @ residual)
         correction = (factor * correction).astype(x.dtype)
@@ -67,17 +69,17 @@ class FreeMotions:
 def followers(elimination: Elimination, nodes: Indices, size: int) -> Elimination:
     """Return the transformation S by which the unknowns of stiffened nodes follow the pivots.
 
-    Each unknown follows the mean of its equations, weighted with its coefficients. The other unknowns of its own side are
-    assumed to move with it, so that translations of both sides together are preserved.
+    Each unknown satisfies the mean of its equations, weighted with its coefficients in them. The other unknowns of its side
+    are assumed to have the same displacement, so that common translations of both sides are preserved.
 
     Parameters
     ----------
     elimination : Elimination
-        T, with sparse weights (m, n).
+        The transformation T, with sparse weights (m, n).
     nodes : ndarray of int (k,)
-        Those stiffened, without pivots of their own.
+        The stiffened nodes, none of which has a pivot.
     size : int
-        Unknowns of a node.
+        Number of unknowns of a node.
     """
     pivots, W = elimination.pivots, coo_array(elimination.weights)
     m, n = W.shape
@@ -103,7 +105,22 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
 
 
 def composed(elimination: Elimination, following: Elimination) -> tuple[Indices, csr_array]:
-    """Return the unknowns that T S changes, and the weights (m + q, n) of their new values; see `followers`."""
+    """Return the product T S of the transformations, see `followers`.
+
+    Parameters
+    ----------
+    elimination : Elimination
+        T, with m pivots.
+    following : Elimination
+        S, with q unknowns that follow.
+
+    Returns
+    -------
+    unknowns : ndarray of int (m + q,)
+        Unknowns whose values T S sets.
+    weights : csr_array (m + q, n)
+        Weights of all n unknowns in these values [-].
+    """
     T, S = elimination.weights, following.weights
     through = csr_array(T[:, following.pivots])
     free = np.ones(T.shape[1])

@@ -1,8 +1,9 @@
-"""Symmetric low-rank update ``D.T G + G.T D`` of a matrix, and its Galerkin product.
+"""Symmetric low-rank change ``D.T G + G.T D`` of a matrix, and its Galerkin product.
 
-Equations set ``u = u + D u`` at their pivots, with rows D of the weights minus one. They transform A into ``T.T A T``, which
-is a change by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs along rows R add ``R.T S R``,
-which has the same form.
+Eliminated equations set ``u[pivots] = weights @ u``. With the matrix D (m, n) of the weights minus the unit rows of the
+pivots, this is the transformation ``T u = u + E.T D u``, where the columns of E.T are the unit vectors of the pivots. The
+matrix ``T.T A T`` differs from A by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs with the
+rows R and the diagonal stiffness S change the matrix by ``R.T S R``, which has the same form.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ class SymmetricChange:
     ----------
     D, G : csr_array (m, n)
     size : int
-        Unknowns of a node.
+        Number of unknowns of a node.
     """
 
     D: csr_array
@@ -38,7 +39,7 @@ class SymmetricChange:
 
     @classmethod
     def of_equations(cls, A: BlockMatrix, pivots: Indices, weights: csr_array) -> SymmetricChange:
-        """Return ``T.T A T - A`` for a symmetric A (n, n), where ``u = T u`` sets ``u[pivots] = weights u``."""
+        """Return ``T.T A T - A`` for a symmetric matrix A (n, n), where T sets ``u[pivots] = weights @ u``."""
         m = len(pivots)
         D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=weights.shape))
         rows = A.rows_of(pivots)
@@ -48,11 +49,11 @@ class SymmetricChange:
 
     @classmethod
     def of_springs(cls, springs: Springs, size: int) -> SymmetricChange:
-        """Return the matrix of springs."""
+        """Return the change of a matrix by springs; each node has `size` unknowns."""
         return cls(springs.rows, scaled(springs.rows, 0.5 * springs.stiffness), size)
 
     def diagonal(self) -> LocalChange:
-        """Return its diagonal blocks."""
+        """Return the diagonal blocks of the change."""
         D, G, size = self.D, self.G, self.size
         nodes = np.unique(D.indices // size)
         row_of_node = np.full(D.shape[1] // size, -1, np.int32)
@@ -64,19 +65,29 @@ class SymmetricChange:
         return LocalChange.of_diagonal(nodes, blocks.reshape(-1, size, size))
 
     def on_finest(self) -> csc_array:
-        """Return the change itself (n, n)."""
+        """Return the change as a matrix (n, n)."""
         half = csr_array(self.D.T @ self.G)
         return csc_array(half + half.T)
 
     def on_coarse(self, P: BlockMatrix) -> LocalChange:
-        """Return its Galerkin product ``P.T (D.T G + G.T D) P``."""
+        """Return the Galerkin product ``P.T (D.T G + G.T D) P`` with the prolongator P."""
         E, H = _restricted(self.D, P), _restricted(self.G, P)
         return _symmetric_product(E, H, P.cols)
 
 
 @dataclass(frozen=True, eq=False)
 class _Restricted:
-    """Rows of blocks: coarse nodes, and a number for each unknown of these."""
+    """Sparse rows whose entries come in blocks of the unknowns of coarse nodes.
+
+    Attributes
+    ----------
+    indptr : ndarray of int (m + 1,)
+        Offsets of the rows.
+    nodes : ndarray of int (n_blocks,)
+        Coarse node of each block.
+    numbers : ndarray (n_blocks * size,)
+        Entries of the blocks, for `size` unknowns per coarse node.
+    """
 
     indptr: Numbers
     nodes: Numbers
@@ -84,7 +95,7 @@ class _Restricted:
 
 
 def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
-    """Return ``rows @ P``."""
+    """Return the product ``rows @ P`` of rows (m, n) and the prolongator."""
     size, n_coarse, count = len(P.rows), int(P.indices.max()) + 1, np.empty(rows.shape[0], np.int32)
     through = P.indptr, P.indices
     spread(
@@ -101,7 +112,7 @@ def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
 
 
 def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
-    """Return ``E.T H + H.T E`` on the nodes of both."""
+    """Return ``E.T H + H.T E`` as a change of the coarse matrix; `cols` is a tuple of the number of unknowns per node."""
     nodes = np.unique(np.concatenate([E.nodes, H.nodes]))
     row_of_node = np.empty(nodes[-1] + 1, np.int32)
     row_of_node[nodes] = np.arange(len(nodes))

@@ -1,10 +1,12 @@
-"""Multigrid as a linear solver, and the factorisation that replaces it where it does not converge.
+"""Multigrid as a linear solver, and the factorisation that replaces it if multigrid does not converge.
 
-Equations ``B u = c`` are eliminated, see `multigrid.solver`, also those with a diagonal compliance, see `multigrid.loaded`.
-Those with a full compliance cannot be eliminated: they use columns of K^-1, one solution each, stored for the whole
-analysis. If these are too many, or the iteration stalls on thin or nearly incompressible parts, or a load step has taken
-more work than a factorisation, a factorisation replaces multigrid for the rest of the analysis, unless the matrix is too
-large.
+Equations ``B u = c`` are eliminated, see `multigrid.solver`, also if they have a diagonal compliance, see
+`multigrid.loaded`. Equations with a full compliance matrix cannot be eliminated. They need columns of K^-1, which take one
+solution each and are stored for the complete analysis.
+
+A factorisation replaces multigrid for the rest of the analysis if too many columns are needed, if the iteration stalls on
+thin or nearly incompressible parts, or if a load step has taken more work than a factorisation. Very large matrices are not
+factorised.
 """
 
 from __future__ import annotations
@@ -36,21 +38,22 @@ from fastcontact.linear.springs import Springs
 from fastcontact.round_off import ROUND_OFF
 
 log = logging.getLogger("fastcontact")
-# Work in one load step, in iterations, above which a factorisation is certainly cheaper: a constant, and a number for
-# each unknown, by the number of components per node. In 3D a factorisation and a step by it cost 300 and 0.04 where two
-# bodies touch, three times as much in stacks with friction (measured, see bench/README.md).
+# Number of iterations in one load step above which a factorisation is cheaper: a constant plus a number for each unknown,
+# which depends on the number of components per node. In 3D, a factorisation and a load step with it cost as much as 300
+# iterations plus 0.04 per unknown for two bodies in contact, and three times as much in stacks with friction (measured, see
+# bench/README.md).
 COST, COST_OF_UNKNOWN = 1000, {1: 0.0, 2: 0.0, 3: 0.08}
 
 
 class Amg(Multigrid, LinearSolver):
-    """See `Multigrid` for parameters.
+    """Linear solver by multigrid; for parameters see `Multigrid`.
 
     Attributes
     ----------
     instead : Direct or None
-        The factorisation that replaced multigrid.
+        The direct solver that has replaced multigrid.
     gave_up : str
-        Reason for the replacement.
+        Reason for the replacement; empty if there was none.
     """
 
     name = "amg"
@@ -58,7 +61,7 @@ class Amg(Multigrid, LinearSolver):
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         super().__init__(tolerance, precision)
         self.instead: Direct | None = None
-        self._factored: Direct | None = None  # kept if an analysis returns to a state before the replacement
+        self._factored: Direct | None = None  # kept when an analysis returns to a state before the replacement
         self.gave_up = ""
 
     def __repr__(self) -> str:
@@ -70,7 +73,7 @@ class Amg(Multigrid, LinearSolver):
 
     @property
     def iterative(self) -> bool:
-        """See `LinearSolver`; False once a factorisation has replaced multigrid."""
+        """Whether a solution with a larger tolerance costs less: True until a factorisation has replaced multigrid."""
         return self.instead is None
 
     def prepare(
@@ -82,19 +85,19 @@ class Amg(Multigrid, LinearSolver):
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
-        """Return the prepared matrix with right-hand side `f` (n,), with a new limit of work, see `affordable`."""
+        """Return the prepared matrix with the right-hand side `f` (n,) [force], and reset the limit of work."""
         self.begin()
         self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
 
     @property
     def affordable(self) -> int:
-        """Number of iterations that costs more than a factorisation and a load step with it."""
+        """Number of iterations that cost more than a factorisation and a load step with it."""
         n, size = self.K.shape[0], self.K.blocksize[0]
         return COST + int(COST_OF_UNKNOWN[size] * n)
 
     def improve(self, excess: float) -> bool:
-        """See `LinearSolver.improve`: lower the tolerance, or replace multigrid by a factorisation near round-off."""
+        """Reduce the tolerance or, if it is near round-off, replace multigrid by a factorisation; see `LinearSolver`."""
         if self.instead is not None:
             return self.instead.improve(excess)
         if self._may_factorise and not self.tolerance > ROUND_OFF * excess:
@@ -106,7 +109,10 @@ class Amg(Multigrid, LinearSolver):
         return tighten(self, excess)
 
     def snapshot(self) -> dict[str, Any]:
-        """See `LinearSolver.snapshot`: equations and bounds of the hierarchy, columns of K^-1; keys of result files."""
+        """Return equations, springs and bounds of the hierarchy, and requested columns of K^-1; see `LinearSolver.snapshot`.
+
+        Result files store the snapshot under these keys.
+        """
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
@@ -114,7 +120,7 @@ class Amg(Multigrid, LinearSolver):
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
-        """Return the equations and springs of the hierarchy, as plain arrays."""
+        """Return the equations and springs for which the hierarchy was changed, as arrays; None if there are none."""
         equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
         if equations is not None:
             rows = equations.weights
@@ -126,7 +132,7 @@ class Amg(Multigrid, LinearSolver):
         if (instead := snapshot.get("instead")) is not None:
             (self.instead or self._factorise(instead["why"])).put_back(instead)
             return
-        if self.instead is not None:  # multigrid was given up later
+        if self.instead is not None:  # The factorisation replaced multigrid after the time of the snapshot.
             self._factored, self.instead, self.gave_up = self.instead, None, ""
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
@@ -142,12 +148,12 @@ class Amg(Multigrid, LinearSolver):
         self.hierarchy.bounds = snapshot["bounds"]
 
     def give_up(self, stalled: StallError | TooManyColumnsError) -> None:
-        """Factorise the matrix, because the iteration stalls or columns of the inverse cost more.
+        """Replace multigrid by a factorisation, for the reason `stalled`.
 
         Raises
         ------
         StallError, TooManyColumnsError
-            If the matrix is too large.
+            The error `stalled`, if the matrix is too large to be factorised.
         """
         if not self._may_factorise:
             raise stalled
@@ -162,9 +168,11 @@ class Amg(Multigrid, LinearSolver):
 
     @property
     def _may_factorise(self) -> bool:
+        """Whether the matrix is small enough to be factorised."""
         return bool(self.K.shape[0] <= AFFORDABLE[self.K.blocksize[0]])
 
     def _factorise(self, why: str) -> Direct:
+        """Replace multigrid by a factorisation with the reason `why`, and return the direct solver."""
         if self._factored is None:
             log.warning("%s", why)
             self._factored = Direct()
@@ -173,28 +181,28 @@ class Amg(Multigrid, LinearSolver):
         else:
             self._factored.put_back({"asked": [], "loads": []})
         self.gave_up, self.instead = why, self._factored
-        # Later tolerances are those of a factorisation.
+        # From now on the tolerance is that of the direct solver.
         self.asked = self.tolerance if self.asked is None else self.asked
         self.tolerance = self.instead.tolerance
         return self.instead
 
 
 def _equal(first: Mapping[str, Any] | None, second: Mapping[str, Any] | None) -> bool:
-    """Return whether two sets of arrays, or None, are equal."""
+    """Return whether two mappings of arrays are equal; either may be None."""
     if first is None or second is None:
         return first is second
     return all(np.array_equal(values, second[name]) for name, values in first.items())
 
 
 def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
-    """Return the elimination of `Amg.snapshot`, without offsets and multipliers, which are not needed."""
+    """Return the elimination stored as ``tied`` in `Amg.snapshot`, for n unknowns, without offsets, which are not needed."""
     m = len(tied["pivots"])
     rows = csr_array((tied["data"], tied["indices"], tied["indptr"]), shape=(m, n))
     return Elimination(tied["pivots"], rows, np.zeros(m), rows)
 
 
 def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Decorate a method to fall back on a factorisation where the iteration stalls."""
+    """Return a method of `_Loaded` that uses the factorisation if the iteration stalls, or if multigrid is replaced."""
 
     @functools.wraps(method)
     def with_fallback(self: _Loaded, *args: Any, **options: Any) -> Any:
@@ -209,7 +217,7 @@ def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
 
 
 class _Loaded(LoadedMultigrid):
-    """See `linear.protocol.LoadedNonsymmetric`."""
+    """A matrix prepared by `Amg` with a right-hand side; see `linear.protocol.LoadedNonsymmetric`."""
 
     solve = _or_by_factors(LoadedMultigrid.solve)
     delassus = _or_by_factors(LoadedMultigrid.delassus)
@@ -218,6 +226,7 @@ class _Loaded(LoadedMultigrid):
 
     @functools.cached_property
     def _factored(self) -> Loaded:
+        """The factorisation with the same right-hand side."""
         return self._solver.instead.load(self._f)
 
     def solve_nonsymmetric(

@@ -1,4 +1,4 @@
-"""Direct solver that is always available: one sparse factorisation serves the whole analysis."""
+"""Direct solver by a sparse Cholesky factorisation, which is always available."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.linear.factor_solver import FactorSolver
 
 
 class Direct(FactorSolver):
-    """Our Cholesky factors with the contact unknowns last; see `FactorSolver`."""
+    """Direct solver with the Cholesky factorisation of `linear.cholesky`; see `FactorSolver`."""
 
     name = "direct"
     _symbolic: SymbolicFactors | None = None  # shared by the solvers of all tangents
