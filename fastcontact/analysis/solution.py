@@ -54,11 +54,11 @@ def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[A
     forces_of : callable
         Returns the change of their forces ((1 + k) q,) due to a change of gaps and slips.
     """
-    at_rest = loaded.involved_solution(np.zeros(R.shape[1]), None)
+    at_rest, transpose = loaded.involved_solution(np.zeros(R.shape[1]), None), csr_array(R.T)
 
     def respond(force: Array, gaps: Array) -> Array:
         u = loaded.involved_solution(force, None) - at_rest
-        return u + loaded.involved_solution(R.T @ forces_of(R @ u + gaps[:, rows].ravel()), None) - at_rest
+        return u + loaded.involved_solution(transpose @ forces_of(R @ u + gaps[:, rows].ravel()), None) - at_rest
 
     return respond
 

@@ -84,5 +84,12 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
     """Return the matrix (m, n) without rows whose entries are below `least` times the largest in the row of `origin`."""
-    significant = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
+    significant = _largest_in_rows(matrix) > least * _largest_in_rows(origin)
     return matrix if significant.all() else scaled(matrix, significant)
+
+
+def _largest_in_rows(matrix: csr_array) -> Array:
+    """Return the largest absolute value in each row of a matrix (m, n), zero for empty rows."""
+    largest = np.zeros(matrix.shape[0])
+    np.maximum.at(largest, np.repeat(np.arange(len(largest)), np.diff(matrix.indptr)), np.abs(matrix.data))
+    return largest
