@@ -34,8 +34,10 @@ class Entries:
 
 def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_array:
     """Return the shape functions (m, n_nodes) of all nodes at points, from those (m, n) of the nodes `local` (m, n)."""
-    row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
-    return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
+    m, n = shape.shape
+    shapes = csr_array((shape.flatten(), local.flatten(), n * np.arange(m + 1)), shape=(m, n_nodes))
+    shapes.sum_duplicates()
+    return shapes
 
 
 def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
