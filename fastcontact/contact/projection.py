@@ -15,7 +15,7 @@ import numpy as np
 
 from fastcontact._jit.parallel import portions, shared
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact import line_projection_kernels, projection_kernels
+from fastcontact.contact import line_projection_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
@@ -141,6 +141,8 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     element, nodes = elements.get(block.element), coordinates[block.facets]
     slopes = element.gradient(element.nodes)
     if element.dim == 2:
+        from fastcontact.contact import projection_kernels
+
         out = np.empty(nodes.shape)
         shared(lambda portion: projection_kernels.normals(nodes, slopes, *portion, out), portions(*block.facets.shape))
         return out
@@ -152,6 +154,8 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     """Return the angles (n, k) of facets with nodes (n, k, dim) at their corners; 1 at other nodes, and on lines."""
     if element.dim == 1:
         return np.ones(nodes.shape[:2])
+    from fastcontact.contact import projection_kernels
+
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)  # edges run from each corner to the next
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
@@ -194,6 +198,8 @@ def along_normals(
     normal : ndarray (n, 3)
         Interpolated unit normals there.
     """
+    from fastcontact.contact import projection_kernels
+
     facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
     # Relative to the middle of the surface: far from the origin, round-off would exceed a converged step.
     x = coordinates[side.points]
@@ -217,6 +223,8 @@ def along_normals(
 
 def _polynomials(kinds: Sequence[Array]) -> Array:
     """Return the coefficients (n_facets, width, 3) of vectors at the nodes of facets (n, m, 3), kind by kind."""
+    from fastcontact.contact import projection_kernels
+
     out, first = np.empty((sum(map(len, kinds)), max(kind.shape[1] for kind in kinds), 3)), 0
     for kind in kinds:
         projection_kernels.coefficients(kind, tables(kind.shape[1]).to_terms, first, 0, len(kind), out)
