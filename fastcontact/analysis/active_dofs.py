@@ -118,6 +118,7 @@ class SurfaceDofs(ActiveDofs):
         self._dofs, self._unknowns = contact_dofs, unknowns
         T = eye_array(len(system.free), format="csr") if system.T is None else system.T
         self._T = csr_array(T[contact_dofs][:, unknowns])
+        self._transpose = csr_array(self._T.T)
 
     # Prescribed displacements of the active components, and the largest condensed unknown; set by `for_step`.
     _lift: Array
@@ -166,7 +167,7 @@ class SurfaceDofs(ActiveDofs):
 
     def reduced(self, force: Array) -> Array:
         """See `ActiveDofs`."""
-        return np.asarray(self._T.T @ force[self._dofs])
+        return np.asarray(self._transpose @ force[self._dofs])
 
     def size(self, v: Array) -> float:
         """See `ActiveDofs`."""

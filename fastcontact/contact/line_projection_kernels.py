@@ -2,8 +2,7 @@
 """Projection of points on a curve in the plane along normals interpolated between its nodes."""
 
 from fastcontact._jit.decorators import interpretable_kernel, kernel
-from fastcontact.contact.projection_kernels import BEYOND
-from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP
+from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from fastcontact._jit.parallel import portions, shared
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact import line_projection_kernels, projection_kernels
+from fastcontact.contact import line_projection_kernels
 from fastcontact.contact.search.closest import Closest
 from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
@@ -153,6 +153,8 @@ def facet_normals(block: FacetBlock, coordinates: Array) -> Array:
     element, nodes = elements.get(block.element), coordinates[block.facets]
     slopes = element.gradient(element.nodes)
     if element.dim == 2:
+        from fastcontact.contact import projection_kernels
+
         out = np.empty(nodes.shape)
         shared(lambda portion: projection_kernels.normals(nodes, slopes, *portion, out), portions(*block.facets.shape))
         return out
@@ -164,6 +166,8 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
     """Return the angles (n, k) of facets with nodes (n, k, dim) at their corners [radian]; 1 at other nodes and for lines."""
     if element.dim == 1:
         return np.ones(nodes.shape[:2])
+    from fastcontact.contact import projection_kernels
+
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)
     beside = np.column_stack([(around + 1) % n, (around - 1) % n])
@@ -207,6 +211,8 @@ def along_normals(
     normal : ndarray (n, 3)
         Interpolated unit normal at the projection [-].
     """
+    from fastcontact.contact import projection_kernels
+
     facet = start.facet.copy(), start.xi.copy(), start.overhang.copy(), np.empty(points.shape)
     # Coordinates are relative to the centre of the surface. Far from the origin, their round-off would exceed the tolerance.
     x = coordinates[side.points]
@@ -233,6 +239,8 @@ def _polynomials(kinds: Sequence[Array]) -> Array:
 
     `kinds` are the vectors (n, m, 3) at the nodes of the facets of each block.
     """
+    from fastcontact.contact import projection_kernels
+
     out, first = np.empty((sum(map(len, kinds)), max(kind.shape[1] for kind in kinds), 3)), 0
     for kind in kinds:
         projection_kernels.coefficients(kind, tables(kind.shape[1]).to_terms, first, 0, len(kind), out)

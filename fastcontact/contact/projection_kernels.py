@@ -8,12 +8,10 @@ in `search.facet_tables`; facets with fewer nodes than the widest kind have zero
 import numpy as np
 
 from fastcontact._jit.decorators import innermost_kernel, interpretable_kernel, kernel
-from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS, STEP, component, vector
+from fastcontact.contact.search.limits import BEYOND, MAX_ITERATIONS, STEP
+from fastcontact.contact.search.projection_3d_kernels import component, vector
 from fastcontact.contact.search.straight_3d_kernels import along, cross, dot, minus, unit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
-
-# A projection that ends farther beyond its facet than this, in facet lengths, is not trusted.
-BEYOND = 1.0
 
 
 @interpretable_kernel

@@ -21,7 +21,6 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate, stacked_rows
 from fastcontact.errors import ModelError
-from fastcontact.linear.multigrid.matrix import block_matrix
 from fastcontact.round_off import ROUND_OFF
 
 # Relative tolerance of the conditions under which supports and constraints are consistent.
@@ -50,9 +49,7 @@ class Stiffness:
 
 
 def _row_sums(K: Any, u: Array) -> Array:
-    if isinstance(K, csr_array):
-        return np.asarray(abs(K) @ np.abs(u))
-    return np.asarray((block_matrix(K) if isinstance(K, bsr_array) else K).row_sums(u))
+    return np.asarray(abs(K) @ np.abs(u) if isinstance(K, csr_array | bsr_array) else K.row_sums(u))
 
 
 class ConstrainedMotion:

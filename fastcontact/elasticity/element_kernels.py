@@ -3,9 +3,13 @@
 
 from types import ModuleType
 
-from fastcontact.elasticity import element_2d_kernels, element_3d_kernels
-
 
 def loops(dim: int) -> ModuleType:
     """Return the module with `add_stiffness`, `stress`, `largest_rotation` and `add_internal_force` for `dim` coordinates."""
-    return {2: element_2d_kernels, 3: element_3d_kernels}[dim]
+    if dim == 2:
+        from fastcontact.elasticity import element_2d_kernels
+
+        return element_2d_kernels
+    from fastcontact.elasticity import element_3d_kernels
+
+    return element_3d_kernels

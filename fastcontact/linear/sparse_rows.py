@@ -37,8 +37,10 @@ def shapes_at(shape: Array, local: NDArray[np.integer], n_nodes: int) -> csr_arr
 
     `shape` (m, n) are the shape functions of the n nodes `local` (m, n) of the cell of each point.
     """
-    row = np.broadcast_to(np.arange(len(shape))[:, None], shape.shape)
-    return coo_array((shape.ravel(), (row.ravel(), local.ravel())), shape=(len(shape), n_nodes)).tocsr()
+    m, n = shape.shape
+    shapes = csr_array((shape.flatten(), local.flatten(), n * np.arange(m + 1)), shape=(m, n_nodes))
+    shapes.sum_duplicates()
+    return shapes
 
 
 def sum_of_blocks(K: bsr_array, more: csr_array | bsr_array) -> bsr_array:
@@ -89,9 +91,21 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
 
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
+<<<<<<< HEAD
     """Return the matrix (m, n) in which rows that are round-off are empty.
 
     These are rows whose entries are less than `least` times the largest entry in the same row of `origin`.
     """
     significant = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
+=======
+    """Return the matrix (m, n) without rows whose entries are below `least` times the largest in the row of `origin`."""
+    significant = _largest_in_rows(matrix) > least * _largest_in_rows(origin)
+>>>>>>> warm
     return matrix if significant.all() else scaled(matrix, significant)
+
+
+def _largest_in_rows(matrix: csr_array) -> Array:
+    """Return the largest absolute value in each row of a matrix (m, n), zero for empty rows."""
+    largest = np.zeros(matrix.shape[0])
+    np.maximum.at(largest, np.repeat(np.arange(len(largest)), np.diff(matrix.indptr)), np.abs(matrix.data))
+    return largest

@@ -12,7 +12,6 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
-from fastcontact.model import body_overlap_kernels
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Points nearer to a surface than this, relative to the size of the model, lie on it.
@@ -98,6 +97,8 @@ def _depths(points: Array, kinds: list[Array], selected: list[Mask] | None = Non
     inside = height < 0
     unsure = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(unsure):
+        from fastcontact.model import body_overlap_kernels
+
         pieces = [corners[:, _flat_pieces(corners)].reshape(-1, *2 * corners.shape[2:]) for corners in kinds]
         number = np.empty(len(unsure))
         body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), np.concatenate(pieces), number)

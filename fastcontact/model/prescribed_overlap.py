@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array
 
-from fastcontact.arrays import Array, Mask, Numbers
+from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
@@ -95,14 +95,18 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
             continue
         # The other nodes count as facing the other side.
         others = len(usable) - len(nodes)
-        overlaps = [_at(contact, formulation, nodes, supports, instant) for instant in supports.instants()]
+        candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
+        before, _, _ = _gaps(formulation, candidates, Configuration.undeformed(formulation.points), bare=True)
+        overlaps = [_at(contact, formulation, candidates, before, supports, instant) for instant in supports.instants()]
         worst = max(overlaps, key=lambda overlap: overlap.depth)
         if worst.count:
             yield contact, formulation, replace(worst, total=worst.total + others)
 
 
-def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports: Supports, instant: float) -> Overlap:
-    """Return the overlap of some secondary nodes at an instant."""
+def _at(
+    contact: ContactPair, formulation: Formulation, candidates: Candidates, before: Array, supports: Supports, instant: float
+) -> Overlap:  # fmt: skip
+    """Return the overlap of some secondary nodes (m,) at an instant, from their gaps `before` (m,) all displacements."""
     displacement, ramp = supports.at(instant), supports.ramp
     still = np.zeros(displacement.shape[1])
     obstacle = still
@@ -111,22 +115,24 @@ def _at(contact: ContactPair, formulation: Formulation, nodes: Numbers, supports
     factor = 1.0 if contact.clearance_ramp is None else multiplier(contact.clearance_ramp, ramp, instant)
     angle = angle_at(contact, ramp, instant)
     at = Configuration(displacement, np.zeros_like(displacement), obstacle, still, factor, angle=angle)
-    candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
     if formulation.options.tied:
         depth, paired = _torn(formulation, candidates, displacement, supports.fixed)
     else:
-        depth, paired = _depth(formulation, candidates, at, supports.fixed)
+        depth, paired = _depth(formulation, candidates, before, at, supports.fixed)
     small = max(SMALL * np.abs(displacement).max(), LENGTH_ROUND_OFF * np.ptp(formulation.points, axis=0).max())
     row = int(np.argmax(depth))
-    return Overlap(int((depth > small).sum()), int(paired.sum()), float(depth[row]), int(nodes[row]), instant)
+    return Overlap(
+        int((depth > small).sum()), int(paired.sum()), float(depth[row]), int(candidates.nodes[row, 0]), instant
+    )
 
 
-def _depth(formulation: Formulation, candidates: Candidates, at: Configuration, fixed: Mask) -> tuple[Array, Mask]:
+def _depth(
+    formulation: Formulation, candidates: Candidates, before: Array, at: Configuration, fixed: Mask
+) -> tuple[Array, Mask]:
     """Return the depths of nodes (m,) in the other side due to supports [length], and which nodes face it.
 
-    Zero where the gap depends on unsupported components. Initial overlaps are subtracted.
+    Zero where the gap depends on unsupported components. Initial overlaps, by gaps `before` (m,), are subtracted.
     """
-    before, rows, paired = _gaps(formulation, candidates, Configuration.undeformed(formulation.points), bare=True)
     gap, rows, paired = _gaps(formulation, candidates, at)
     if formulation.options.always_closed:
         depth = np.abs(gap) - np.abs(before)

@@ -167,61 +167,76 @@ def _plain(value: Any) -> Any:
     return str(value)
 
 
-def append_fields(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+class OpenObjects(dict[str, Any]):
+    """Groups and data sets of a file by path, each opened once; None for one that earlier versions did not create."""
+
+    def __init__(self, file: Any) -> None:
+        self.file = file
+
+    def __missing__(self, path: str) -> Any:
+        self[path] = known = self.file.get(path)
+        return known
+
+
+def append_fields(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
     """Write the point and cell fields of step `number`, overwriting remains of a writer that was stopped."""
-    points, cells = file["VTKHDF/PointData"], file["VTKHDF/CellData"]
     by_cell = {name: step.cell_fields[name] for name in cell_fields}
-    by_cell |= layout.material_fields(mesh, step) if layout.CELL_STRESS in cells else {}
-    for group, fields in ((points, layout.point_fields(mesh, step)), (cells, by_cell)):
+    by_cell |= layout.material_fields(mesh, step) if _has_material_stress(file) else {}
+    for group, fields in (("PointData", layout.point_fields(mesh, step)), ("CellData", by_cell)):
         for name, values in fields.items():
-            if name in group:  # earlier versions created fewer
-                _extend(group[name], values, number * len(values))
+            table = file[f"VTKHDF/{group}/{name}"]
+            if table is not None:
+                _extend(table, values, number * len(values))
+
+
+def _has_material_stress(file: OpenObjects) -> bool:
+    return file[f"VTKHDF/CellData/{layout.CELL_STRESS}"] is not None
 
 
 def append_tables(
-    file: Any, mesh: Mesh, number: int, step: StepResult, pairs: dict[str, Any], notes: Mapping[str, Any]
+    file: OpenObjects, mesh: Mesh, number: int, step: StepResult, pairs: dict[str, Any], notes: Mapping[str, Any]
 ) -> None:
     """Write contact tables, iterations, warnings and further `notes`; new pairs are added to `pairs`, by name."""
-    group = file["fastcontact"]
     for name in step.contact:
         if name not in pairs:
-            pairs[name] = _new_pair(group["contact"], name, mesh.dim, layout.further_columns(step.contact[name]))
+            pairs[name] = _new_pair(
+                file["fastcontact/contact"], name, mesh.dim, layout.further_columns(step.contact[name])
+            )
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
     if step.material_stress is not None:
-        _append_sides(group, mesh, number, step.material_stress)
+        _append_sides(file["fastcontact"], mesh, number, step.material_stress)
     contact = [[name, contact.formulation] for name, contact in step.contact.items()]
     text = as_json({**notes, "contact": contact, "iterations": step.iterations, "warnings": list(step.warnings)})
-    table = group["notes"]
+    table = file["fastcontact/notes"]
     row = (step.index, step.load_factor, len(table), len(text))
     _extend(table, np.frombuffer(text.encode("ascii"), np.uint8))
-    _set_row(group["steps"], number, np.array(row, layout.STEP_ROW))
+    _set_row(file["fastcontact/steps"], number, np.array(row, layout.STEP_ROW))
 
 
-def append_rows(file: Any, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
+def append_rows(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
     """Write the positions of the fields of step `number` for viewers."""
-    steps = file["VTKHDF/Steps"]
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
-        _set_row(steps[name], number, value)
-    further = layout.MATERIAL_FIELDS if layout.CELL_STRESS in file["VTKHDF/CellData"] else ()
+        _set_row(file[f"VTKHDF/Steps/{name}"], number, value)
+    further = layout.MATERIAL_FIELDS if _has_material_stress(file) else ()
     for name in (*cell_fields, *further):
-        _set_row(steps["CellDataOffsets"][name], number, number * len(file["VTKHDF/Types"]))
+        _set_row(file[f"VTKHDF/Steps/CellDataOffsets/{name}"], number, number * len(file["VTKHDF/Types"]))
 
 
-def append_run(file: Any, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
+def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
     """Write the record of a run that ended after `n_steps` steps, as JSON; `flush` flushes the file."""
-    group, text = file["fastcontact"], as_json(run)
-    row = np.array((n_steps, len(group["notes"]), len(text)), layout.RUN_ROW)
-    _extend(group["notes"], np.frombuffer(text.encode("ascii"), np.uint8))
+    notes, runs, text = file["fastcontact/notes"], file["fastcontact/runs"], as_json(run)
+    row = np.array((n_steps, len(notes), len(text)), layout.RUN_ROW)
+    _extend(notes, np.frombuffer(text.encode("ascii"), np.uint8))
     flush()
-    _set_row(group["runs"], len(group["runs"]), row)
+    _set_row(runs, len(runs), row)
     flush()
 
 
-def set_restart(file: Any, number: int, state: NDArray[np.uint8]) -> None:
+def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> None:
     """Write the packed restart state of step `number`; the table never shrinks, because HDF5 would reuse the space."""
-    table = file["fastcontact"][layout.restart_table(number)]
+    table = file[f"fastcontact/{layout.restart_table(number)}"]
     if len(table) < len(state):
         table.resize(len(state), axis=0)
     table[: len(state)] = state
@@ -251,17 +266,17 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
-def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> Any:
+def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> dict[str, Any]:
     pair = parent.create_group(None)  # unnamed until complete, in case of an interrupt
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim, further))
     growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair
-    return pair
+    return dict(pair)
 
 
-def _append_contact(pair: Any, number: int, contact: ContactResult | None) -> None:
+def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | None) -> None:
     """Append a pair's state; a step without it gets a row of zeros."""
     rows, steps = pair["rows"], pair["steps"]
     row = np.zeros((), steps.dtype)

@@ -134,7 +134,7 @@ class ResultWriter:
         self._synchronise, self._started = synchronise, time.monotonic()
         self._cell_fields = _checked_names(cell_fields, mesh)
         self._mesh: Mesh = mesh
-        self._pairs: dict[str, Any] = {}
+        self._pairs: dict[str, dict[str, Any]] = {}
         self._file: Any = None
         self._committed: Any = None
         self._closed = self._ended = False
@@ -236,15 +236,15 @@ class ResultWriter:
             self._reserve(2 * room if self._committed.synchronised else room)
             # Fields, rows and number of steps are flushed in this order, unless a single journal contains all of them.
             in_parts = not self._committed.synchronised or room > journal.LARGEST
-            write_arrays.append_fields(self._file, self._mesh, self.n_steps, step, self._cell_fields)
-            write_arrays.append_tables(self._file, self._mesh, self.n_steps, step, self._pairs, self._notes)
-            write_arrays.set_restart(self._file, self.n_steps, restart)
+            write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
+            write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
+            write_arrays.set_restart(self._objects, self.n_steps, restart)
             if in_parts:
                 self._flush()
-            write_arrays.append_rows(self._file, self._mesh, self.n_steps, step, self._cell_fields)
+            write_arrays.append_rows(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             if in_parts:
                 self._flush()
-            self._file["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
+            self._objects["VTKHDF/Steps"].attrs.modify("NSteps", np.int64(self.n_steps + 1))
             self._flush()
             self.n_steps += 1
             self._last = step.index, _case_of(step)
@@ -298,7 +298,7 @@ class ResultWriter:
                     self._check_ours()
                     if self._committed.writable:
                         self._reserve(len(write_arrays.as_json(run)))
-                        write_arrays.append_run(self._file, self.n_steps, run, self._flush)
+                        write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
                 finally:
                     try:
                         self._file.close()
@@ -332,8 +332,9 @@ class ResultWriter:
             except BaseException:
                 self._committed.close()
                 raise
+            self._objects = write_arrays.OpenObjects(self._file)
             pairs = self._file["fastcontact/contact"].values()
-            self._pairs = {json.loads(read_text(pair["name"], self._committed)): pair for pair in pairs}
+            self._pairs = {json.loads(read_text(pair["name"], self._committed)): dict(pair) for pair in pairs}
 
     def _check_in_place(self) -> None:
         """Raise FileError if the file is no longer at its path, or an earlier write has failed."""

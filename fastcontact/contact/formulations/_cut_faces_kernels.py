@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, innermost_kernel, interpretable_kernel, kernel
 from fastcontact.contact.search.box_tree_kernels import DEPTH
-from fastcontact.contact.search.projection_3d_kernels import MAX_ITERATIONS
+from fastcontact.contact.search.limits import MAX_ITERATIONS
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 # A polygon of up to 4 corners clipped by one of up to 4 has at most 8.

@@ -39,7 +39,7 @@ from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
 from fastcontact.contact.prescribed_normals import Normals
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
-from fastcontact.contact.projection_kernels import BEYOND
+from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled

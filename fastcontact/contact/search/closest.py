@@ -9,10 +9,9 @@ import numpy as np
 
 from fastcontact._jit.parallel import portions, shared
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.search import facets_3d_kernels, search_2d_kernels, search_3d_kernels
+from fastcontact.contact.search import search_2d_kernels
 from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
-from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
 from fastcontact.errors import ContactError
 
 # Number of consecutive points in the order of the search that need not be sorted among themselves.
@@ -83,6 +82,9 @@ def _on_lines(points: Array, corners: Array, closest: Closest) -> None:
 
 
 def _on_faces(points: Array, corners: Array, closest: Closest) -> None:
+    from fastcontact.contact.search import facets_3d_kernels, search_3d_kernels
+    from fastcontact.contact.search.projection_3d_kernels import Domain, Facets
+
     n, kind = len(corners), tables(corners.shape[1])
     numbers, order = tree_order(corners[:, 0].copy(), 1), tree_order(points, TOGETHER)
     midst = 0.5 * (corners.min(axis=0).min(axis=0) + corners.max(axis=0).max(axis=0))

@@ -11,12 +11,9 @@ import numpy as np
 
 from fastcontact._jit.decorators import inlined_kernel, kernel
 from fastcontact.arrays import Array, Indices
+from fastcontact.contact.search.limits import MAX_ITERATIONS, STEP
 from fastcontact.contact.search.straight_3d_kernels import cross, dot, minus, on_flat, rest, unit
 from fastcontact.round_off import ROUND_OFF
-
-# Steps in reference coordinates below which a projection has converged.
-STEP = 1e-13
-MAX_ITERATIONS = 100
 
 
 class Facets(NamedTuple):
