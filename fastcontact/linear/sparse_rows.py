@@ -91,16 +91,11 @@ def taken(matrix: csr_array, rows: Indices) -> csr_array:
 
 
 def without_remnants(matrix: csr_array, origin: csr_array, least: float) -> csr_array:
-<<<<<<< HEAD
     """Return the matrix (m, n) in which rows that are round-off are empty.
 
     These are rows whose entries are less than `least` times the largest entry in the same row of `origin`.
     """
-    significant = abs(matrix).max(axis=1).toarray() > least * abs(origin).max(axis=1).toarray()
-=======
-    """Return the matrix (m, n) without rows whose entries are below `least` times the largest in the row of `origin`."""
     significant = _largest_in_rows(matrix) > least * _largest_in_rows(origin)
->>>>>>> warm
     return matrix if significant.all() else scaled(matrix, significant)
 
 
