@@ -433,6 +433,6 @@ def test_pages_tell_the_limits_of_meshio():
     gib, times = meshio_process.MEMORY >> 30, meshio_process.MEMORY_PER_BYTE
     assert f"to {gib} GiB plus {times} times the size of the file" in (docs / "promises.md").read_text("utf-8")
     told = " ".join((docs / "io.md").read_text("utf-8").split())
-    assert f"memory is limited to {gib} GiB plus {times} times the size of the file" in told
+    assert f"limited to {gib} GiB plus {times} times the size of the file" in told
     each = meshio_process.SECONDS_PER_BYTE * 1e6
     assert f"its CPU time to {meshio_process.SECONDS:g} s plus {each:g} s per megabyte" in told
