@@ -166,8 +166,8 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed, enough = None, tolerances.enough(moved.size)
-        if mixing.newton(moved.change, enough) and solution.settled and nodes is None:
-            stepped = newton_step(step, constraints, solution, moved.before, displacement, enough / moved.change)
+        if mixing.newton(moved.change, enough) and solution.settled:
+            stepped = newton_step(step, constraints, solution, moved.before, displacement, enough / moved.change, nodes)
             mixed = None if stepped is None else mixing.stepped(*stepped)
         if mixed is None:
             mixed = mixing.next(moved.before, displacement, solution, tolerances.inexact, constraints)

@@ -19,6 +19,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.inequalities import StepContext
+from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
@@ -29,8 +30,9 @@ ACCURACY, AT_END, MOST = 1e-6, 0.01, 20
 
 
 def newton_step(
-    step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array, accuracy: float
-) -> tuple[Array, float] | None:
+    step: StepContext, constraints: StackedConstraints, solution: Solution, before: Array, image: Array, accuracy: float,
+    nodes: SharedNodes | None = None,
+) -> tuple[Array, float] | None:  # fmt: skip
     """Return the active displacements (k,) of the next pairing [length], and the norm of S'; None without derivatives.
 
     Parameters
@@ -39,14 +41,19 @@ def newton_step(
     constraints : StackedConstraints
         Paired at displacements `before` (k,) [length].
     solution : Solution
-        Solution with these constraints.
+        Solution with these constraints, of those of shared nodes with their representatives.
     before, image : ndarray (k,)
         Active displacements of the pairing and of the solution [length]; displacements on which contact does not depend are
         taken from the latter.
     accuracy : float
         Relative accuracy of the change that suffices.
+    nodes : SharedNodes, optional
+        Nodes that several pairs, or both ends of a period, share.
     """
-    displacement = step.problem.displacement(step.dofs.put(step.state.u.copy(), image))
+    u = step.dofs.put(step.state.u.copy(), image)
+    displacement = step.problem.displacement(u)
+    if nodes is not None:
+        solution = nodes.shared(solution, constraints, u)
     if solution.response is None or not (parts := _linearised(constraints, solution, displacement)):
         return None
     try:
@@ -66,7 +73,8 @@ def newton_step(
             varied, changed = part.along(nodal)
             gaps[: len(changed), rows] = changed
             force[: varied.size] += varied.ravel()
-        return v - step.dofs.varied(respond(step.dofs.reduced(force), gaps))[where]
+        merged = gaps if nodes is None else nodes.merged(gaps)
+        return v - step.dofs.varied(respond(step.dofs.reduced(force), merged))[where]
 
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)

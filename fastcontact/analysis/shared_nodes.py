@@ -124,6 +124,10 @@ class SharedNodes:
         vectors = np.einsum("mk,mkd->md", weight[:, None] * along, self.frame)
         return np.einsum("md,mkd->mk", self.summed(vectors), self.frame)
 
+    def merged(self, gaps: Array) -> Array:
+        """Return the mean gaps and slips (1 + k, m) of representatives, given those of all constraints [length]."""
+        return np.vstack([self._at_places(self.part) @ gaps[0], self._mean(gaps[1:].T, self.along).T])
+
     def gathered(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
     ) -> tuple[Array, Array, Array, Array]:

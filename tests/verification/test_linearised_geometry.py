@@ -50,14 +50,14 @@ def blocks(mesh, **options):
     return model
 
 
-# Nodes on axes and planes of symmetry project onto the ends of facets, where projections have kinks. The derivative of
-# weighted gaps leaves out how cuts and weights move, and in 3D replaces integrals over segments by those over facets.
-EXACT, ON_AXIS, ON_PLANES, WEIGHTED, IN_SPACE = 1e-7, 1e-5, 1e-4, 0.01, 0.1
+# The derivative of weighted gaps leaves out how cuts and weights move, and in 3D replaces integrals over segments by those
+# over facets.
+EXACT, WEIGHTED, IN_SPACE = 1e-7, 0.01, 0.1
 FRICTION = {"friction": 0.3}
 DERIVATIVES = [
     # model, mesh, options, allowed error of the derivative
-    (half_spheres, "A", {"formulation": "node_to_segment"}, ON_AXIS),
-    (half_spheres, "A", {"formulation": "node_to_segment", "normals": "averaged"}, ON_AXIS),
+    (half_spheres, "A", {"formulation": "node_to_segment"}, EXACT),
+    (half_spheres, "A", {"formulation": "node_to_segment", "normals": "averaged"}, EXACT),
     (half_spheres, "A", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (half_spheres, "A", {"formulation": "node_to_segment", "normals": "averaged", **FRICTION}, EXACT),
     (half_spheres, "B", {"formulation": "continuous"}, EXACT),
@@ -70,7 +70,7 @@ DERIVATIVES = [
     (blocks, "quad4", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (blocks, "quad8", {"formulation": "continuous", **FRICTION}, EXACT),
     (blocks, "quad4", {"formulation": "mortar", "multipliers": "dual", **FRICTION}, WEIGHTED),
-    (ball_on_block, "tet4", {"formulation": "node_to_segment"}, ON_PLANES),
+    (ball_on_block, "tet4", {"formulation": "node_to_segment"}, EXACT),
     (ball_on_block, "tet4", {"formulation": "node_to_segment", **FRICTION}, EXACT),
     (ball_on_block, "hex8", {"formulation": "continuous", **FRICTION}, EXACT),
     (ball_on_block, "hex8", {"formulation": "continuous", "slip": "primary", **FRICTION}, EXACT),
@@ -98,6 +98,9 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
 
     here = paired(u)
     closed = here.usable & (here.gap0 + here.B @ u < 1e-3)
+    if not here.tangents and here.nodes is not None:
+        # Nodes on the axis and on planes of symmetry face the ends of facets, where derivatives are one-sided.
+        closed &= problem.system.free.reshape(points.shape)[here.nodes].all(axis=1)
     multiplier = np.where(closed, rng.uniform(0.5, 1.0, len(here)), 0.0)
     slides = np.array([closed & (np.diff(T.indptr) > 0) for T in here.tangents], bool).reshape(-1, len(here)).T
     tangential = np.where(slides, rng.uniform(-0.3, 0.3, slides.shape), 0.0)

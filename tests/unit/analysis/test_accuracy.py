@@ -85,10 +85,10 @@ def test_soft_parts_balance_beside_parts_a_million_times_as_stiff(solver, option
 def test_friction_of_a_stiff_secondary_side_balances(unit):
     model = stacked(1e6, unit=unit)
     found, expected = solved(model, "amg"), solved(model, "direct")
-    assert out_of_balance(model, found) < 1e-6
-    assert found.iterations["linear_iterations"] < 400
+    assert out_of_balance(model, found) < 2e-7
+    assert found.iterations["linear_iterations"] <= 260
     forces = expected.contact["c"].force_vectors
-    assert np.abs(found.contact["c"].force_vectors - forces).max() < 1e-6 * np.abs(forces).max()
+    assert np.abs(found.contact["c"].force_vectors - forces).max() < 3e-7 * np.abs(forces).max()
 
 
 @pytest.mark.filterwarnings("ignore:Young's moduli", "ignore:.*across its radius")
