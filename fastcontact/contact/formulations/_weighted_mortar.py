@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,23 @@ from fastcontact.round_off import SINGLE_PRECISION, TINY
 MULTIPLIERS = ("standard", "dual")
 # A tangent of which a smaller fraction, squared, is free counts as held.
 FREE = 0.1
+
+
+class Coverage(NamedTuple):
+    """The overlap of both sides, and what of the test functions lies on it.
+
+    Attributes
+    ----------
+    overlap : Overlap
+    weights : list of ndarray (n_facets, k)
+        Integrals over the overlap of the k test functions of the facets of each block [area].
+    kept : ndarray of bool (m,)
+        Whether a secondary node has a gap.
+    """
+
+    overlap: Overlap
+    weights: list[Array]
+    kept: Mask
 
 
 @dataclass(eq=False)
@@ -116,9 +133,9 @@ class WeightedMortar(Formulation):
         """Intersect the facets on the deformed configuration and return one weighted gap per node."""
         deformed = self.points + at.displacement
         overlap = self._overlap(deformed, at.pose)
-        covered = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        kept = self._taking_part(covered)
-        rows, across, closer = self._weighted(overlap, covered, kept)
+        weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
+        coverage = Coverage(overlap, weights, self._taking_part(weights))
+        rows, across, closer = self._weighted(coverage)
         # Left out altogether: the functions of its neighbours are not extended over the area of an excluded node.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
@@ -130,7 +147,7 @@ class WeightedMortar(Formulation):
         if at.worn is not None:
             gap0 += rows @ at.worn / weight
         points, nodes = self.secondary.points, self.secondary.points.astype(np.intp)
-        geometry = partial(self._linearised, at, overlap, covered, kept, normal, weight)
+        geometry = partial(self._linearised, at, coverage, normal, weight)
         constraints = Constraints(
             B, gap0, self.points[points], areas=weight, nodes=nodes, nodal=self._nodal(weight), geometry=geometry
         )
@@ -142,7 +159,7 @@ class WeightedMortar(Formulation):
         for along, where in held:
             projectors[where] += along[where, :, None] * along[where, None, :]
         directions, rubbing = self.options.rubbing(tangents(normal, projectors), candidates)
-        slips, beside = self._slips(rubbing, held, overlap, covered, kept, mean, rows, weight)
+        slips, beside = self._slips(rubbing, held, coverage, mean, rows, weight)
         length, between = self._closing(constraints, normal, at)
         closing = length[:, None] * between
         slip0 = self._slip0(mean, closing, rubbing, at)
@@ -160,8 +177,8 @@ class WeightedMortar(Formulation):
         )
 
     def _linearised(
-        self, at: Configuration, overlap: Overlap, covered: list[Array], kept: Mask, normal: Array, weight: Array,
-        multiplier: Array, tangential: Array, displacement: Array, slipping: tuple[Array, csr_array, Array] | None = None,
+        self, at: Configuration, coverage: Coverage, normal: Array, weight: Array, multiplier: Array, tangential: Array,
+        displacement: Array, slipping: tuple[Array, csr_array, Array] | None = None,
     ) -> WeightedForces:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
@@ -169,14 +186,14 @@ class WeightedMortar(Formulation):
         the points of the segments are not known, Gauss points of whole facets replace them: the integrand is continuous
         across the cuts.
         """
-        at, acts = replace(at, displacement=displacement), multiplier != 0.0
+        at, acts, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
             inside = self._whole_facets(block) if overlap.points is None else overlap.points[number]
             facet, shape, area = (values[acts[block.local].any(axis=1)[inside.facet]] for values in inside)
             T = self._test[number]
-            psi, _ = self._functions(T, mass, kept[block.local], self._fraction(number, covered))
+            psi, _ = self._functions(T, mass, coverage.kept[block.local], self._fraction(number, coverage.weights))
             columns = first + np.arange(len(facet))[:, None]
             functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
             tests.add(block.local[facet], columns, (area[:, None] * (shape @ T.T))[:, :, None])
@@ -220,10 +237,10 @@ class WeightedMortar(Formulation):
             return faced(here, pairing, all_nodes, self.primary, deformed, self.normals, pose)
         return NodalNormals(self.secondary, deformed) if self.normals == "secondary" else None
 
-    def _fraction(self, number: int, covered: list[Array]) -> Array:
+    def _fraction(self, number: int, weights: list[Array]) -> Array:
         """Return the fraction (n_facets, k) of the weights of a block's functions that faces the other side."""
         full_area = self._whole[number]
-        return np.where(full_area > 0.0, covered[number] / np.where(full_area > 0.0, full_area, 1.0), 0.0)
+        return np.where(full_area > 0.0, weights[number] / np.where(full_area > 0.0, full_area, 1.0), 0.0)
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
@@ -273,8 +290,8 @@ class WeightedMortar(Formulation):
         return gap / np.where(lean > 0.0, lean, 1.0), between
 
     def _slips(
-        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], overlap: Overlap, covered: list[Array],
-        kept: Mask, mean: csr_array, own: csr_array, weight: Array,
+        self, directions: Sequence[Array], without_slip: list[tuple[Array, Mask]], coverage: Coverage, mean: csr_array,
+        own: csr_array, weight: Array,
     ) -> tuple[tuple[csr_array, ...], list[tuple[Array, Mask, csr_array]]]:  # fmt: skip
         """Return rows (m, n_dofs) of the slips along tangents (m, dim).
 
@@ -287,9 +304,9 @@ class WeightedMortar(Formulation):
         rows, beside = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for along, nodes in without_slip:
-            if not (nodes & kept).any():
+            if not (nodes & coverage.kept).any():
                 continue
-            on_secondary, across, _ = self._weighted(overlap, covered, kept & ~nodes)
+            on_secondary, across, _ = self._weighted(coverage._replace(kept=coverage.kept & ~nodes))
             other = csr_array(scaled(csr_array(on_secondary - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
@@ -302,18 +319,19 @@ class WeightedMortar(Formulation):
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
         return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), beside
 
-    def _weighted(self, overlap: Overlap, covered: list[Array], kept: Mask) -> tuple[csr_array, csr_array, Array]:
+    def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
 
         The third result are the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
-        [volume]. `covered` are the weights (n_facets, k) of the functions of each block, `kept` (m,) the nodes with gaps.
+        [volume].
         """
+        overlap, weights, kept = coverage
         size = (len(self.secondary.points), len(self.points))
         rows, across, functions = Entries(), Entries(), {}
         closer = np.zeros((size[0], self.points.shape[1]))
         for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
             psi, products = self._functions(
-                self._test[number], mass, kept[block.local], self._fraction(number, covered)
+                self._test[number], mass, kept[block.local], self._fraction(number, weights)
             )
             rows.add(block.local, block.facets, products)
             functions[block.element] = psi
