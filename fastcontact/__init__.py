@@ -1,6 +1,6 @@
-"""fastcontact: fast, trustworthy elastic-contact finite elements.
+"""fastcontact: fast finite elements for elastic contact problems.
 
-Public names load on first use, so that ``import fastcontact`` takes about 0.02 s.
+Public names are imported on first use, which keeps ``import fastcontact`` at about 0.02 s.
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from typing import Any
 
 from fastcontact._version import __version__ as __version__
 
-# OpenBLAS threads spin for a tenth of a second after their creation. The library reads the setting once, when NumPy or SciPy
-# is first imported.
+# By default, idle OpenBLAS threads spin for about 0.1 s before they sleep. OpenBLAS reads this variable once, when NumPy or
+# SciPy is first imported.
 os.environ.setdefault("OPENBLAS_THREAD_TIMEOUT", "4")
 
 logging.getLogger(__name__).addHandler(logging.NullHandler())  # no output unless the user configures logging
 
-# Public modules, and public names, by where they are defined. Type checkers read `__init__.pyi`.
+# Public modules, and public names by the module that defines them. Type checkers read `__init__.pyi`.
 _MODULES = {
     "analytic": "analytic",
     "generate": "mesh.generate",

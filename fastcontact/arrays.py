@@ -1,7 +1,4 @@
-"""Types of arrays by content, and a check for masked arrays, which are refused.
-
-Most NumPy functions treat masked entries as if they were valid.
-"""
+"""Types of arrays, and a check that rejects masked arrays, whose masked entries most NumPy functions treat as valid."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from numpy.typing import NDArray
 
 Array: TypeAlias = NDArray[np.float64]
 Mask: TypeAlias = NDArray[np.bool_]
-# Indices into other arrays; numbers of points and cells in meshes; arrays of any kind.
+# Indices into arrays, numbers of points and cells of meshes, and arrays of any type.
 Indices: TypeAlias = NDArray[np.intp]
 Numbers: TypeAlias = NDArray[np.int32]
 AnyArray: TypeAlias = NDArray[Any]
@@ -22,7 +19,7 @@ REFUSAL = "has entries that are masked, and masks are not kept: fill them first,
 
 
 def is_masked(value: Any) -> bool:
-    """Return whether an array, or one nested in sequences or dictionaries, has masked entries."""
+    """Return whether an array, or an array nested in sequences or dictionaries, has masked entries."""
     if isinstance(value, np.ndarray):
         return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
     if isinstance(value, Mapping):

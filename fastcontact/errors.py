@@ -1,4 +1,4 @@
-"""Every exception and warning that fastcontact raises, under one base class."""
+"""Exceptions and warnings of fastcontact, and the texts of messages about unknown names."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ LONGEST = 1500  # largest number of characters of a message
 
 
 def printable(text: str) -> str:
-    """Return a text in which control and format characters, except line ends, are replaced by escapes."""
+    """Return a text in which escapes replace control and format characters, except line ends and tabs."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
 
 
 class FastcontactError(Exception):
-    """Base class of every error that fastcontact raises deliberately; its message is one line."""
+    """Base class of the errors that fastcontact raises, whose messages are one line."""
 
     def __str__(self) -> str:
-        # Names and values from files may contain anything: line ends, terminal control codes, thousands of characters.
+        # Names and values from files may contain line ends, control characters and thousands of characters.
         text = printable(" ".join(super().__str__().splitlines()))
         return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 3 :]}"
 
 
 class MeshError(FastcontactError):
-    """The mesh cannot be used: an invalid cell, a missing group, a wrong number."""
+    """A mesh is invalid, for example because of an inverted cell or a missing group."""
 
 
 class ModelError(FastcontactError):
-    """The model is incomplete or contradictory (materials, supports, loads)."""
+    """A model or an argument is incomplete, invalid or contradictory, for example a material, a support or a load."""
 
 
 class ContactError(FastcontactError):
-    """A contact pair cannot be set up: wrong side, empty surface, illegal option."""
+    """A contact pair is invalid, for example because of an empty surface or an invalid option."""
 
 
 class CaseError(FastcontactError):
-    """A case file or a command-line option is wrong."""
+    """A case file, an input deck or a command-line option is invalid."""
 
 
 class FileError(FastcontactError):
@@ -55,7 +55,7 @@ class ConvergenceError(FastcontactError):
     Attributes
     ----------
     history : list of dict
-        One entry per iteration of the failed step: residual, active constraints, displacement change.
+        Residual, active constraints and change of the displacement in each iteration of the failed step.
     smaller_steps_help : bool
         Whether smaller load steps may converge.
     """
@@ -69,7 +69,7 @@ class ConvergenceError(FastcontactError):
 
 
 class FastcontactWarning(UserWarning):
-    """A doubtful model or result; the message states a number."""
+    """A model or a result is doubtful; the message quantifies the reason."""
 
     def __str__(self) -> str:
         return printable(super().__str__())
@@ -77,7 +77,7 @@ class FastcontactWarning(UserWarning):
 
 @contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Prefix errors of the package from the block with a file name, or a location in it, unless they have one."""
+    """Prefix the messages of errors in the block with a file name, unless they contain it."""
     try:
         yield
     except FastcontactError as error:
@@ -87,7 +87,7 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def warn(text: str) -> None:
-    """Issue a FastcontactWarning at the calling line outside the package."""
+    """Issue a FastcontactWarning that refers to the line outside the package from which it was called."""
     package = os.path.dirname(__file__) + os.sep
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
@@ -95,24 +95,22 @@ def warn(text: str) -> None:
     warnings.warn(text, FastcontactWarning, stacklevel=level)
 
 
-# Largest number of characters that a message shows of an unknown name.
+# Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
 
 
 def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:
-    """Return the error for a name that a module does not have, with the nearest ones."""
+    """Return the AttributeError for a name that a module lacks, with the nearest known names."""
     text = f"module '{module}' has no attribute '{name}'"
-    if name.startswith("_"):  # a name probed by tools
+    if name.startswith("_"):  # tools look up such names
         return AttributeError(text)
     near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
     remedy = ": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
-    return AttributeError(
-        text + remedy, name=name, obj=text
-    )  # with a text as object, Python does not append its own suggestions
+    return AttributeError(text + remedy, name=name, obj=text)  # a text as `obj` prevents suggestions by Python
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a module with lazily loaded public names."""
+    """Return ``__getattr__`` and ``__dir__`` for a module with the public names `known`."""
 
     def missing(name: str) -> object:
         raise no_attribute(module, name, known)
@@ -123,13 +121,13 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
 def check_known(
     kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
 ) -> None:
-    """Raise `error` for a name that is not among the `known` ones, with the nearest of them, and `about` before its text."""
+    """Raise `error` with the nearest known names unless a name is in `known`; `about` precedes the message."""
     if not isinstance(name, str) or name not in known:
         raise error(about + unknown(kind, str(name), known))
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return the message for an unknown name: the name, and the nearest known names or, if none is near, the first ones."""
+    """Return the message for an unknown name, with the nearest known names or, if none is near, the first known names."""
     names, name = sorted(known), str(name)
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:

@@ -1,10 +1,10 @@
-"""Relative bounds of round-off: smaller values count as zero."""
+"""Relative tolerances for round-off, below which values are taken for zero."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Entries after cancellation or rotation, relative to the largest entry.
+# Entries of arrays after cancellation or rotation, relative to the largest entry.
 ROUND_OFF = 1e-12
 # Lengths, energies, directions and shape functions computed from coordinates of meshes, which files store with about ten
 # digits, relative to their magnitude.
@@ -13,8 +13,8 @@ LENGTH_ROUND_OFF = 1e-9
 SINGLE_PRECISION = 1e-6
 # Round-off of a sum, relative to the sum of the magnitudes of its terms.
 SUM_ROUND_OFF = 16 * float(np.finfo(float).eps)
-# Step of central differences, relative to the size of the argument: their error of second order is then about what round-off
-# makes of them.
+# Step of central differences, relative to the size of the argument, at which truncation and round-off errors are of the same
+# order.
 DIFFERENCES = float(np.finfo(float).eps) ** (1.0 / 3.0)
-# In place of a divisor that may be zero.
+# Lower bound of divisors that may vanish.
 TINY = 1e-300

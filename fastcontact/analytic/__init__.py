@@ -1,11 +1,12 @@
 """Closed-form solutions of contact mechanics.
 
-Each file holds one theory: a frozen result class, and a function that returns it. `THEORIES` lists the functions that
-case files can name. All normal contacts have `radius` (half-width in the plane), `force`, `pressure_max` and
-`pressure(distance)`. Units are those of the caller; forces of plane problems are per unit length.
+Each module contains one theory: a frozen result class and a function that returns an instance of the class. `THEORIES`
+lists the functions that case files can name. All normal contacts have `radius` (the half-width in plane problems),
+`force`, `pressure_max` and `pressure(distance)`. Units are those of the caller; forces of plane problems are per unit
+length.
 
-Positions are numbers or arrays of any shape (...), which is also the shape of results. Numbers out of range, or two
-loads where one is needed, raise ModelError.
+Positions are numbers or arrays of any shape (...), and results have the same shape. ModelError is raised for a number out
+of range, and if several loads are given where exactly one is needed.
 """
 
 from __future__ import annotations

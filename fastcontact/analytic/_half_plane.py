@@ -2,8 +2,8 @@
 
 The half-plane is y <= 0 and carries the pressure p0 sqrt(1 - x^2/b^2) on |x| <= b. With k = |y| + i x and the root w =
 sqrt(b^2 + k^2), Re w >= 0, the harmonic function that equals the pressure on the surface is p0/b Re(w - k) (McEwen 1949;
-Johnson 1985, eq. 4.49). Displacements are measured from the point (0, 0): in a half-plane there is no point at infinity
-to measure from. Plane stress: the same with nu/(1 + nu) for nu and the same shear modulus.
+Johnson 1985, eq. 4.49). Displacements are relative to the point (0, 0), since the displacement of a half-plane is unbounded
+at infinity. The displacements in plane stress follow with nu/(1 + nu) instead of nu and the same shear modulus.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ ComplexArray = NDArray[np.complex128]
 
 
 def _roots(x: ArrayLike, y: ArrayLike, b: float) -> tuple[Array, ComplexArray, ComplexArray, ComplexArray]:
-    """Return depth, k, w and w - k (...) [-], all divided by b."""
+    """Return the depth, k, w and w - k (...) [-], each divided by b."""
     across, depth = np.broadcast_arrays(array("x", x) / b, below_surface(y, b) / b)
     k = depth + 1j * across
     square = np.empty(k.shape, dtype=np.complex128)
     square.real = (1.0 - across) * (1.0 + across) + depth**2
     square.imag = 2.0 * across * depth
     w = np.sqrt(square)
-    w = w.real + 1j * np.copysign(w.imag, across)  # outside the contact, on the surface, the sign is that of x
-    return depth, k, w, 1.0 / (w + k)  # (w - k)(w + k) = b^2; the difference itself would lose digits far away
+    w = w.real + 1j * np.copysign(w.imag, across)  # on the surface outside the contact, Im w has the sign of x
+    return depth, k, w, 1.0 / (w + k)  # (w - k)(w + k) = b^2; the difference w - k cancels far from the contact
 
 
 def stress(x: ArrayLike, y: ArrayLike, b: float, p0: float, nu: float, kinematics: str) -> Array:
-    """Return stresses (..., 4) xx, yy, zz, xy [pressure] at `x` (...) [length], `y` (...) [length] (McEwen 1949)."""
+    """Return the stresses (..., 4) xx, yy, zz, xy [pressure] at `x` (...) [length], `y` (...) [length] (McEwen 1949)."""
     depth, _, w, q = _roots(x, y, b)
     inside = depth > 0.0
-    gradient = depth * q / np.where(inside, w, 1.0)  # the depth times -dq/dk; w vanishes only on the surface
+    gradient = depth * q / np.where(inside, w, 1.0)  # depth times -dq/dk; w vanishes only on the surface
     xx, yy = -(q - gradient).real, -(q + gradient).real
     zz = nu * (xx + yy) if kinematics == "plane_strain" else np.zeros_like(xx)
     return p0 * np.stack([xx, yy, zz, -gradient.imag], axis=-1)
 
 
 def displacement(x: ArrayLike, y: ArrayLike, b: float, p0: float, E: float, nu: float, kinematics: str) -> Array:
-    """Return displacements (..., 2) along x, y [length] at `x` (...) [length], `y` (...) [length] from the point (0, 0).
+    """Return the displacements (..., 2) [length] at `x` (...) [length], `y` (...) [length], relative to the point (0, 0).
 
-    With H the integral of w - k over k, 2 G u_x = (p0/b) [y Im(w - k) - (1 - 2 nu) Im H] and
+    With the integral H of w - k over k, 2 G u_x = (p0/b) [y Im(w - k) - (1 - 2 nu) Im H] and
     2 G u_y = (p0/b) [y Re(w - k) + 2 (1 - nu) Re H].
     """
     depth, k, w, q = _roots(x, y, b)

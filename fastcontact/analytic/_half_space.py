@@ -1,9 +1,9 @@
-"""Elastic half-space under Hertz's axisymmetric pressure: closed-form stress and displacement; von Mises stress.
+"""Elastic half-space under Hertz's axisymmetric pressure: stress and displacement in closed form, and von Mises stress.
 
 The half-space is z <= 0 and carries the pressure p0 sqrt(1 - r^2/a^2) on r <= a. In oblate spheroidal coordinates s >=
 0, 0 <= t <= 1 with r^2 = a^2 (1 + s^2)(1 - t^2) and -z = a s t, every quantity is a rational function of s and t and the
-Legendre functions of the second kind of i s, without cancellation near the axis or the surface. Huber 1904 gives the
-stresses in other coordinates; the displacement follows from Boussinesq's potentials (Johnson 1985, section 3.1).
+Legendre functions of the second kind of i s, without cancellation near the axis or the surface. Huber (1904) gives the
+stresses in other coordinates. The displacement follows from Boussinesq's potentials (Johnson 1985, section 3.1).
 """
 
 from __future__ import annotations
@@ -17,12 +17,15 @@ from fastcontact.analytic._inputs import array
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-# From this s on the series in 1/s is used: the closed forms lose digits as s grows.
+# Value of s above which series in 1/s replace the closed forms, which cancel as s grows.
 _FAR = 4.0
 
 
 def below_surface(z: ArrayLike, a: float) -> Array:
-    """Return the depth -z (...) [length] of `z` (...) [length]; points above the surface by round-off count as on it."""
+    """Return the depth -z (...) [length] of `z` (...) [length]; points above the surface by round-off are moved to it.
+
+    Raises ModelError if a point lies above the surface by more than round-off.
+    """
     depth = -array("z", z)
     if depth.size and depth.min() < -1e-9 * a:
         raise ModelError(f"a point lies {-depth.min():g} above the surface: the body is z <= 0 (y <= 0 in the plane)")
@@ -30,10 +33,10 @@ def below_surface(z: ArrayLike, a: float) -> Array:
 
 
 def _spheroidal(r: ArrayLike, z: ArrayLike, a: float) -> tuple[Array, Array]:
-    """Return s and t of points; s - i t is the square root of ((r^2 + z^2 - a^2) - 2 i a |z|)/a^2."""
+    """Return the spheroidal coordinates s and t (...) [-]: s - i t is the root of ((r^2 + z^2 - a^2) - 2 i a |z|)/a^2."""
     radial, depth = np.broadcast_arrays(np.abs(array("r", r)) / a, below_surface(z, a) / a)
     square = np.empty(radial.shape, dtype=np.complex128)
-    # (r - a)(r + a) rather than r^2 - a^2: it keeps its digits at the edge of the contact.
+    # (r - a)(r + a), unlike r^2 - a^2, does not cancel at the edge of the contact.
     square.real = (radial - 1.0) * (radial + 1.0) + depth**2
     square.imag = 2.0 * depth
     root = np.sqrt(square)
@@ -55,7 +58,7 @@ def _legendre(s: Array) -> tuple[Array, Array, Array]:
 
 
 def stress(r: ArrayLike, z: ArrayLike, a: float, p0: float, nu: float) -> Array:
-    """Return stresses (..., 4) rr, zz, hoop, rz [pressure] at `r` (...) [length], `z` (...) [length] (Huber 1904)."""
+    """Return the stresses (..., 4) rr, zz, hoop, rz [pressure] at `r` (...) [length], `z` (...) [length] (Huber 1904)."""
     s, t = _spheroidal(r, z, a)
     _, q1, _ = _legendre(s)
     sum_of_squares = s**2 + t**2
@@ -71,10 +74,11 @@ def stress(r: ArrayLike, z: ArrayLike, a: float, p0: float, nu: float) -> Array:
 
 
 def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: float) -> Array:
-    """Return displacements (..., 2) radial, axial [length] at `r` (...) [length], `z` (...) [length], zero at infinity.
+    """Return the radial and axial displacements (..., 2) [length] at `r` (...) [length], `z` (...) [length].
 
-    z points out of the body. The radial one is r times the hoop strain; the axial one is (z P - 2 (1 - nu) V)/(2 G) with the
-    potential V of the pressure and P = -dV/d|z| (Johnson 1985, eq. 3.2-3.6 without shear tractions).
+    The displacements vanish at infinity, and z points out of the body. The radial displacement is r times the hoop strain;
+    the axial displacement is (z P - 2 (1 - nu) V)/(2 G) with the potential V of the pressure and P = -dV/d|z|
+    (Johnson 1985, eq. 3.2-3.6 without shear tractions).
     """
     radial, height = np.broadcast_arrays(array("r", r), -below_surface(z, a))
     s, t = _spheroidal(r, z, a)
@@ -88,14 +92,14 @@ def displacement(r: ArrayLike, z: ArrayLike, a: float, p0: float, E: float, nu: 
 
 
 class VonMisesMaximum(NamedTuple):
-    """Largest equivalent stress under a contact.
+    """Maximum von Mises stress below a contact.
 
     Attributes
     ----------
     value : float
-        [pressure].
+        Von Mises stress [pressure].
     depth : float
-        Distance below the surface, on the axis [length].
+        Depth of the maximum below the surface, on the axis [length].
     """
 
     value: float
@@ -103,6 +107,6 @@ class VonMisesMaximum(NamedTuple):
 
 
 def von_mises(stress: Array) -> Array:
-    """Return the equivalent stress (...) [pressure] of `stress` (..., 4) [pressure], xx, yy, zz, xy (von Mises 1913)."""
+    """Return the von Mises stress (...) [pressure] of `stress` (..., 4) [pressure], xx, yy, zz, xy (von Mises 1913)."""
     xx, yy, zz, xy = np.moveaxis(stress, -1, 0)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2)

@@ -1,4 +1,4 @@
-"""Inputs of formulas: checks of numbers with messages that name the parameter, elastic constants, curvature of bodies."""
+"""Inputs of the analytic solutions: checked numbers, elastic constants and radii of curvature."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from numpy.typing import ArrayLike
 from fastcontact.arrays import REFUSAL, Array, is_masked
 from fastcontact.errors import ModelError, unknown
 
-# Largest magnitude of an input: its cube is still finite.
+# Largest magnitude of an input. Its cube is finite in double precision.
 LARGEST = 1e60
 PLANE = ("plane_strain", "plane_stress")
 
 
 def number(name: str, value: object) -> float:
     """Return `value` as a finite float, or raise ModelError."""
-    # Compared without conversion, since integers may exceed the range of floats; comparisons with NaN are false.
+    # The comparison precedes the conversion because an integer may exceed the range of floats. NaN compares false.
     size: Any = abs(value) if isinstance(value, numbers.Real) and not isinstance(value, bool) else math.nan
     if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
@@ -35,7 +35,7 @@ def array(name: str, values: ArrayLike) -> Array:
         raise ModelError(f"{name} {REFUSAL}")
     try:
         values_read = np.asarray(values)
-    except ValueError:  # rows of several lengths
+    except ValueError:  # rows of different lengths
         values_read = np.empty(0, object)
     if values_read.dtype.kind not in "biuf":
         raise ModelError(f"{name} must be a number or an array of real numbers, not {type(values).__name__}")
@@ -43,7 +43,7 @@ def array(name: str, values: ArrayLike) -> Array:
 
 
 def positive(name: str, value: object, *, infinite: bool = False) -> float:
-    """Return `value` as a positive float; infinity is allowed only if the formula has that limit."""
+    """Return `value` as a positive float, or raise ModelError; `infinite` admits infinity."""
     if infinite and isinstance(value, numbers.Real) and value == math.inf:
         return math.inf
     checked = number(name, value)
@@ -55,7 +55,7 @@ def positive(name: str, value: object, *, infinite: bool = False) -> float:
 
 
 def not_negative(name: str, value: object) -> float:
-    """Return `value` as a float that is zero or positive."""
+    """Return `value` as a non-negative float, or raise ModelError."""
     checked = number(name, value)
     if checked < 0.0:
         raise ModelError(f"{name} is {checked:g}: it must not be negative")
@@ -63,7 +63,7 @@ def not_negative(name: str, value: object) -> float:
 
 
 def poisson(name: str, value: object) -> float:
-    """Return a Poisson ratio in (-1, 0.5]."""
+    """Return `value` as a Poisson ratio in (-1, 0.5], or raise ModelError."""
     checked = number(name, value)
     if not -1.0 < checked <= 0.5:
         raise ModelError(f"{name} is {checked:g}: a Poisson ratio lies in (-1, 0.5]")
@@ -71,7 +71,7 @@ def poisson(name: str, value: object) -> float:
 
 
 def exactly_one(**given: float | None) -> tuple[str, float]:
-    """Return name and value of the one argument that is not None; the value must be positive."""
+    """Return the name and the value of the only argument that is not None; ModelError unless it is a positive number."""
     present = [name for name, value in given.items() if value is not None]
     if len(present) != 1:
         present_names = " and ".join(present) if present else "none"
@@ -80,7 +80,7 @@ def exactly_one(**given: float | None) -> tuple[str, float]:
 
 
 def one_of(name: str, value: str, known: tuple[str, ...]) -> str:
-    """Return `value` if it is one of the `known` words."""
+    """Return `value` if it is one of the `known` words; otherwise raise ModelError."""
     if not isinstance(value, str) or value not in known:
         raise ModelError(unknown(name, str(value), known))
     return value
@@ -88,14 +88,18 @@ def one_of(name: str, value: str, known: tuple[str, ...]) -> str:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Elastic constants of two bodies; the second is rigid if `E2` is None.
+    """Elastic constants of two bodies in contact.
 
     Attributes
     ----------
-    E1, E2 : float, float or None
-        Young's moduli [pressure].
-    nu1, nu2 : float
-        Poisson ratios.
+    E1 : float
+        Young's modulus of the first body [pressure].
+    nu1 : float
+        Poisson's ratio of the first body [-].
+    E2 : float or None
+        Young's modulus of the second body; None if the body is rigid [pressure].
+    nu2 : float
+        Poisson's ratio of the second body [-].
     """
 
     E1: float
@@ -128,7 +132,7 @@ class Bodies:
 
     @property
     def dundurs(self) -> float:
-        """Dundurs' beta in plane strain; where it is 0, pressure causes no shear (Dundurs 1969)."""
+        """Dundurs' parameter beta in plane strain [-]; if it is 0, normal and shear tractions decouple (Dundurs 1969)."""
         first = (1.0 - 2.0 * self.nu1) * (1.0 + self.nu1) / self.E1
         second = 0.0 if self.E2 is None else (1.0 - 2.0 * self.nu2) * (1.0 + self.nu2) / self.E2
         return 0.5 * (first - second) * self.E_star
@@ -139,7 +143,7 @@ class Bodies:
         return first if self.E2 is None else [*first, (self.E2, self.nu2)]
 
     def constants(self, body: int) -> tuple[float, float]:
-        """Return E and nu of body 1 or 2; a rigid body has none."""
+        """Return E and nu of body 1 or 2; ModelError for other numbers and for a rigid body."""
         if body not in (1, 2):
             raise ModelError(f"body is {body!r}: it must be 1 or 2")
         if body > len(self._elastic):
@@ -148,7 +152,7 @@ class Bodies:
 
 
 def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")) -> float:
-    """Return R of 1/R = 1/R1 + 1/R2 [length]; one of the two may be infinite, a plane."""
+    """Return the effective radius R with 1/R = 1/R1 + 1/R2 [length]; one radius may be infinite, for a plane."""
     R1 = positive(names[0], R1, infinite=True)
     R2 = positive(names[1], R2, infinite=True)
     if math.isinf(R1) and math.isinf(R2):
@@ -157,5 +161,5 @@ def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")
 
 
 def plane_kinematics(kinematics: str) -> str:
-    """Return `kinematics` if it is "plane_strain" or "plane_stress"."""
+    """Return `kinematics` if it is "plane_strain" or "plane_stress"; otherwise raise ModelError."""
     return one_of("kinematics", kinematics, PLANE)

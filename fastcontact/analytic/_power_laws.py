@@ -1,4 +1,4 @@
-"""Contacts whose quantities are powers of their radius, as those of Hertz and of rigid punches."""
+"""Contacts whose quantities are power laws of the contact radius, such as Hertzian contacts and rigid punches."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 
 
 def by_power_laws(laws: Mapping[str, tuple[float, float]], name: str, value: float) -> dict[str, float]:
-    """Return all quantities that are ``coefficient * radius**exponent``, from the value of one.
+    """Return all quantities ``coefficient * radius**exponent`` from the value of one of them.
 
-    `laws` are coefficient and exponent of each quantity by name.
+    `laws` contains the coefficient and the exponent of each quantity by its name.
 
     Examples
     --------
