@@ -1,4 +1,4 @@
-"""The assembly of a deck: its points and elements, and the sets and surfaces resolved to them."""
+"""The assembly of a deck: points, elements, and the points and elements of sets and surfaces."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Pa
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
 
-# Number of set names that a message lists, and number of characters that it shows of each.
+# Number of set names that a message lists, and length to which a name is cut.
 SHOWN = 12
 LONGEST = 80
 
 
 @dataclass(eq=False, slots=True)
 class Element:
-    """An element of an instance: its cell in the deck, its type (None unless it is a solid), and its points.
+    """An element of an instance with its cell in the deck and its points.
 
-    `row` is its index among the solids of its type; its `section` assigns the material.
+    `type` is None unless the element is a solid. `row` is its index among the solids with the same type of mesh element, and
+    `section` assigns its material.
     """
 
     scope: str
@@ -44,7 +45,7 @@ class Element:
 
     @property
     def given_section(self) -> Section:
-        """The section of a solid; every solid has one once sections are checked."""
+        """The section of a solid, which exists once the sections are checked."""
         assert self.section is not None
         return self.section
 
@@ -54,17 +55,24 @@ Face = tuple[Element, int]
 
 @dataclass
 class Assembly:
-    """Points and elements of a deck with all its instances.
+    """Points and elements of all instances of a deck.
 
     Attributes
     ----------
     content : Content
+        Content of the deck.
     points : ndarray (n_points, 3)
         Coordinates in the assembly [length].
     index : dict of str to dict of int to int
-        Point number by instance, empty for what belongs to no part, and node number.
+        Point number by instance and node number. The instance is empty for nodes outside all parts.
     elements : dict of str to dict of int to Element
         Elements by instance and element number.
+    resolved : dict of (str, str, str) to list
+        Members of the sets resolved so far, by kind, instance and name.
+    surfaces : dict of str to list of (Element, int)
+        Faces of the surfaces resolved so far.
+    open : list of (str, str, str)
+        Sets that are being resolved, from which a set that contains itself is detected.
     """
 
     content: Content
@@ -93,20 +101,20 @@ class Assembly:
         return [element for elements in self.elements.values() for element in elements.values() if element.type is None]
 
     def part(self, scope: str) -> Part:
-        """Return the part of an instance, or what belongs to none."""
+        """Return the part of an instance, or the content outside all parts if `scope` is empty."""
         return self.content.instances[scope].part if scope else self.content.root
 
     def turned(self, scope: str) -> bool:
-        """Whether an instance is turned."""
+        """Return whether an instance is rotated."""
         return bool(scope and self.content.instances[scope].rotation)
 
     @cached_property
     def scopes(self) -> list[str]:
-        """Names of all instances as they are looked up, and the empty one."""
+        """Names of all instances in the form used for lookup, preceded by the empty name."""
         return ["", *self.content.instances]
 
     def place_of(self, name: str) -> tuple[str, str]:
-        """Return the instance that a name begins with, empty for none, and the rest: ``Part-1.17`` is node 17 of Part-1."""
+        """Split a name into its instance, which may be empty, and the rest: ``Part-1.17`` is node 17 of Part-1."""
         text = folded(name)
         for scope in self.content.instances:
             if text.startswith(scope + "."):
@@ -114,14 +122,14 @@ class Assembly:
         return "", text
 
     def members(self, kind: str, name: str, location: Location) -> list[Any]:
-        """Return the points of nodes, or the elements (`kind`), of a set or a number; CaseError if there is none."""
+        """Return the points or the elements, by `kind`, of a set or a number; CaseError if it is not defined."""
         scope, rest = self.place_of(name)
         if rest.isdecimal():
             return [self._existing(kind, scope, int(rest[:19]), location)]
         return self.members_of(kind, scope, rest, location, name)
 
     def members_of(self, kind: str, scope: str, name: str, location: Location, shown: str = "") -> list[Any]:
-        """Return the points or elements of a set that is defined in an instance, sets of sets included."""
+        """Return the points or elements of a set of an instance; nested sets are resolved, and CaseError if not defined."""
         part, label = self.part(scope), (kind, scope, name)
         sets = part.node_sets if kind == "node" else part.element_sets
         if name not in sets:
@@ -171,7 +179,7 @@ class Assembly:
         return self.members_of(kind, scope, name, entry.location, entry.name)
 
     def _items_of(self, kind: str, scope: str) -> Mapping[int, Any]:
-        """Return the points or elements of an instance by number."""
+        """Return the points or elements of an instance by their number."""
         return self.index.get(scope, {}) if kind == "node" else self.elements.get(scope, {})
 
     def _existing(self, kind: str, scope: str, number: int, location: Location) -> Any:
@@ -186,18 +194,18 @@ class Assembly:
         return self.members("node", name, location)
 
     def elements_of(self, name: str, location: Location) -> list[Element]:
-        """Return the elements of a set or a single one; errors as for `members`."""
+        """Return the elements of an element set or a single element; errors as for `members`."""
         return self.members("element", name, location)
 
     def node(self, name: str, location: Location) -> int:
-        """Return the point of a node number, or the only one of a node set; errors as for `keys`, or if there are several."""
+        """Return the point of a node number or of a set with one node; CaseError if it is not defined or not unique."""
         nodes = self.nodes(name, location)
         if len(nodes) != 1:
             raise location.refuse(f"'{name}' holds {len(nodes)} nodes where one is needed")
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
-        """Return the elements of a surface, each with the index of its face among the facets of the element."""
+        """Return the faces of a surface, each as an element and the index of a facet; CaseError if it has no faces."""
         definition, scope = self.surface(name, location)
         if definition.of_nodes:
             whole, _, left = self.faces_of_nodes(definition, scope)
@@ -223,7 +231,7 @@ class Assembly:
         return self.surfaces[label]
 
     def surface(self, name: str, location: Location) -> tuple[SurfaceDefinition, str]:
-        """Return the definition of a surface and the instance that contains it; raises CaseError if there is none."""
+        """Return the definition of a surface and the instance that contains it; CaseError if it is not defined."""
         scope, rest = self.place_of(name)
         surfaces = self.part(scope).surfaces
         if rest not in surfaces:
@@ -234,7 +242,7 @@ class Assembly:
         return surfaces[rest], scope
 
     def facet(self, element: Element, label: int, location: Location) -> int:
-        """Return the index of the face with a label, counted from 1, among the facets of its element."""
+        """Return the index of the facet of an element with a face label, counted from 1; CaseError if there is none."""
         if element.type is None:
             raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         faces = element.type.faces
@@ -245,7 +253,7 @@ class Assembly:
         return matching(element.type.element)[label - 1]
 
     def _free_faces(self, element: Element, location: Location) -> Iterator[Face]:
-        """Yield the faces of an element that no other one shares."""
+        """Yield the faces of an element that no other solid shares."""
         if element.type is None:
             raise location.refuse(f"element {element.number} is not a solid, so it has no faces")
         facets = matching(element.type.element)
@@ -254,7 +262,7 @@ class Assembly:
 
     @cached_property
     def free(self) -> dict[str, Mask]:
-        """Masks (n_elements, n_faces), by label, of the faces that no other solid shares, for each kind of solid."""
+        """Masks (n_elements, n_faces), by type of mesh element, of the faces that no other solid shares."""
         corners, shapes = [], {}
         for name, members in self.by_kind.items():
             points = np.array([element.points for element in members], np.int32)
@@ -271,7 +279,7 @@ class Assembly:
 
     @cached_property
     def by_kind(self) -> dict[str, list[Element]]:
-        """The solids by type of the mesh element, each at its `row`."""
+        """The solids by type of mesh element, each at index `row`."""
         elements: dict[str, list[Element]] = {}
         for element in self.solids:
             elements.setdefault(element.solid.element, []).append(element)
@@ -279,7 +287,7 @@ class Assembly:
 
     @cached_property
     def outer(self) -> dict[int, list[tuple[Face, frozenset[int]]]]:
-        """The outer faces at each point, each with its corners."""
+        """The outer faces at each point, with their corner points."""
         by_part: dict[int, list[tuple[Face, frozenset[int]]]] = {}
         for name, members in self.by_kind.items():
             facets, faces = matching(name), members[0].solid.faces
@@ -291,17 +299,17 @@ class Assembly:
         return by_part
 
     def faces_within(self, points: set[int]) -> list[Face]:
-        """Return the outer faces with all corners among the points."""
+        """Return the outer faces whose corners are all in `points`."""
         near = dict.fromkeys(face for point in sorted(points) for face in self.outer.get(point, ()))
         return [face for face, corners in near if corners <= points]
 
     def surface_nodes(self, definition: SurfaceDefinition, scope: str) -> list[int]:
-        """Return the points of a surface of nodes, each once."""
+        """Return the points of a node-based surface without repetition."""
         given = [(face.of if not scope else f"{scope}.{face.of}", face.location) for face in definition.faces]
         return list(dict.fromkeys(point for name, location in given for point in self.nodes(name, location)))
 
     def number_of(self, point: int) -> str:
-        """Return the name of the node of a point in the deck."""
+        """Return the label in the deck of the node at a point, with its instance."""
         for scope, nodes in self.index.items():
             for number, index in nodes.items():
                 if index == point:
@@ -309,7 +317,7 @@ class Assembly:
         return "of a rotation"
 
     def faces_of_nodes(self, definition: SurfaceDefinition, scope: str) -> tuple[list[Face], list[Face], list[int]]:
-        """Return the outer faces within a surface of nodes, those that hold most of its other nodes, and these nodes."""
+        """Return the faces within a node-based surface, the faces that cover its remaining nodes best, and these nodes."""
         chosen = set(self.surface_nodes(definition, scope))
         whole: list[tuple[Face, set[int]]] = []
         others: list[tuple[Face, set[int]]] = []
@@ -333,7 +341,7 @@ MATCHING: dict[str, tuple[int, ...]] = {}
 
 
 def matching(element: str) -> tuple[int, ...]:
-    """Return the facet of an element for each of the face labels 1, 2, ..."""
+    """Return the index of the facet of an element for each face label 1, 2, ..."""
     if element not in MATCHING:
         kind = ElementType("", element, "")
         facets = [frozenset(facet) for facet in elements.get(element).facets]
@@ -344,7 +352,7 @@ def matching(element: str) -> tuple[int, ...]:
 
 
 def assemble(assembly: Assembly) -> None:
-    """Add the points and elements of all instances; raises CaseError if an element uses an undefined node."""
+    """Add the points and elements of all instances to an assembly; CaseError if an element uses an undefined node."""
     content, total, counts = assembly.content, 0, {}  # type: Content, int, dict[str, int]
     places = []
     for scope in assembly.scopes:

@@ -1,4 +1,4 @@
-"""Keyword blocks of a deck: keyword, parameters and data lines; errors with file and line; included files in place."""
+"""Keyword blocks of a deck, with its included files: keywords, parameters and data lines, and errors with file and line."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ from typing import Any, NamedTuple, TypeVar
 
 from fastcontact.errors import CaseError, FastcontactError, FileError
 
-# Largest number of bytes of a deck with all included files, and of such files: a deck with more is taken for an error.
+# Largest size in bytes and largest number of files of a deck with all included files; a larger deck is taken for an error.
 LARGEST = 1 << 28
 MOST_FILES = 200
-# Largest number of characters of a line, or of a keyword with its continuation lines; both programs allow far fewer.
+# Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
 LONGEST_LINE = 1 << 16
 _TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
 LONGEST_QUOTED = 80
-LARGEST_WHOLE = 1 << 53  # beyond, not every integer is a floating-point number
+LARGEST_WHOLE = 1 << 53  # all integers up to this one are exact in double precision
 Entry = TypeVar("Entry")
 
 
 @dataclass(frozen=True, slots=True)
 class Location:
-    """A line of a file, with the keyword it belongs to."""
+    """A line of a file, with its keyword."""
 
     file: str
     line: int
     keyword: str
 
     def refuse(self, text: str) -> CaseError:
-        """Return the error for this location with a text."""
+        """Return a CaseError whose message is the location followed by `text`."""
         return CaseError(f"{self}: {text}")
 
     def __str__(self) -> str:
@@ -39,13 +39,13 @@ class Location:
 
 
 class Located:
-    """Base class of deck items with a `location`, which error messages name."""
+    """Base class of deck items with a location, which error messages name."""
 
     __slots__ = ()
     location: Location
 
     def refuse(self, text: str) -> CaseError:
-        """Return an error at the location of the item."""
+        """Return a CaseError whose message is the location of the item followed by `text`."""
         return self.location.refuse(text)
 
     def __str__(self) -> str:
@@ -54,24 +54,24 @@ class Located:
 
 @dataclass(frozen=True, slots=True)
 class Item(Located):
-    """A deck item that does not change once it is read."""
+    """Base class of deck items that do not change after they are read."""
 
     location: Location
 
 
 @dataclass(frozen=True, slots=True)
 class Row(Item):
-    """A data line: its entries without surrounding blanks, and its location."""
+    """A data line with its entries, without surrounding blanks; `goes_on` is true if the line ends with a comma."""
 
     entries: tuple[str, ...]
     goes_on: bool = False
 
     def text(self, index: int) -> str:
-        """Return an entry, empty where the line ends before it."""
+        """Return an entry, or an empty string if the line has fewer entries."""
         return self.entries[index] if index < len(self.entries) else ""
 
     def number(self, index: int, default: float | None = None) -> float:
-        """Return an entry as a number, or `default` where it is empty; raises CaseError if it is missing or no number."""
+        """Return an entry as a number, or `default` if it is empty; CaseError if it is not a number or has no default."""
         text = self.text(index)
         if not text:
             if default is None:
@@ -80,14 +80,14 @@ class Row(Item):
         return as_number(self.location, text)
 
     def whole(self, index: int, default: int | None = None) -> int:
-        """Return an entry as a whole number; errors as for `number`."""
+        """Return an entry as an integer; CaseError as for `number`, and if the entry is not an integer."""
         value = self.number(index, default)
         if value != int(value) or abs(value) > LARGEST_WHOLE:
             raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
     def positive(self, index: int, quantity: str) -> float:
-        """Return an entry as a positive number; the error names the `quantity`."""
+        """Return an entry as a positive number; otherwise raise CaseError with the name of the `quantity`."""
         value = self.number(index)
         if not value > 0:
             raise self.refuse(f"the {quantity} {value:g} must be positive")
@@ -96,7 +96,7 @@ class Row(Item):
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """The data lines of a keyword in the contents of a file, from a line number on; rows are made on demand."""
+    """The data lines of a keyword: bytes `begin` to `end` of a file, from which an iterator makes one row at a time."""
 
     location: Location
     contents: bytes = field(repr=False)
@@ -111,31 +111,37 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Block(Item):
-    """A keyword with its parameters (names in upper case, without values None) and all its data lines."""
+    """A keyword with its parameters and its data lines.
+
+    The names of parameters are in upper case, and the value of a parameter without a value is None.
+    """
 
     parameters: dict[str, str | None]
     lines: Iterable[Row] = ()
 
     @property
     def keyword(self) -> str:
-        """Return the keyword in upper case, without its asterisk."""
+        """The keyword in upper case, without its asterisk."""
         return self.location.keyword
 
     @property
     def rows(self) -> list[Row]:
-        """Return the data lines that are not empty."""
+        """The data lines that are not empty."""
         return list(self.each())
 
     def each(self) -> Iterator[Row]:
-        """Yield `rows`, one at a time."""
+        """Return an iterator over the data lines that are not empty."""
         return (row for row in self.lines if any(row.entries))
 
     def numbers(self) -> list[float]:
-        """Return the entries of all data lines, which are numbers."""
+        """Return the numbers in all data lines; CaseError if an entry is not a number."""
         return [row.number(i) for row in self.each() for i, text in enumerate(row.entries) if text]
 
     def only(self, why: str = "") -> Row:
-        """Return the only data line; raises CaseError if there are several: constants that depend on `why`."""
+        """Return the only data line; CaseError unless there is exactly one.
+
+        If `why` is given, the message adds that constants that depend on `why` are not supported.
+        """
         rows = self.rows
         if len(rows) != 1:
             text = f"{len(rows)} data lines where one is needed"
@@ -143,11 +149,11 @@ class Block(Item):
         return rows[0]
 
     def get(self, name: str, default: str = "") -> str:
-        """Return the value of a parameter, or `default` where it is missing or has no value."""
+        """Return the value of a parameter, or `default` if it is missing or has no value."""
         return self.parameters.get(name) or default
 
     def choice(self, name: str, known: tuple[str, ...]) -> str:
-        """Return the value of a parameter in upper case, by default the first of `known`; raises CaseError for any other."""
+        """Return a parameter as one of the `known` values, by default the first; CaseError for any other value."""
         value = self.get(name, known[0]).upper()
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
@@ -155,7 +161,7 @@ class Block(Item):
         raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
 
     def required(self, name: str) -> str:
-        """Return the value of a parameter; raises CaseError if there is none."""
+        """Return the value of a parameter; CaseError if it is missing or has no value."""
         value = self.parameters.get(name)
         if not value:
             raise self.refuse(f"the parameter {name} is missing")
@@ -164,7 +170,7 @@ class Block(Item):
 
 @dataclass
 class Source:
-    """State of reading a deck: its folder, whether data lines are kept, the bytes and files read, and the open files."""
+    """State of reading a deck: its folder, whether data lines are kept, size and paths of files read, and open files."""
 
     folder: Path
     with_data: bool = True
@@ -174,7 +180,7 @@ class Source:
 
 
 def as_number(location: Location, text: str) -> float:
-    """Return a text as a finite number, also in Fortran notation (1.D5); raises CaseError if it is none."""
+    """Return the finite number in `text`, also in Fortran notation (1.D5); CaseError if it is not a finite number."""
     try:
         value = float(text.upper().replace("D", "E")) if text[:1].upper() not in "IN" else float("nan")
     except ValueError:
@@ -195,21 +201,21 @@ def folded(name: str) -> str:
 
 
 def read_blocks(path: Path) -> Iterator[Block]:
-    """Yield all blocks of a deck, those of included files in place.
+    """Return an iterator over the blocks of a deck, with the blocks of included files at their *INCLUDE.
 
     Raises
     ------
     FileError
-        If a file cannot be read or all of them are too large.
+        If a file cannot be read, or if the files are too many or too large.
     CaseError
-        If a line is no part of a deck, or an *INCLUDE is refused; the message names file and line.
+        If a line is invalid or the file of an *INCLUDE is not accepted; the message names file and line.
     """
     source = Source(path.resolve().parent)
     return _blocks(path, path.name, source)
 
 
 def files_of_deck(path: Path) -> list[Path]:
-    """Return a deck and the files that it includes, in reading order; errors as for `read_blocks`."""
+    """Return the paths of a deck and of its included files in reading order; errors as for `read_blocks`."""
     source = Source(path.resolve().parent, with_data=False)
     for _ in _blocks(path, path.name, source):
         pass
@@ -217,7 +223,7 @@ def files_of_deck(path: Path) -> list[Path]:
 
 
 class _Line(NamedTuple):
-    """A line without surrounding blanks, with its number and the offsets at which it and the next line begin."""
+    """A line without surrounding blanks, with its number and the byte offsets of its begin and of the next line."""
 
     number: int
     begin: int
@@ -226,7 +232,7 @@ class _Line(NamedTuple):
 
 
 def _contents(path: Path, source: Source) -> bytes:
-    """Return the bytes of a file with Unix line ends."""
+    """Return the contents of a file with Unix line ends; FileError if it cannot be read or the deck becomes too large."""
     source.files.append(path)
     try:
         source.size += path.stat().st_size
@@ -241,7 +247,7 @@ def _contents(path: Path, source: Source) -> bytes:
 
 
 def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_Line]:
-    """Yield the lines between two offsets, one at a time: a list of all would take several times their memory."""
+    """Yield the lines between two byte offsets; a list of all lines would take several times the memory of the file."""
     while begin < end:
         after = contents.find(b"\n", begin, end) + 1 or end
         yield _Line(number, begin, after, contents[begin:after].decode("utf-8", "replace").strip())
@@ -249,7 +255,7 @@ def _lines(contents: bytes, begin: int, end: int, number: int = 1) -> Iterator[_
 
 
 def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of one file; data lines before the first keyword are refused."""
+    """Yield the blocks of a file and of its included files; CaseError for data lines before the first keyword."""
     source.open.append(path.resolve())
     current: Block | None = None
     contents = _contents(path, source)
@@ -279,7 +285,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
 
 
 def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: Source) -> Block:
-    """Return a block with the data lines from the last line of its keyword up to an offset."""
+    """Return a block with the data lines between the last line of its keyword and the offset `end`."""
     if not source.with_data or last.end >= end:
         return block
     location = Location(block.location.file, last.number + 1, block.keyword)
@@ -306,7 +312,7 @@ def _keyword(line: str) -> str:
 
 
 def _parts(line: str) -> list[str]:
-    """Return the entries between the commas of a line, without surrounding blanks; quoted names keep their commas."""
+    """Return the comma-separated entries of a line, without surrounding blanks; commas within quotes do not separate."""
     if '"' not in line:
         return [part.strip() for part in line.split(",")]
     parts = [""]
@@ -338,7 +344,7 @@ def _row(location: Location, line: str) -> Row:
 
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
-    """Yield the blocks of the file that *INCLUDE names; it must lie below the folder of the deck."""
+    """Yield the blocks of the file of an *INCLUDE; CaseError unless the file exists in the folder of the deck or below."""
     given = block.required("INPUT")
     for parameter in block.parameters:
         if parameter != "INPUT":
@@ -364,17 +370,17 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
 
 @contextmanager
 def refusing(at: Location | Located, about: str = "") -> Iterator[None]:
-    """Re-raise errors of the package as CaseError at a location of the deck; the message begins with `about`."""
+    """Re-raise errors of the package as CaseError at a location of the deck; `about` precedes the message."""
     try:
         yield
-    except CaseError:  # has a location already
+    except CaseError:  # its message has a location
         raise
     except FastcontactError as error:
         raise at.refuse(f"{about}{error}") from error
 
 
 def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: Location | Located) -> Entry:
-    """Add an entry to a table under its name and return it; raises CaseError if the name is in the table already."""
+    """Add an entry to a table by its name and return the entry; CaseError if the table contains the name."""
     if folded(name) in table:
         raise at.refuse(f"{kind} '{name}' is defined twice")
     table[folded(name)] = entry
@@ -382,7 +388,7 @@ def registered(kind: str, name: str, table: dict[str, Entry], entry: Entry, at: 
 
 
 def defined(kind: str, name: str, table: Mapping[str, Any], at: Location | Located) -> Any:
-    """Return the entry of a table with a name; raises CaseError with the names of all entries if there is none."""
+    """Return the entry of a table with a name; otherwise raise CaseError with the names of all entries."""
     if folded(name) not in table:
         known = ", ".join(entry.name for entry in table.values()) or "none"
         raise at.refuse(f"{kind} '{name}' is not defined; {kind.rpartition(' ')[2]}s: {known}")

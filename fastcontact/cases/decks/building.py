@@ -1,4 +1,4 @@
-"""Build a model and a ramp from the content of a deck."""
+"""The model and the ramp built from the content of a deck."""
 
 from __future__ import annotations
 
@@ -47,23 +47,30 @@ LONGEST_RAMP = 100_000
 
 
 class Building:
-    """A model under construction.
+    """Model and ramp of a deck.
 
     Attributes
     ----------
+    content : Content
+        Content of the deck.
     assembly : DeckMesh
-        The assembly, and its mesh under construction.
+        Assembly of the deck, with the groups of its mesh.
     model : Model
+        Model of the deck.
+    ramp : Ramp
+        Load steps.
     thickness : float
-        Thickness of a plane model; the forces of the model are per unit thickness [length].
+        Thickness of a plane model [length]. The forces in the model are per unit thickness.
+    links : list of MultiPointConstraint
+        Constraints that are not supports.
     local_supports : list of MultiPointConstraint
-        Constraints that are supports: those along local axes, and those that do not act in all steps.
+        Supports that are constraints, because they act along local axes or not in all steps.
     linearised : str
-        Reason why small strains are solved although a step has NLGEOM; otherwise empty.
+        Reason why small strains are used although a step has NLGEOM; otherwise empty.
     driven : dict of (int, int) to Table
-        Prescribed motions of gap-element nodes that belong to no solid, by point and component [length].
+        Prescribed motions of nodes of gap elements that belong to no solid, by point and component [length].
     gap_ends : dict of str to dict of int to int
-        By name of a contact made of gap elements: the node behind the gap for each of its nodes.
+        Node opposite to each node of a contact made of gap elements, by the name of the contact.
     """
 
     def __init__(self, content: Content, case_text: str) -> None:
@@ -117,7 +124,7 @@ class Building:
         self._springs()
 
     def _materials(self) -> tuple[list[tuple[Any, str]], float]:
-        """Return the materials with their groups of solids, and the thickness; every solid needs a section."""
+        """Return the materials with their groups of solids, and the thickness; CaseError if a solid has no section."""
         thickness: float | None = None
         for scope in self.assembly.scopes:
             for section in self.assembly.part(scope).sections:
@@ -153,7 +160,7 @@ class Building:
         return materials, thickness or 1.0
 
     def _axes(self, section: Section, members: Sequence[Element]) -> Any:
-        """Return the material axes of a section with its elements, None for the axes of the mesh."""
+        """Return the material axes of a section with its elements, or None for the axes of the mesh."""
         if not section.orientation:
             return None
         axes = orientation_of(self.content, section.orientation, section.location)
@@ -184,7 +191,7 @@ class Building:
             raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
-        """Refuse pairs with undefined surfaces or an undefined interaction."""
+        """Raise CaseError if a pair is given twice or has an undefined surface or interaction."""
         seen: set[str] = set()
         for pair in self.content.pairs:
             secondary_group(self.assembly, pair.secondary, pair.location)
@@ -196,7 +203,7 @@ class Building:
             seen.add(folded(pair.name))
 
     def _pressures(self, conditions: Conditions) -> list[Callable[[Model], None]]:
-        """Make groups of the facets whose pressures have the same history; return functions that add these to a model."""
+        """Make groups of facets whose pressures have the same history; return functions that add the pressures to a model."""
         alike = ByShape[tuple[str, str]]()
         for table, names in conditions.loads.alike():
             for name in names:
@@ -210,7 +217,7 @@ class Building:
         return pressures
 
     def _point_group(self, kind: str, points: Iterable[int]) -> str:
-        """Return the name of a group of points of the mesh; it is made if there is none."""
+        """Return the name of the group of some points of the mesh; a new group is created if there is none."""
         before = len(self.assembly.point_groups)
         name = self.assembly.add_points(f"{kind} {before}", points)
         if name not in self.model.mesh.point_groups:
@@ -243,7 +250,7 @@ class Building:
             self.model.fix(self._point_group("rotation", self.assembly.rotations.values()), "y")
 
     def _temporary_supports(self, conditions: Conditions, temporary: Sequence[tuple[Component, Acting]]) -> None:
-        """Add the supports that do not act in all steps; those with the same times become one constraint."""
+        """Add the supports that do not act in all steps; supports with the same period and history share a constraint."""
         alike: dict[tuple[Acting, Table], list[Component]] = {}
         for name, acting in (entry for entry in temporary if entry[1].begins < entry[1].ends):
             alike.setdefault((acting, conditions.supports.table(name)), []).append(name)
@@ -265,7 +272,7 @@ class Building:
         self.model.relations.append(constraint)
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
-        """Return the constraint row (1, n_dofs) of the displacement that a support prescribes [-]."""
+        """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""
         point, axis, local = name
         direction = (conditions.directions[point] if local else np.eye(3))[[axis], : self.assembly.dim]
         return along(np.array([point]), direction, self.model.n_dofs)
@@ -330,7 +337,7 @@ class Building:
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
 
     def _at_nodes(self, pair: Pair, secondary: str) -> dict[str, Any]:
-        """Return the options that restrict contact to some nodes of the facets around them."""
+        """Return the options that exclude from contact the nodes of the facets that are not in a node-based surface."""
         options: dict[str, Any] = {"excluded": self._point_group("without contact", self.assembly.loose[secondary])}
         if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
@@ -359,16 +366,17 @@ class Building:
         return {**options, **self._fitted(pair)}
 
     def _tied(self, pair: Pair) -> dict[str, Any]:
-        """Return the options of a tie, with a conductance where heat is computed."""
+        """Return the options of a tie, with a conductance if temperatures are computed."""
         if not self.content.heat:
             return {"kind": "tied"}
         kind = "gap_only" if self.content.heat == "alone" else "tied"
         return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
-        """Return the clearance that closes the sides as ADJUST or *CLEARANCE prescribe; refused where one number cannot.
+        """Return the option `clearance` that ADJUST or *CLEARANCE requires; an empty dictionary if it is zero.
 
-        Raises CaseError if `glued` sides have a gap, across which the layer would not act.
+        Raises CaseError if *CLEARANCE is given for sides whose distance varies, and if `glued` sides have a gap, across
+        which the cohesive layer would not act.
         """
         if not (pair.adjust or glued) and pair.clearance is None:
             return {}
@@ -405,7 +413,10 @@ class Building:
         return {"clearance": lambda points: closing[nearest(places, points)[1]]}
 
     def _ramp(self, conditions: Conditions) -> Ramp:
-        """Return the ramp: ends of all steps, of increments of steps with friction, and the corners of all histories."""
+        """Return the ramp with the ends of all steps and the corners of all histories.
+
+        Models with friction or cohesive contact also have the ends of the increments of each step.
+        """
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
         if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
@@ -421,13 +432,13 @@ class Building:
 
 
 def _parts(step: Step) -> list[float]:
-    """Return the ends of the equal increments inside a step, as fractions of its length."""
+    """Return the boundaries between the equal increments of a step, as fractions of its length."""
     count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
     return [k / count for k in range(1, count)]
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:
-    """Return the components of a body force where its history is 1, for cells with the factor `value`."""
+    """Return the components of a body force at a history of 1, multiplied by the factor `value` of the cells."""
 
     def times(component: Any) -> Any:
         if not callable(value):
@@ -450,9 +461,9 @@ def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> d
 
 
 def nodal_gaps(model: Model, secondary: str, primary: str, without: Sequence[int]) -> tuple[Array, Array]:
-    """Return the gaps (n,) of the nodes of one side that face the other, and their positions (n, dim) [length].
+    """Return the gaps (n,) [length] of the secondary nodes that face the primary side, and their positions (n, dim) [length].
 
-    Nodes in `without` are left out.
+    Nodes in `without` are left out. Without any such node, the result is a gap of zero at the first point.
     """
     from fastcontact.contact.configuration import Configuration
     from fastcontact.model.contact_pair import ContactPair

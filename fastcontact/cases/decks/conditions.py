@@ -25,7 +25,17 @@ Component = tuple[int, int, bool]
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """Load factors between which a support acts, whether it holds the current value, and its line if it starts late."""
+    """Period of a support.
+
+    Attributes
+    ----------
+    location : Location or None
+        Line of a support that begins after the first step.
+    begins, ends : float
+        Load factors between which the support acts [-].
+    keeps : bool
+        Whether the support holds the displacement at its begin.
+    """
 
     location: Location | None
     begins: float
@@ -54,7 +64,7 @@ class Conditions:
         self.directions = local_directions(assembly)
 
     def run(self) -> None:
-        """Go through all steps."""
+        """Record the supports and loads of all steps."""
         content = self.assembly.content
         for given in content.supports:
             self._supports(given, before=True)
@@ -82,7 +92,7 @@ class Conditions:
             {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
     def _change(self, number: int) -> None:
-        """Record the supports that begin or end at the beginning of step `number`."""
+        """Record the supports that begin or end at the begin of step `number`."""
         begin, changing = number - 1.0, self.supports.changing
         kept = (name for name in self.acting if name in changing and name not in self.keeping)
         moved = dict.fromkeys(name for name in kept if self._acts(name) and self.acting[name].keeps)
@@ -96,16 +106,16 @@ class Conditions:
         self.keeping.clear()
 
     def _acts(self, name: Component) -> bool:
-        """Whether a support is still active after the steps so far."""
+        """Return whether a support acts at the end of the steps recorded so far."""
         track = self.supports.tracks.get(name)
         return track is not None and track.alive
 
     def temporary(self) -> list[tuple[Component, Acting]]:
-        """Return the supports that do not act in all steps, each with its period."""
+        """Return the supports that do not act in all steps, with their periods."""
         return [*self.over, *((name, acting) for name, acting in self.acting.items() if acting.begins > 0.0)]
 
     def named(self, component: Component) -> str:
-        """Return the name of a component of a point in the deck."""
+        """Return a text that names a displacement component in the deck, for messages."""
         point, axis, _ = component
         if point >= sum(map(len, self.assembly.index.values())):
             return f"rotation {axis + 1} of a reference node"
@@ -160,7 +170,7 @@ class Conditions:
         self.supports.give(name, sign * value, given.amplitude, row.location)
 
     def _component(self, point: int, component: int) -> Component | None:
-        """Return the displacement component of a point, or of its rotation point; None if there is none."""
+        """Return the component of a point, or of the point that carries its rotation; None if it does not exist."""
         dim = self.assembly.dim
         if component <= dim:
             return point, component - 1, False
@@ -170,7 +180,7 @@ class Conditions:
         return None
 
     def _local(self, point: int, component: int) -> tuple[Component, float]:
-        """Return the component along a local axis: a global component with its sign where the axis is parallel to it."""
+        """Return the component along a local axis and its sign; a global component if the axis is parallel to it."""
         direction = self.directions[point][component - 1]
         axis = int(np.argmax(np.abs(direction)))
         if abs(abs(direction[axis]) - 1.0) < LENGTH_ROUND_OFF and axis < self.assembly.dim:

@@ -9,12 +9,12 @@ from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint,
 from fastcontact.cases.decks.cyclic_symmetry import sector_ends
 from fastcontact.cases.decks.relating import LEAST
 
-# Largest number of terms of an equation: more would couple everything to everything.
+# Largest number of terms of an equation. Each equation couples all of its terms to each other.
 MOST_TERMS = 100_000
 
 
 def contact_pair(content: Content, block: Block) -> None:
-    """*CONTACT PAIR: the first surface of a line is the secondary side."""
+    """Read *CONTACT PAIR; the first surface of a line is the secondary side."""
     kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
     if block.choice("TYPE", kinds) == "NODE TO SURFACE":
         content.note(block, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes")
@@ -27,7 +27,7 @@ def contact_pair(content: Content, block: Block) -> None:
 
 
 def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
-    """Yield the place of each data line, and the secondary and the primary surface that it names."""
+    """Yield the location of each data line with the names of its secondary and its primary surface."""
     for row in block.each():
         if len([entry for entry in row.entries if entry]) != 2:
             raise row.refuse(f"{kind} needs two surfaces, the secondary and the primary one")
@@ -35,7 +35,7 @@ def _sides(block: Block, kind: str) -> Iterator[tuple[Location, str, str]]:
 
 
 def clearance(content: Content, block: Block) -> None:
-    """*CLEARANCE: the initial gap between the sides of a pair, irrespective of the coordinates."""
+    """Read *CLEARANCE: the initial gap between the sides of a pair, which replaces that of the coordinates."""
     secondary = block.get("SLAVE") or block.get("SECONDARY")
     primary = block.get("MASTER") or block.get("MAIN")
     value = as_number(block.location, block.required("VALUE"))
@@ -47,7 +47,7 @@ def clearance(content: Content, block: Block) -> None:
 
 
 def tie(content: Content, block: Block) -> None:
-    """*TIE: surfaces that neither open nor slide."""
+    """Read *TIE: tied surfaces, or the end surfaces of a cyclic sector."""
     if "CYCLIC SYMMETRY" in block.parameters:
         content.sector_ends.append(sector_ends(block))
         return
@@ -68,7 +68,7 @@ def tie(content: Content, block: Block) -> None:
 
 
 def equation(content: Content, block: Block) -> None:
-    """*EQUATION: the number of terms, then the node, component and coefficient of each term."""
+    """Read *EQUATION: the number of terms, then the node, component and coefficient of each term."""
     rows = block.each()
     for head in rows:
         count = head.whole(0)
@@ -90,9 +90,10 @@ def _term(row: Row, start: int) -> tuple[str, int, float]:
 
 
 def multi_point(content: Content, block: Block) -> None:
-    """*MPC: PIN and TIE give two nodes the same displacement, BEAM a rigid bar from the first node to the second.
+    """Read *MPC.
 
-    PLANE, STRAIGHT and MEANROT continue over lines that begin with a number.
+    PIN and TIE give two nodes the same displacement, and BEAM is a rigid bar from the first node to the second. PLANE,
+    STRAIGHT and MEANROT continue on lines that begin with a number.
     """
     several: list[tuple[Row, str, list[str]]] = []
     for row in block.each():
@@ -114,14 +115,14 @@ def multi_point(content: Content, block: Block) -> None:
 
 
 def rigid_body(content: Content, block: Block) -> None:
-    """*RIGID BODY: nodes that move with a reference node as a rigid body."""
+    """Read *RIGID BODY: nodes that move as a rigid body with a reference node."""
     kind = "elements" if block.get("ELSET") else "nodes"
     group = block.get("ELSET") or block.required("NSET")
     content.links.append(Link(block.location, block.required("REF NODE"), group, kind, rotation=block.get("ROT NODE")))
 
 
 def coupling(content: Content, block: Block, inner: Block) -> None:
-    """*COUPLING with *KINEMATIC or *DISTRIBUTING below it."""
+    """Read *COUPLING with its *KINEMATIC or *DISTRIBUTING, the `inner` block."""
     components: set[int] = set()
     for row in inner.each():
         first, last = row.whole(0), row.whole(1, row.whole(0))

@@ -1,4 +1,4 @@
-"""Content of a deck before the model is built: parts with nodes, elements, sets and surfaces; properties; steps."""
+"""Content of a deck before the model is built: parts with nodes, elements, sets and surfaces, properties and steps."""
 
 from __future__ import annotations
 
@@ -29,9 +29,10 @@ class Cell(Located):
 
 @dataclass(frozen=True, slots=True)
 class Members(Item):
-    """Entries of a set: numbers, or the name of another set, in an instance (empty: that of the definition).
+    """Entries of a set: numbers, or the name of another set.
 
-    The numbers may come from several lines: `lines` holds the index of the first number and the line of each further one.
+    They refer to an instance, or to the instance of the definition if `instance` is empty. The numbers may come from several
+    lines: `lines` contains, for each line after the first, the index of its first number and its line number.
     """
 
     numbers: Sequence[int] = ()
@@ -40,20 +41,20 @@ class Members(Item):
     lines: array[int] = field(default_factory=lambda: array("q"))
 
     def add(self, numbers: array[int], line: int) -> None:
-        """Add the numbers of a further line."""
+        """Add the numbers of another line."""
         assert isinstance(self.numbers, array)
         self.lines.extend((len(self.numbers), line))
         self.numbers.extend(numbers)
 
     def place_of(self, number: int) -> Location:
-        """Return the location of the line that holds a number."""
+        """Return the location of the line with a number."""
         row = bisect_right(self.lines[::2], self.numbers.index(number))
         return replace(self.location, line=self.lines[2 * row - 1]) if row else self.location
 
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """One entry of a surface: an element set or number and the label of the face, or a node set or number."""
+    """An entry of a surface: an element set or number with the label of a face, or a node set or number."""
 
     location: Location
     of: str
@@ -62,7 +63,7 @@ class Face:
 
 @dataclass
 class SurfaceDefinition(Located):
-    """A surface as the deck defines it."""
+    """The definition of a surface in the deck."""
 
     name: str
     location: Location
@@ -72,7 +73,7 @@ class SurfaceDefinition(Located):
 
 @dataclass(frozen=True)
 class Section(Item):
-    """Material and thickness (None: not given) of the elements of a set."""
+    """Material, orientation and thickness (None if not given) of the elements of a set."""
 
     elements: str
     material: str
@@ -84,7 +85,7 @@ class Section(Item):
 class Part:
     """Nodes, elements, sets and surfaces of a part, of the assembly, or of a deck without parts.
 
-    `nodes` are rows by node number; `coordinates` holds three numbers per row.
+    `nodes` contains the row of each node number in `coordinates`, which has three numbers for each row.
     """
 
     name: str = ""
@@ -99,7 +100,7 @@ class Part:
     sections: list[Section] = field(default_factory=list)
 
     def add(self, kind: str, name: str, members: list[Members]) -> None:
-        """Add entries to a set, which may exist already."""
+        """Add entries to a new or an existing set."""
         sets = self.node_sets if kind == "node" else self.element_sets
         sets.setdefault(folded(name), []).extend(members)
         self.set_names.setdefault(folded(name), name)
@@ -107,7 +108,10 @@ class Part:
 
 @dataclass
 class Instance:
-    """Placement of a part in the assembly: a translation, then a rotation about a line through two points [degree]."""
+    """A part placed in the assembly.
+
+    A translation [length] precedes a rotation, which is given by two points of its axis [length] and an angle [degree].
+    """
 
     name: str
     part: Part
@@ -117,7 +121,7 @@ class Instance:
 
 @dataclass
 class Material(Located):
-    """A material of the deck; `law` returns the material of the model for given axes, None for those of the mesh."""
+    """A material of the deck; `law` returns the material of the model for material axes, or None for those of the mesh."""
 
     name: str
     location: Location
@@ -140,7 +144,7 @@ class Interaction(Located):
     cohesion: dict[str, Block] = field(default_factory=dict)
     conductance: list[Block] = field(default_factory=list)
     friction_heat: tuple[Location, float] | None = None
-    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # (steps before, friction)
+    changes: list[tuple[int, Interaction]] = field(default_factory=list)  # number of preceding steps, and friction
 
 
 @dataclass
@@ -164,7 +168,7 @@ class Pair(Located):
 
 @dataclass(frozen=True)
 class SectorEnds(Item):
-    """The two end surfaces of a cyclic sector, and the name of their tie."""
+    """The name of a tie with cyclic symmetry and its surfaces, which are the ends of the sector."""
 
     name: str
     surfaces: tuple[str, str]
@@ -188,7 +192,7 @@ class Equation(Item):
 
 @dataclass(frozen=True)
 class Pin(Item):
-    """Nodes that follow the displacement of another node, or each of them that of a node in another set."""
+    """Two nodes, or the nodes of two sets in pairs, with the same displacement: `first` follows `second`."""
 
     first: str
     second: str
@@ -196,7 +200,7 @@ class Pin(Item):
 
 @dataclass(frozen=True)
 class MultiPoint(Item):
-    """Nodes that stay in a plane or on a line, or whose mean rotation is that of the last node."""
+    """Nodes that stay in a plane or on a line, or whose mean rotation is prescribed at the last node."""
 
     kind: str
     nodes: tuple[str, ...]
@@ -204,7 +208,7 @@ class MultiPoint(Item):
 
 @dataclass(frozen=True)
 class Link(Item):
-    """A reference node with the nodes that follow it (rigid, kinematic) or whose mean motion it follows (distributing)."""
+    """A reference node with the nodes that follow it (rigid, kinematic) or whose mean motion it has (distributing)."""
 
     reference: str
     group: str
@@ -212,12 +216,12 @@ class Link(Item):
     components: tuple[int, ...] = (1, 2, 3, 4, 5, 6)
     distributing: bool = False
     rotation: str = ""
-    orientation: str = ""  # the components refer to its axes
+    orientation: str = ""  # axes of the components
 
 
 @dataclass(frozen=True)
 class PretensionSection(Item):
-    """A pretension section of a bolt: its surface, the node that carries its shortening and force, and its normal."""
+    """A pretension section of a bolt: its surface, the node whose displacement is its shortening, and its normal."""
 
     surface: str
     node: str
@@ -226,18 +230,22 @@ class PretensionSection(Item):
 
 @dataclass(frozen=True)
 class Axes(Item):
-    """Local axes of nodes or materials: rectangular, by a point on the first axis and one in the plane, or cylindrical."""
+    """Local axes of nodes or materials.
+
+    Rectangular axes are given by a point on the first axis and a point in the plane of the first two axes, cylindrical axes
+    by two points of the axis of the cylinder.
+    """
 
     nodes: str
     cylindrical: bool
     points: tuple[float, ...]
-    distribution: str = ""  # name of the distribution of material axes by cell, in place of points
-    part: Part | None = None  # the part that defines axes of materials
+    distribution: str = ""  # name of a distribution of material axes by element, used instead of points
+    part: Part | None = None  # part in which material axes are defined
 
 
 @dataclass(frozen=True)
 class Amplitude:
-    """Points (time, multiplier), in step time or in total time."""
+    """Times and values of an amplitude, in step time or in total time."""
 
     location: Location
     times: tuple[float, ...]
@@ -247,7 +255,7 @@ class Amplitude:
 
 @dataclass(frozen=True, slots=True)
 class Given:
-    """Given supports, loads or temperatures: their block, whether earlier ones remain, and their amplitude."""
+    """A block of supports, loads or temperatures; `new` is true for OP=NEW, which removes earlier ones."""
 
     block: Block
     new: bool
@@ -264,14 +272,14 @@ class Step(Located):
     increment: float = 1.0
     static: bool = False
     perturbation: bool = False
-    heat: str = ""  # "alone", "coupled" with displacements, or empty: not computed
+    heat: str = ""  # "alone", "coupled" with displacements, or empty if temperatures are not computed
     modes: int = 0
     given: list[Given] = field(default_factory=list)
 
 
 @dataclass
 class Content:
-    """The whole content of a deck."""
+    """The content of a deck."""
 
     title: str = ""
     root: Part = field(default_factory=lambda: Part(flat=True))
@@ -297,11 +305,11 @@ class Content:
     initial: list[Block] = field(default_factory=list)
     stresses: list[Block] = field(default_factory=list)
     steps: list[Step] = field(default_factory=list)
-    heat: str = ""  # that of its steps
+    heat: str = ""  # `heat` of its steps
     modes: dict[str, Any] | None = None
     notes: list[str] = field(default_factory=list)
     outputs: list[Location] = field(default_factory=list)
 
     def note(self, at: Location | Located, text: str) -> None:
-        """Add a note on the interpretation of a line where it is not obvious."""
+        """Add a note on how a line is interpreted."""
         self.notes.append(f"{at}: {text}")

@@ -10,12 +10,12 @@ from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.model import Model
 
-# Largest number of sectors: a smaller sector would be a negligible part of the whole.
+# Largest number of sectors. A larger one is taken for an error.
 MOST_SECTORS = 100_000
 
 
 def sector_ends(block: Block) -> SectorEnds:
-    """*TIE, CYCLIC SYMMETRY: the end surfaces of a sector."""
+    """Read *TIE, CYCLIC SYMMETRY: the end surfaces of a sector."""
     if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
         raise block.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
     row = block.rows[0]
@@ -23,7 +23,7 @@ def sector_ends(block: Block) -> SectorEnds:
 
 
 def cyclic_symmetry_model(content: Content, block: Block) -> None:
-    """*CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
+    """Read *CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
     text = block.required("N")
     if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
         raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
@@ -36,7 +36,7 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
 
 
 def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]:
-    """Add the cyclic symmetries of the deck to the model; return their constraints."""
+    """Add the cyclic symmetries of the deck to the model and return their constraints."""
     content, before = deck_mesh.content, len(model.relations)
     used: set[int] = set()
     for sectors in content.sectors:
@@ -61,7 +61,7 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
 
 
 def _ends(content: Content, sectors: Sectors) -> SectorEnds:
-    """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of the tie it names, or the only ones."""
+    """Return the sector ends of a *CYCLIC SYMMETRY MODEL: those of its TIE, or the only ones of the deck."""
     named = [ends for ends in content.sector_ends if not sectors.tie or folded(ends.name) == folded(sectors.tie)]
     if len(named) != 1:
         known = ", ".join(ends.name or f"that of line {ends.location.line}" for ends in content.sector_ends) or "none"

@@ -31,25 +31,29 @@ from fastcontact.results.step import StepResult
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """An input deck of Abaqus or CalculiX, ready to solve.
+    """Model and load steps of an input deck of Abaqus or CalculiX.
 
     Attributes
     ----------
     path : pathlib.Path
+        Path of the deck.
     title : str
-        First line of ``*HEADING``.
+        First line of ``*HEADING``, or the name of the file without suffix.
     model : Model
-        Contact pairs are named ``SECONDARY/PRIMARY``, groups like the sets and surfaces of the deck. Plane models have
-        unit thickness.
+        Model of the deck. Contact pairs are named ``SECONDARY/PRIMARY``, and groups have the names of the sets and
+        surfaces of the deck. Plane models have unit thickness.
     ramp : Ramp
-        Step k of the deck ends at load factor k.
+        Load steps. Step k of the deck ends at load factor k.
     criteria : Criteria
+        Convergence criteria.
     notes : tuple of str
-        Keywords and parameters without effect, and those that are treated differently from Abaqus or CalculiX.
+        Notes on keywords and parameters that have no effect or differ from Abaqus or CalculiX.
     thickness : float
-        Thickness of a plane model [length]; `solve` returns forces for the whole thickness.
+        Thickness of a plane model [length]. `solve` returns forces for the whole thickness.
     modes : dict, optional
         Arguments of `fastcontact.modes` at the last step, from ``*FREQUENCY``; None without it.
+    building : Building
+        Model under construction, with the relation between the deck and the model.
 
     Examples
     --------
@@ -71,23 +75,28 @@ class Deck:
     building: Building = field(default=None, repr=False)  # type: ignore[assignment]
 
     def _repr_html_(self) -> str:
-        """Return title, notes and model as tables for notebooks."""
+        """Return the title, the notes and the model as HTML tables for notebooks."""
         return html_table([("note", text) for text in self.notes], caption=self.title) + self.model._repr_html_()
 
     def solve(self, **options: Any) -> list[StepResult]:
-        """Solve all steps; `options` are those of `fastcontact.solve_steps` without `resume`.
+        """Solve all steps.
+
+        Parameters
+        ----------
+        **options
+            Options of `fastcontact.solve_steps` except `resume`.
 
         Returns
         -------
         list of StepResult
-            Step k of the deck ends at load factor k. Displacements are along the global axes; reactions are the forces
-            of supports, without those of equations and couplings; forces of plane models are for the whole thickness.
+            Load steps; step k of the deck ends at load factor k. Displacements are along the global axes. Reactions are the
+            forces of supports, without those of equations and couplings. Forces of plane models are for the whole thickness.
 
         Warns
         -----
         FastcontactWarning
-            If the deck requests NLGEOM but small strains are used: it states the largest strain and rotation, whose
-            squares linear kinematics neglect. Other warnings, and errors, are those of `fastcontact.solve`.
+            If the deck requests NLGEOM but small strains are used. The warning states the largest strain and rotation, whose
+            squares linear kinematics neglect. Other warnings and errors are those of `fastcontact.solve`.
         """
         steps: list[StepResult] = []
         for step in self.solve_steps(**options):
@@ -97,14 +106,22 @@ class Deck:
         return steps
 
     def solve_steps(self, **options: Any) -> Iterator[StepResult]:
-        """Solve step by step, like `fastcontact.solve_steps`; the results are those of `solve`."""
+        """Yield the results of `solve` step by step, as `fastcontact.solve_steps` does."""
         for step in solve_steps(self.model, self.ramp, **{"criteria": self.criteria, **options}):
             yield self.finished(step)
 
     def points_of(self, name: str) -> Numbers:
-        """Return the sorted point numbers (n,) of a node set. The case of `name` is ignored.
+        """Return the sorted point numbers (n,) of a node set.
 
-        A set of a part is called ``Instance.set``. MeshError if there is no such set.
+        Parameters
+        ----------
+        name : str
+            Name of the set, in any case of letters; ``Instance.set`` for a set of a part.
+
+        Raises
+        ------
+        MeshError
+            If the set does not exist.
         """
         wanted = name.replace('"', "").strip().upper()
         for group in self.model.mesh.point_groups:
@@ -115,8 +132,15 @@ class Deck:
     def point(self, number: int | str) -> int:
         """Return the point number of a node of the deck.
 
-        `number` is its number in the deck, in an instance of a part ``"Instance".number``. MeshError if there is no such
-        node.
+        Parameters
+        ----------
+        number : int or str
+            Node number in the deck; ``"Instance.number"`` for a node of a part.
+
+        Raises
+        ------
+        MeshError
+            If the node does not exist.
         """
         assembly = self.building.assembly
         scope, rest = assembly.place_of(str(number))
@@ -125,7 +149,7 @@ class Deck:
         return assembly.index[scope][int(rest[:19])]
 
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step of the model with the reactions of supports alone and forces of the whole thickness."""
+        """Return a step of the model with the reactions of supports only and with forces for the whole thickness."""
         reaction = self._supports_alone(step.reaction, float(np.nextafter(step.load_factor, -np.inf)))
         for name, ends in self.building.gap_ends.items():
             contact = step.contact[name]
@@ -154,7 +178,10 @@ class Deck:
         )
 
     def _supports_alone(self, reaction: Array, instant: float) -> Array:
-        """Return reactions (n_points, dim) without constraint forces, computed from the unsupported components [force]."""
+        """Return the reactions (n_points, dim) [force] of supports, without the forces of other constraints.
+
+        The forces of the constraints follow from the reactions at components without a support.
+        """
         links = self.building.links
         if not links:
             return reaction.copy()
@@ -191,18 +218,21 @@ class Deck:
 
 @typed(FileError)
 def read_deck(path: PathLike) -> Deck:
-    """Read an input deck of Abaqus or CalculiX: static steps of elastic, plastic and hyperelastic bodies in contact.
+    """Read an input deck of Abaqus or CalculiX.
 
-    Every keyword and parameter is translated, noted as without effect, or refused. Only the deck and included files in
-    its folder and subfolders are read.
+    Static steps of elastic, plastic and hyperelastic bodies in contact are supported. Each keyword and parameter is
+    translated, listed in a note because it has no effect, or rejected with an error. Included files must be in the folder of
+    the deck or below.
 
     Parameters
     ----------
     path : path-like
+        Path of the deck.
 
     Returns
     -------
     Deck
+        Model and load steps.
 
     Raises
     ------
@@ -216,7 +246,7 @@ def read_deck(path: PathLike) -> Deck:
     Warns
     -----
     FastcontactWarning
-        If a step has NLGEOM, but small strains are used, as with couplings.
+        If a step has NLGEOM but small strains are used, for example because of couplings.
 
     Examples
     --------
@@ -252,7 +282,7 @@ def read_deck(path: PathLike) -> Deck:
 
 
 def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
-    """Return sums of work or power, also those by name, times a factor; counts stay as they are."""
+    """Return sums of work or power, which may be nested by name, times a factor; counts are unchanged."""
     return {
         name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
         for name, value in sums.items()
@@ -260,7 +290,7 @@ def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _text(path: Path) -> str:
-    """Return the text stored in result files: the title in the form of a case file."""
+    """Return the text that result files store for a deck: a comment in a case file."""
     return f"# from the deck {path.name}\n"
 
 

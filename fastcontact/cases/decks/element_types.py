@@ -1,4 +1,4 @@
-"""Element types of decks: the element of the mesh, the kinematics, and the nodes of the labelled faces."""
+"""Element types of decks: the element of the mesh, the kinematics and the corner nodes of each face."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SHAPES = {"tet": TETRAHEDRON, "hex": HEXAHEDRON, "wed": WEDGE, "tri": TRIANGLE, 
 SOLIDS = {"4": "tet4", "6": "wedge6", "8": "hex8", "10": "tet10", "15": "wedge15", "20": "hex20"}
 PLANES = {"3": "tri3", "4": "quad4", "6": "tri6", "8": "quad8"}
 FAMILIES = {"CPE": "plane_strain", "CPS": "plane_stress", "CAX": "axisymmetric"}
-# Families of pure heat conduction elements, and the deformable ones of the same shape.
+# Families of heat conduction elements, and the families of deformable elements with the same shape.
 CONDUCTING = {"DC3D": "C3D", "DC2D": "CPE", "DCAX": "CAX"}
 # Kinds of elements that are not solids, by the beginning of their type name.
 OTHERS = {
@@ -31,16 +31,18 @@ class ElementType:
 
     Attributes
     ----------
-    name, element, kinematics : str
-        Name in the deck, element of the mesh, kinematics of the model.
-    faces : tuple of tuple of int
-        Corners of the faces 1, 2, ..., as positions in the connectivity.
+    name : str
+        Name in the deck.
+    element : str
+        Name of the mesh element.
+    kinematics : str
+        Kinematics of the model.
     note : str
-        How the element of the package differs; otherwise empty.
+        Difference between the element of the deck and that of the package; empty if there is none.
     modes : bool
-        Whether it has incompatible modes.
+        Whether the element has incompatible modes.
     conducts : bool
-        Whether it conducts heat without having displacements.
+        Whether the element conducts heat and has no displacements.
     """
 
     name: str
@@ -52,13 +54,13 @@ class ElementType:
 
     @property
     def faces(self) -> tuple[tuple[int, ...], ...]:
-        """Corners of the faces 1, 2, ..., as positions in the connectivity."""
+        """Corners of the faces 1, 2, ..., as indices into the connectivity of the element."""
         return SHAPES[self.element[:3]]
 
 
 @cache
 def element_type(name: str) -> ElementType | None:
-    """Return the translation of an element type of decks (in upper case), None unless it is a supported solid."""
+    """Return the translation of an element type of a deck, in upper case, or None unless it is a supported solid."""
     conducts = name[:4] in CONDUCTING
     base = CONDUCTING[name[:4]] + name[4:] if conducts else name.removesuffix("T")
     note, modes = "", False
@@ -80,6 +82,6 @@ def element_type(name: str) -> ElementType | None:
 
 
 def described(name: str) -> str:
-    """Return the kind of an unsupported element type, in brackets; empty if it is unknown."""
+    """Return the kind of an unsupported element type in parentheses, or an empty string if it is unknown."""
     fitting = [key for key in OTHERS if name.startswith(key)]
     return f" ({OTHERS[max(fitting, key=len)]})" if fitting else ""

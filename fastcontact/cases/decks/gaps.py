@@ -1,4 +1,4 @@
-"""Gap elements and springs of a deck: contact of the faces around nodes with a rigid plane or the faces of another body."""
+"""Gap elements and springs of a deck; gap elements become contact of faces with a rigid plane or with another body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.contact.obstacles.shapes import HalfSpace
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Distances that count as none, relative to the size of the model.
+# Tolerance of distances, relative to the size of the model.
 TOUCHING = 1e-6
 
 
@@ -29,15 +29,19 @@ class GapGroup(Located):
     Attributes
     ----------
     name : str
+        Name of the element set.
     location : Location
+        Line of the keyword *GAP.
     clearance : float
-        [length]
+        Initial clearance [length].
     direction : ndarray (dim,)
-        Direction from the first node to the second one [-].
+        Unit vector from the first node to the second node [-].
     ends : ndarray of int (n, 2)
-        Points of the two nodes.
-    facets, opposite : str
-        Groups of the facets around the first nodes and around the second ones; empty if these belong to no solid.
+        Points of the first and the second node of each element.
+    facets : str
+        Group of the facets around the first nodes.
+    opposite : str
+        Group of the facets around the second nodes; empty unless all of them belong to solids.
     """
 
     name: str
@@ -50,7 +54,7 @@ class GapGroup(Located):
 
 
 def gap(content: Content, block: Block) -> None:
-    """*GAP: clearance and direction of gap elements."""
+    """Read *GAP: the clearance and the direction of gap elements."""
     row = block.only()
     direction = tuple(row.number(i, 0.0) for i in (1, 2, 3))
     if not any(direction):
@@ -59,7 +63,7 @@ def gap(content: Content, block: Block) -> None:
 
 
 def spring(content: Content, block: Block) -> None:
-    """*SPRING: stiffness of springs along their axis."""
+    """Read *SPRING: the stiffness of springs along their axis."""
     rows = block.rows
     if len(rows) != 1:
         raise block.refuse("linear springs along their line need an empty line and then one with the stiffness")
@@ -69,7 +73,7 @@ def spring(content: Content, block: Block) -> None:
 
 
 def check_discrete(assembly: Assembly, kind: str, given: Mapping[str, Any], needed: str) -> None:
-    """Refuse springs and gap elements without properties."""
+    """Raise CaseError if a spring or a gap element has no properties."""
     with_one = {element for name, entry in given.items() for element in assembly.elements_of(name, entry[0])}
     for element in assembly.discrete:
         if element.cell.type == kind and element not in with_one:
@@ -77,7 +81,7 @@ def check_discrete(assembly: Assembly, kind: str, given: Mapping[str, Any], need
 
 
 def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
-    """Make groups of the facets around the nodes of gap elements; raises CaseError if these do not fill whole facets."""
+    """Make groups of the facets around the nodes of gap elements; CaseError if the nodes do not fill whole facets."""
     groups = []
     check_discrete(deck_mesh, "GAPUNI", deck_mesh.content.gaps, "*GAP")
     for name, (location, clearance, vector) in deck_mesh.content.gaps.items():
@@ -98,7 +102,7 @@ def gap_groups(deck_mesh: DeckMesh) -> list[GapGroup]:
 
 
 def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location) -> str:
-    """Make a group of the facets with all nodes among points; raises CaseError if a point belongs to none of them."""
+    """Make a group of the facets whose nodes are all in `points`; CaseError if a point belongs to no such facet."""
     chosen = set(points.tolist())
     faces = deck_mesh.faces_within(chosen)
     if {p for face in faces for p in facet_points(*face)} != chosen:
@@ -109,7 +113,11 @@ def _whole(deck_mesh: DeckMesh, group: str, points: Indices, location: Location)
 
 
 def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Conditions) -> dict[str, dict[int, int]]:
-    """Add the contact of gap elements to a model; return, by its name, the held node behind each node of the body."""
+    """Add the contact of gap elements to a model.
+
+    Returns the node opposite to each node of the body by the name of the contact, or an empty dictionary if the opposite
+    nodes belong to solids. Raises CaseError if the nodes are not in planes normal to the direction of the elements.
+    """
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
     if np.ptp(first @ gap.direction) > size:
@@ -141,7 +149,7 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
 
 
 def _motion(gap: GapGroup, conditions: Conditions) -> Table:
-    """Return the motion of the second nodes along the direction; raises CaseError unless all are driven alike."""
+    """Return the motion of the second nodes along the direction; CaseError unless all have the same prescribed motion."""
     axes, supports = np.flatnonzero(gap.direction).tolist(), conditions.supports
     temporary = {name for name, _ in conditions.temporary()}
     by_axis: list[tuple[float, Array]] = []

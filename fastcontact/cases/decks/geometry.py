@@ -1,4 +1,4 @@
-"""Keywords of the geometry: nodes, elements, sets, surfaces, sections, parts, instances."""
+"""Keywords of the geometry: nodes, elements, sets, surfaces, sections, parts and instances."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from fastcontact.cases.decks.content import Cell, Content, Face, Instance, Membe
 from fastcontact.cases.decks.element_types import described, element_type
 from fastcontact.mesh import elements
 
-# Numbers of nodes of the supported elements that are not solids.
+# Number of nodes of each supported element that is not a solid.
 DISCRETE = {"GAPUNI": 2, "SPRINGA": 2}
-# Elements with at least this number of nodes may continue in the next line without a comma at the end.
+# Smallest number of nodes of elements that may continue on the next line without a comma at the end of the line.
 LONG = 15
 
 
 def nodes(content: Content, part: Part, block: Block) -> None:
-    """*NODE: numbers and coordinates."""
+    """Read *NODE: numbers and coordinates of nodes."""
     if block.get("SYSTEM", "R").upper() != "R":
         raise block.refuse(f"SYSTEM={block.get('SYSTEM')} is not supported: give rectangular coordinates")
     numbers = array("q")
@@ -38,7 +38,7 @@ def nodes(content: Content, part: Part, block: Block) -> None:
 
 
 def cells(content: Content, part: Part, block: Block) -> None:
-    """*ELEMENT: numbers and nodes of elements of one type."""
+    """Read *ELEMENT: numbers and nodes of elements of one type."""
     name, element_set = block.required("TYPE").upper(), block.get("ELSET")
     kind = element_type(name)
     if kind is None and name not in DISCRETE:
@@ -66,7 +66,7 @@ def cells(content: Content, part: Part, block: Block) -> None:
 
 
 def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
-    """Yield the entries of each element; they may continue after a line that ends with a comma."""
+    """Yield the first line and all entries of each element, which may continue on several lines."""
     first: Row | None = None
     entries: tuple[str, ...] = ()
     for row in block.each():
@@ -83,17 +83,17 @@ def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
 
 
 def node_set(content: Content, part: Part, block: Block) -> None:
-    """*NSET."""
+    """Read *NSET: a node set."""
     part.add("node", block.required("NSET"), _members(block))
 
 
 def element_set(content: Content, part: Part, block: Block) -> None:
-    """*ELSET."""
+    """Read *ELSET: an element set."""
     part.add("element", block.required("ELSET"), _members(block))
 
 
 def _members(block: Block) -> list[Members]:
-    """Return the entries of a set."""
+    """Return the entries of a set; CaseError if a range of GENERATE is empty."""
     instance = folded(block.get("INSTANCE"))
     entries = []
     for row in block.each():
@@ -107,7 +107,7 @@ def _members(block: Block) -> list[Members]:
             if numbers:
                 members = array("q", map(int, group))
                 if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
-                    entries[-1].add(members, row.location.line)  # one entry for consecutive lines
+                    entries[-1].add(members, row.location.line)  # consecutive lines become one entry
                 else:
                     entries.append(Members(row.location, members, instance=instance))
             else:
@@ -116,7 +116,7 @@ def _members(block: Block) -> list[Members]:
 
 
 def surface(content: Content, part: Part, block: Block) -> None:
-    """*SURFACE: faces of elements, or nodes."""
+    """Read *SURFACE: faces of elements, or nodes."""
     name, kind = block.required("NAME"), block.choice("TYPE", ("ELEMENT", "NODE"))
     definition = SurfaceDefinition(name, block.location, kind == "NODE")
     registered("surface", name, part.surfaces, definition, block)
@@ -128,7 +128,7 @@ def surface(content: Content, part: Part, block: Block) -> None:
 
 
 def instance(content: Content, block: Block) -> Instance:
-    """*INSTANCE: a part placed in the assembly."""
+    """Read *INSTANCE: a part placed in the assembly."""
     name, of = block.required("NAME"), block.required("PART")
     placed = Instance(name, defined("part", of, content.parts, block))
     rows = block.rows
@@ -142,13 +142,13 @@ def instance(content: Content, block: Block) -> Instance:
 
 
 def new_part(content: Content, block: Block) -> Part:
-    """*PART."""
+    """Read *PART and return the new part."""
     name = block.required("NAME")
     return registered("part", name, content.parts, Part(unquoted(name)), block)
 
 
 def section(content: Content, part: Part, block: Block) -> None:
-    """*SOLID SECTION: the material of the elements of a set."""
+    """Read *SOLID SECTION: material, orientation and thickness of the elements of a set."""
     thickness = None
     for row in block.rows[:1]:
         thickness = row.number(0, 1.0)

@@ -1,4 +1,4 @@
-"""Heat conduction of a deck: temperatures, fluxes and films of its steps as loads of the model."""
+"""Heat conduction in a deck: prescribed temperatures, heat fluxes and films of its steps, as loads of the model."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ TEMPERATURE = 11
 
 
 def physical_constants(content: Content, block: Block) -> None:
-    """*PHYSICAL CONSTANTS: constants of radiation, without effect."""
+    """Read *PHYSICAL CONSTANTS: constants of radiation, which have no effect."""
     content.note(block, "no effect: there is no radiation")
 
 
 def check_steps(content: Content) -> None:
-    """Set whether the steps compute heat, alone or with displacements; raises CaseError if they do not match."""
+    """Set whether the steps compute temperatures, alone or with displacements; CaseError if the steps are inconsistent."""
     first = next((step for step in content.steps if step.heat), None)
     content.heat = first.heat if first else ""
     for number, step in enumerate(content.steps):
@@ -51,21 +51,21 @@ def check_steps(content: Content) -> None:
 
 
 class Spans(Generic[Name]):
-    """Intervals of the load factor in which loads act, from the steps that give and remove them."""
+    """Intervals of the load factor in which loads act, derived from the steps that apply and remove the loads."""
 
     def __init__(self) -> None:
         self._begun: dict[Name, float] = {}
         self._over: dict[Name, list[tuple[float, float]]] = {}
 
     def advance(self, history: Histories[Name], begin: float) -> None:
-        """Advance to the step that begins at a load factor; to be called before `history` advances."""
+        """Advance to the step that begins at the load factor `begin`. Call this before `history.advance`."""
         for name in history.dying:
             self._over.setdefault(name, []).append((self._begun.pop(name), begin))
         for name in (*history.changing, *history.first):
             self._begun.setdefault(name, begin)
 
     def of(self, names: Iterable[Name]) -> dict[tuple[float, float], list[Name]]:
-        """Return the names by the interval of load factors in which they act."""
+        """Return the names of loads by the interval of load factors in which the loads act."""
         alike: dict[tuple[float, float], list[Name]] = {}
         for name in names:
             last = [(self._begun[name], np.inf)] if name in self._begun else []
@@ -75,7 +75,7 @@ class Spans(Generic[Name]):
 
 
 class HeatConditions:
-    """Prescribed temperatures, nodal heat, fluxes and films of a deck, with their histories."""
+    """Prescribed temperatures, nodal heat flows, heat fluxes and films of a deck, with their histories."""
 
     def __init__(self, assembly: DeckMesh, initial: Mapping[int, float]) -> None:
         self.assembly, content = assembly, assembly.content
@@ -93,11 +93,11 @@ class HeatConditions:
 
     @property
     def histories(self) -> tuple[Histories[Any], ...]:
-        """All heat histories."""
+        """The histories of all heat loads."""
         return self.temperatures, self.powers, self.fluxes, self.films
 
     def prescribe(self, given: Given, row: Row) -> None:
-        """Prescribe the temperature of nodes from a line of *BOUNDARY."""
+        """Prescribe the temperature of nodes as a line of *BOUNDARY requires."""
         if not self.assembly.content.heat:
             raise row.refuse("component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE")
         if "FIXED" in given.block.parameters:
@@ -106,7 +106,7 @@ class HeatConditions:
             self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
 
     def _of_solids(self, row: Row) -> list[int]:
-        """Return the points of the node set in a line; raises CaseError if one belongs to no solid."""
+        """Return the points of the node set in a line; CaseError if a point belongs to no solid."""
         points = self.assembly.nodes(row.text(0), row.location)
         for point in points:
             if point not in self.assembly.of_solids:
@@ -136,7 +136,7 @@ class HeatConditions:
                 history.give(target, row.number(2), given.amplitude, row.location)
 
     def _in_place_of_others(self, film: Target, row: Row) -> None:
-        """Replace a film that has another coefficient on the same face."""
+        """Replace an earlier film with another coefficient on the same face; CaseError if this step has applied it."""
         self.rest[film] = self.reference
         before = self.film_of.get((film.keyword, film.face))
         if before is not None and before != film:
@@ -157,7 +157,7 @@ class HeatConditions:
         self.begun = self.begun or bool(step.heat)
 
     def loads(self, thickness: float) -> list[Callable[[Model], None]]:
-        """Make the mesh groups of all heat loads; return functions that add them to a model."""
+        """Make the mesh groups of all heat loads; return functions that add the loads to a model."""
         assembly, adders = self.assembly, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
         risen = ByShape[int]()
@@ -211,12 +211,12 @@ class HeatConditions:
 
 
 def _between(span: tuple[float, float]) -> dict[str, float]:
-    """Return the arguments `begins` and `ends` of the model's methods for an interval of load factors."""
+    """Return the arguments `begins` and `ends` of methods of `Model` for an interval of load factors."""
     return {name: at for name, at in zip(("begins", "ends"), span, strict=True) if np.isfinite(at)}
 
 
 def _above(value: Any, reference: float) -> Any:
-    """Return a temperature, a number or a function of the position, relative to the reference."""
+    """Return a temperature that is given relative to the reference, as a number or a function of the position."""
 
     def risen(points: Array) -> Array:
         return np.asarray(value(points) + reference)
@@ -225,7 +225,10 @@ def _above(value: Any, reference: float) -> Any:
 
 
 def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
-    """Return the initial temperature of all solids; zero if it varies and no material expands."""
+    """Return the initial temperature of the solids, or zero if it varies and has no effect.
+
+    Raises CaseError if it varies and the computed temperatures expand a material.
+    """
     content = assembly.content
     values = {initial.get(point, 0.0) for point in assembly.of_solids}
     if len(values) == 1:

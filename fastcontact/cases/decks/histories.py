@@ -17,18 +17,18 @@ from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
-# Duration of a jump at the beginning of a step, relative to the step.
+# Duration of a jump at the begin of a step, relative to the duration of the step.
 JUMP = 1e-9
-# Number of digits to which histories must agree, up to a factor, to be merged.
+# Number of decimals to which scaled histories must agree to be merged.
 ALIKE = 12
 
 
 @dataclass(slots=True)
 class Track:
-    """The history of quantities that were always given together.
+    """The common history of quantities that have always been prescribed together.
 
-    `numbers` alternates load factor and value of the points: every node may have its own track, and pairs would take three
-    times the memory.
+    `numbers` contains load factors and values in turn. Each node may have a separate track, and a list of pairs would take
+    three times the memory. `size` is the number of quantities, and `alive` is false once a step has removed them.
     """
 
     numbers: array[float]
@@ -39,16 +39,16 @@ class Track:
 
     @property
     def last(self) -> float:
-        """The value at the end of the last step so far."""
+        """The value at the end of the latest step."""
         return self.numbers[-1]
 
     @property
     def points(self) -> Table:
-        """Points (load factor, value)."""
+        """Load factor and value of each point."""
         return tuple(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     def add(self, points: Iterable[tuple[float, float]]) -> None:
-        """Append points; one at the time of the last point but with another value becomes a jump."""
+        """Append points; a point with the time of the last point and another value becomes a jump."""
         for time, value in points:
             end, before = self.numbers[-2:]
             if time <= end:
@@ -60,16 +60,16 @@ class Track:
 
 @dataclass
 class Values(Generic[Name]):
-    """Values of a step by name: the rows in columns of values, line numbers, and block lines.
+    """Values of a step by name, stored in columns of values, line numbers and indices of blocks.
 
-    Every node may have its own value, and an object for each would take several times the memory of its line.
+    Each node may have a separate value, and an object per value would take several times the memory of its line.
     """
 
     rows: dict[Name, int] = field(default_factory=dict)
     values: array[float] = field(default_factory=lambda: array("d"))
     lines: array[int] = field(default_factory=lambda: array("q"))
     origins: array[int] = field(default_factory=lambda: array("q"))
-    blocks: list[tuple[str, Location]] = field(default_factory=list)  # amplitude, and a line of the block
+    blocks: list[tuple[str, Location]] = field(default_factory=list)  # amplitude and a line of each block
     last: tuple[float, int, int] | None = None
     row: int = 0
 
@@ -80,7 +80,7 @@ class Values(Generic[Name]):
         return iter(self.rows)
 
     def put(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Store a value; the last one for a name counts."""
+        """Store a value, which replaces an earlier value with the same name."""
         block = self.blocks[-1] if self.blocks else None
         if block is None or (amplitude, location.file, location.keyword) != (block[0], block[1].file, block[1].keyword):
             self.blocks.append((amplitude, location))
@@ -93,7 +93,7 @@ class Values(Generic[Name]):
         self.rows[name] = self.row
 
     def get(self, name: Name) -> tuple[float, str, Location]:
-        """Return the value for a name, its amplitude and its location."""
+        """Return the value with a name, its amplitude and its location."""
         row = self.rows[name]
         amplitude, location = self.blocks[self.origins[row]]
         return self.values[row], amplitude, replace(location, line=self.lines[row])
@@ -104,7 +104,7 @@ class Values(Generic[Name]):
             self.put(name, *other.get(name))
 
     def columns(self) -> tuple[Array, list[str]]:
-        """Return values (n,) and amplitudes of all names."""
+        """Return the values (n,) and the amplitudes of all names."""
         rows = np.fromiter(self.rows.values(), int, len(self.rows))
         origins = np.asarray(self.origins, int)[rows]
         return np.asarray(self.values, float)[rows], [self.blocks[origin][0] for origin in origins.tolist()]
@@ -114,10 +114,24 @@ class Values(Generic[Name]):
 class Histories(Generic[Name]):
     """Histories of loads or supports by name.
 
-    `changing` holds the values given in the current step, with their locations, and `dying` the earlier ones that this step
-    removes. `rest` holds the values before any are given (default zero), `first` those given before all steps, which hold for
-    the first step unless it gives others. `time` is the beginning of the current step, and `lasting` holds the tracks whose
-    amplitudes are in total time.
+    Attributes
+    ----------
+    content : Content
+        Content of the deck.
+    tracks : dict
+        Track by name.
+    changing : Values
+        Values of the current step.
+    dying : dict
+        Names of earlier values that the current step removes.
+    rest : mapping
+        Values without any load or support, by default zero.
+    first : Values
+        Values given before all steps, which are effective in the first step unless that step changes them.
+    time : float
+        Total time at the begin of the current step.
+    lasting : dict
+        Tracks whose amplitudes are in total time, by the identity of the track.
     """
 
     content: Content
@@ -130,7 +144,7 @@ class Histories(Generic[Name]):
     lasting: dict[int, Track] = field(default_factory=dict)
 
     def give(self, name: Name, value: float, amplitude: str, location: Location) -> None:
-        """Set a value for the current step; raises CaseError if the step has set a different one."""
+        """Set a value for the current step; CaseError if this step has set a different value."""
         if name in self.changing:
             first, other, before = self.changing.get(name)
             if (first, other) != (value, amplitude):
@@ -142,13 +156,13 @@ class Histories(Generic[Name]):
         self.dying.pop(name, None)
 
     def hold(self, name: Name, location: Location) -> None:
-        """Hold the value at the end of the last step."""
+        """Hold the value that was reached at the end of the latest step."""
         if name in self.tracks:
             self.changing.put(name, self.tracks[name].last, "", location)
             self.dying.pop(name, None)
 
     def begin(self) -> None:
-        """Start the values given before all steps at their rest values, to be reached in the first step."""
+        """Begin the histories of values given before all steps at their rest values; the first step reaches the values."""
         alike: dict[float, list[Name]] = {}
         for name in self.changing:
             alike.setdefault(self.rest.get(name, 0.0), []).append(name)
@@ -158,7 +172,7 @@ class Histories(Generic[Name]):
         self.first, self.changing = self.changing, Values()
 
     def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
-        """Remove the values that earlier steps gave."""
+        """Remove the values of earlier steps whose names satisfy `which`."""
         self.first = Values()
         for name, track in self.tracks.items():
             if track.alive and name not in self.changing and which(name):
@@ -198,7 +212,7 @@ class Histories(Generic[Name]):
         self.changing, self.first, self.dying = Values(), Values(), {}
 
     def _track(self, names: list[Name], rest: float, given: Values[Name]) -> Track:
-        """Return a track of these names alone: the existing one, a new one, or a copy split from a shared one."""
+        """Return a track for these names only: the existing track, a new track, or a copy of a track with more names."""
         track = self.tracks.get(names[0])
         if track is not None and track.size == len(names):
             return track
@@ -211,16 +225,16 @@ class Histories(Generic[Name]):
         return track
 
     def distinct(self) -> list[Track]:
-        """Return all tracks, each once."""
+        """Return all tracks without repetition."""
         return list({id(track): track for track in self.tracks.values()}.values())
 
     def table(self, name: Name) -> Table:
-        """Return the whole history as a table of load factors and values."""
+        """Return the history up to the end of the last step as load factors and values."""
         points, end = self.tracks[name].points, float(len(self.content.steps))
         return points if points[-1][0] >= end else (*points, (end, points[-1][1]))
 
     def alike(self) -> Iterator[tuple[Table, list[Name]]]:
-        """Yield all histories, each once, with the names that share it."""
+        """Yield each distinct history with the names that share it."""
         members: dict[bytes, list[Name]] = {}
         for name, track in self.tracks.items():
             members.setdefault(track.numbers.tobytes(), []).append(name)
@@ -241,23 +255,24 @@ def _equal(*columns: AnyArray) -> Iterator[Indices]:
 
 
 def shape_of(table: Table) -> tuple[float, Table]:
-    """Return the value of a history that is largest in magnitude, and the history divided by it."""
+    """Return the value of largest magnitude in a history, and the history divided by this value."""
     size = max((value for _, value in table), key=abs)
     return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
 
 
 class ByShape(Generic[Name]):
-    """Histories of points along axes, grouped by axis and shape: nodal values become a few loads.
+    """Histories of points along axes, grouped by axis and shape, so that many nodal values become a few loads.
 
-    For body forces, points are cells and axes are kinds of force. Iteration yields axis, points, value and history. The value
-    is 1, or a function that returns the values of the ascending points if they differ.
+    For body forces, points are cells and axes are kinds of force. Iteration yields the axis, the points, the value and the
+    history of each group. The value is 1 if it is uniform; otherwise it is a function that returns the values of the points,
+    which are in ascending order.
     """
 
     def __init__(self) -> None:
         self._members: dict[tuple[Name, Table], tuple[Table, array[float], array[int]]] = {}
 
     def add(self, axis: Name, table: Table, points: Sequence[int]) -> None:
-        """Add a history of points along an axis."""
+        """Add the history of some points along an axis."""
         size, shape = shape_of(table)
         _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
         sizes.extend([size] * len(points))
@@ -265,7 +280,7 @@ class ByShape(Generic[Name]):
 
     @staticmethod
     def of(alike: Iterable[tuple[Table, Sequence[int]]]) -> ByShape[int]:
-        """Return the histories of points without axis; the axis is 0."""
+        """Return the histories of quantities without a direction; their axis is 0."""
         by_shape = ByShape[int]()
         for table, points in alike:
             by_shape.add(0, table, points)
@@ -276,17 +291,20 @@ class ByShape(Generic[Name]):
             points, which = np.unique(members, return_inverse=True)
             if len(points) == len(members) and min(sizes) == max(sizes):
                 yield axis, np.asarray(members), 1.0, table
-            else:  # values at the same point add up
+            else:  # several values at a point are added
                 yield axis, points, partial(given_values, np.bincount(which, sizes).astype(float)), shape
 
 
 def given_values(values: Array, positions: Array) -> Array:
-    """Return given values (n,), repeated to the number of positions (k n, dim), which do not matter otherwise."""
+    """Return `values` (n,), each repeated k times for k n positions; the positions (k n, dim) [length] are not used."""
     return np.repeat(values, len(positions) // len(values))
 
 
 def _shaped(value: float, shape: Amplitude, begin: float, start: float, period: float) -> list[tuple[float, float]]:
-    """Return the points (load factor, value) of an amplitude in a step that begins at the load factor `begin`."""
+    """Return load factors and values of an amplitude in a step that begins at the load factor `begin`.
+
+    `start` is the total time at the begin of the step and `period` its duration.
+    """
     first = start if shape.total else 0.0
     low, high = bisect_right(shape.times, first), bisect_left(shape.times, first + period)
     times = [first, *shape.times[low:high], first + period]

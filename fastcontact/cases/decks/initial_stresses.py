@@ -1,4 +1,4 @@
-"""Initial stresses of a deck by element or element set, with the conventions of Abaqus."""
+"""Initial stresses of a deck by element or element set."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.mesh.mesh import starts_of
 from fastcontact.model.model import Model
 
-# Components in the order of a data line, by their number.
+# Components in the order of a data line, by the dimension of the mesh.
 ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
-    """Add the initial stresses to a model; of several lines for an element, the last one counts."""
+    """Add the initial stresses to a model; the last of several lines for an element is used.
+
+    Raises CaseError if a line has not all components, or if an element is not a solid or has an orientation.
+    """
     content, names = deck_mesh.content, ORDER[deck_mesh.dim]
     if not content.stresses:
         return

@@ -1,4 +1,4 @@
-"""Interactions of a deck: the keywords of contact properties, and the options of pairs that follow from them."""
+"""Surface interactions of a deck: the keywords of contact properties, and the resulting options of contact pairs."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from fastcontact.model.model import Model
 
 INITIATIONS = {"QUADS": "quadratic", "MAXS": "maximum"}
 MODES = {"BK": "bk", "POWER LAW": "power"}
-# Conductance of ties relative to conductivity over model size: the sides differ in temperature by about its inverse.
+# Conductance of ties relative to conductivity over model size. The relative difference in temperature between the sides is
+# about its inverse.
 PERFECT = 1e8
-# Clearance, relative to the last one of a table, beyond which no heat is conducted.
+# Clearance beyond which no heat is conducted, relative to the last clearance of a table.
 BEYOND = 1.0 + 1e-9
 
 
 def interaction(content: Content, block: Block) -> Interaction:
-    """*SURFACE INTERACTION: the beginning of the properties of contact pairs."""
+    """Read *SURFACE INTERACTION and return the new contact properties, which later keywords set."""
     name = block.required("NAME")
     properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
@@ -35,16 +36,16 @@ def interaction(content: Content, block: Block) -> Interaction:
 
 
 def changed_interaction(content: Content, block: Block) -> Interaction:
-    """*CHANGE FRICTION: the beginning of a change from the current step on, given by the *FRICTION below it."""
+    """Read *CHANGE FRICTION; a *FRICTION below it sets the friction from the begin of the current step."""
     name = block.required("INTERACTION")
     before = defined("surface interaction", name, content.interactions, block)
-    changed = Interaction(name, block.location, friction=-1.0)  # to be set by *FRICTION
+    changed = Interaction(name, block.location, friction=-1.0)  # set by *FRICTION
     before.changes.append((len(content.steps) - 1, changed))
     return changed
 
 
 def behaviour(content: Content, current: Interaction, block: Block) -> None:
-    """*SURFACE BEHAVIOR: hard, or soft with a slope, a table or an exponential law."""
+    """Read *SURFACE BEHAVIOR: hard or tied contact, or a linear, tabular or exponential law of pressure."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
     if law == "LINEAR":
         current.penalty = block.only().positive(0, "slope")
@@ -60,7 +61,7 @@ def behaviour(content: Content, current: Interaction, block: Block) -> None:
 
 
 def _table(block: Block) -> float | list[tuple[float, float]]:
-    """Return a table of overclosures and pressures, or the slope if it is one straight line through the origin."""
+    """Return a table of overclosures and pressures, or its slope if it is a straight line through the origin."""
     points = [(row.number(1), row.number(0)) for row in block.rows]
     try:
         TabularLaw("", points)
@@ -72,7 +73,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
 
 
 def friction(content: Content, current: Interaction, block: Block) -> None:
-    """*FRICTION: the coefficient, and in CalculiX the stick slope."""
+    """Read *FRICTION: the coefficient of friction and, as in CalculiX, the stick slope."""
     row = block.only()
     current.friction = row.number(0)
     if current.friction < 0:
@@ -85,12 +86,12 @@ def friction(content: Content, current: Interaction, block: Block) -> None:
 
 
 def gap_conductance(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP CONDUCTANCE: stored until it is known whether heat is computed."""
+    """Read *GAP CONDUCTANCE, which is interpreted after all steps are read."""
     current.conductance.append(block)
 
 
 def gap_heat_generation(content: Content, current: Interaction, block: Block) -> None:
-    """*GAP HEAT GENERATION: the fraction of the friction work that becomes heat, half of it on each side."""
+    """Read *GAP HEAT GENERATION: the fraction of the frictional work that becomes heat, half of it on each side."""
     row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
@@ -103,19 +104,19 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
 
 
 def keep(content: Content, current: Interaction, block: Block) -> None:
-    """*COHESIVE BEHAVIOR, *DAMAGE INITIATION, *DAMAGE EVOLUTION: stored until all are read."""
+    """Read *COHESIVE BEHAVIOR, *DAMAGE INITIATION or *DAMAGE EVOLUTION, which are interpreted together."""
     if block.keyword in current.cohesion:
         raise block.refuse(f"surface interaction '{current.name}' has this keyword twice")
     current.cohesion[block.keyword] = block
 
 
 def stabilization(content: Content, current: Interaction, block: Block) -> None:
-    """*DAMAGE STABILIZATION: without effect."""
+    """Read *DAMAGE STABILIZATION, which has no effect."""
     content.note(block, "no effect: layers break without viscosity")
 
 
 def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the friction options of a pair; *CHANGE FRICTION changes them at the beginning of steps."""
+    """Return the friction options of a pair, with the changes by *CHANGE FRICTION at the begin of steps."""
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
@@ -135,9 +136,9 @@ def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
 
 
 def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the options of a pair for its cohesive layer: a tie without stiffness and damage, none without a layer.
+    """Return the options of a pair for its cohesive layer; an empty dictionary if the pair has no layer.
 
-    Raises CaseError if no law of the package matches the one of the deck.
+    A layer without stiffness and damage is a tie. Raises CaseError if the law of the deck is not supported.
     """
     blocks = law.cohesion
     if not blocks:
@@ -175,7 +176,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def _stiffness(block: Block) -> float | None:
-    """Return the stiffness of a layer, None if not given; raises CaseError if it differs between the directions."""
+    """Return the stiffness of a layer [pressure / length], None if not given; CaseError if it depends on the direction."""
     block.choice("TYPE", ("UNCOUPLED",))
     block.choice("ELIGIBILITY", ("CURRENT CONTACTS", "ORIGINAL CONTACTS"))
     if not block.rows:
@@ -188,7 +189,7 @@ def _stiffness(block: Block) -> float | None:
 
 
 def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> dict[str, Any]:
-    """Return the fracture energies of a layer and its mixed-mode law."""
+    """Return the fracture energies [force / length] of a layer and its mixed-mode law."""
     block.choice("SOFTENING", ("LINEAR",))
     block.choice("MODE MIX RATIO", ("ENERGY",))
     kind = block.choice("TYPE", ("DISPLACEMENT", "ENERGY"))
@@ -210,7 +211,7 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
 
 
 def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
-    """Return the numbers for opening and for sliding, the latter the same along both directions."""
+    """Return the numbers for opening and for sliding; CaseError if the two directions of sliding differ."""
     row = block.only("modes or fields")
     values = [row.positive(index, "number") for index in range(3)]
     if values[1] != values[2]:
@@ -221,7 +222,7 @@ def _in_modes(block: Block, quantity: str) -> tuple[float, float]:
 
 
 def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the conductance options of a contact pair, by pressure or clearance; none without a table."""
+    """Return the option `conductance` of a pair, a number or tables by pressure or gap; an empty dictionary if not given."""
     tables: dict[str, Any] = {}
     for block in law.conductance:
         rows = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
@@ -254,7 +255,7 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option for frictional heating of both sides, with the step length as time."""
+    """Return the option for frictional heating of both sides; the duration of a step is its time."""
     if law.friction_heat is None:
         if law.conductance:
             content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
@@ -267,7 +268,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie, independent of pressure and gap."""
+    """Return the conductance of a tie [power / (area temperature)], which does not depend on pressure and gap."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
     content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")

@@ -1,4 +1,4 @@
-"""The keywords of decks: their context, the function that reads them, their parameters; and the reader of all blocks."""
+"""The keywords of decks with their context, their functions and their parameters, and the reader of all blocks."""
 
 from __future__ import annotations
 
@@ -23,13 +23,17 @@ from fastcontact.cases.decks import (
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
 
-# Placeholder for a keyword that accepts any parameter.
+# Entry for a keyword that accepts any parameter.
 ANYTHING = "*"
 
 
 @dataclass(frozen=True)
 class Keyword:
-    """Context of a keyword, the function that reads it, and its parameters: those in use and those without effect."""
+    """Properties of a keyword.
+
+    `place` is the context of the keyword and `read` the function that reads it, None for keywords that `Reader` handles.
+    `used` and `harmless` list the parameters that have an effect and those that are accepted without effect.
+    """
 
     place: Literal["deck", "part", "material", "interaction", "model", "step", "procedure"]
     read: Callable[..., None] | None = None
@@ -42,11 +46,11 @@ class Keyword:
         return {*self.used.split("; "), *self.harmless.split("; ")} - {""}
 
 
-# Parameters of steps that control their solution.
+# Parameters that control the solution of steps.
 STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
 # Supported keywords.
 TRANSLATED = {
-    # Keywords handled by the reader itself.
+    # Keywords that methods of `Reader` handle.
     **dict.fromkeys(("ASSEMBLY", "MATERIAL", "PART", "SURFACE INTERACTION"), Keyword("deck", None, "NAME")),
     **dict.fromkeys(("END ASSEMBLY", "END INSTANCE", "END PART", "END STEP"), Keyword("deck")),
     **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("deck")),
@@ -115,14 +119,14 @@ TRANSLATED = {
     "FREQUENCY": Keyword("procedure", stepping.frequency, "", "EIGENSOLVER; NORMALIZATION; SOLVER; STORAGE; GLOBAL"),
     "STATIC": Keyword("procedure", stepping.static, "", STEERING),
 }
-# Output requests, since results contain all output, and convergence controls, since the package has its own criteria.
+# Keywords without effect: output requests, because results contain all output, and convergence controls.
 _OUTPUT = (
     "CONTACT FILE; CONTACT OUTPUT; CONTACT PRINT; EL FILE; EL PRINT; ELEMENT OUTPUT; ENERGY FILE; ENERGY OUTPUT; "
     "ENERGY PRINT; FACE PRINT; FILE FORMAT; FILE OUTPUT; MONITOR; NODE FILE; NODE OUTPUT; NODE PRINT; OUTPUT; "
     "PREPRINT; PRINT; RESTART; SECTION FILE; SECTION PRINT; TIME POINTS; CONTROLS"
 )
 OUTPUT = _OUTPUT.split("; ")
-# Other keywords of the format, by the reason why they are refused.
+# Unsupported keywords by the reason in the error message.
 _REASONS = {
     "is outside the scope of fastcontact (elastic, elastic-plastic and hyperelastic materials)": (
         "HYPERFOAM; CREEP; CYCLIC HARDENING; DEFORMATION PLASTICITY; DRUCKER PRAGER; MOHR COULOMB; VISCOELASTIC; "
@@ -154,7 +158,7 @@ _SPELLED = {name.replace(" ", ""): name for name in (*TRANSLATED, *OUTPUT, *REFU
 
 
 def spelled(block: Block) -> Block:
-    """Return a block with the usual blanks in its keyword and parameters: CalculiX accepts them without blanks."""
+    """Return a block with the standard blanks in its keyword and parameters; CalculiX accepts them without blanks."""
     keyword = _SPELLED.get(block.keyword.replace(" ", ""), block.keyword)
     known = TRANSLATED.get(keyword)
     names = {name.replace(" ", ""): name for name in known.parameters} if known else {}
@@ -163,9 +167,9 @@ def spelled(block: Block) -> Block:
 
 
 def checked(block: Block, about: str) -> Keyword:
-    """Return the entry of a keyword; refuse unknown and unsupported keywords and parameters.
+    """Return the entry of a keyword; CaseError if the keyword or one of its parameters is unknown or unsupported.
 
-    `about` names the material in messages.
+    `about` precedes messages about unsupported keywords.
     """
     keyword = block.keyword
     if keyword in REFUSED:
@@ -182,7 +186,7 @@ def checked(block: Block, about: str) -> Keyword:
     return known
 
 
-# Keywords that belong below another one, by their place, and the message where they do not follow it.
+# Contexts that need an open material, interaction or step, with the message if there is none.
 OWNERS = {
     "material": "belongs below *MATERIAL",
     "interaction": "belongs below *SURFACE INTERACTION",
@@ -194,7 +198,7 @@ COHESIVE_DAMAGE = ("DAMAGE INITIATION", "DAMAGE EVOLUTION", "DAMAGE STABILIZATIO
 
 @dataclass
 class Reader:
-    """State while a deck is read: the open part, instance, material, interaction, step and coupling."""
+    """State of reading a deck: the open part, instance, material, interaction, step and coupling."""
 
     content: Content = field(default_factory=Content)
     part: Part | None = None
@@ -301,7 +305,7 @@ class Reader:
 
 
 def read_content(blocks: Iterable[Block]) -> Content:
-    """Return the content of the blocks of a deck; raises CaseError with file, line and keyword if it is invalid."""
+    """Return the content of the blocks of a deck; CaseError with file, line and keyword if it is invalid."""
     reader = Reader()
     for block in blocks:
         reader.take(spelled(block))

@@ -1,4 +1,4 @@
-"""Local axes of a deck, rectangular or cylindrical: *TRANSFORM of nodes; *ORIENTATION and *DISTRIBUTION of materials."""
+"""Rectangular and cylindrical local axes of a deck: *TRANSFORM of nodes, *ORIENTATION and *DISTRIBUTION of materials."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def orientation(content: Content, part: Part, block: Block) -> None:
-    """*ORIENTATION: material axes."""
+    """Read *ORIENTATION: material axes."""
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
     block.choice("DEFINITION", ("COORDINATES",))
     rows, key = block.rows, folded(name)
@@ -39,20 +39,20 @@ def orientation(content: Content, part: Part, block: Block) -> None:
 
 
 def distribution_table(content: Content, part: Part, block: Block) -> None:
-    """*DISTRIBUTION TABLE: content of distributions; only axes of cells are supported."""
+    """Read *DISTRIBUTION TABLE: the content of distributions; only axes of elements are supported."""
     kinds = [entry.upper() for row in block.rows for entry in row.entries if entry]
     if kinds != ["COORD3D", "COORD3D"]:
         raise block.refuse(f"a distribution of {', '.join(kinds)[:80]} is not supported, only COORD3D, COORD3D of axes")
 
 
 def distribution(content: Content, part: Part, block: Block) -> None:
-    """*DISTRIBUTION: two points for the axes of each cell, relative to the origin; the line without a cell is the default."""
+    """Read *DISTRIBUTION: two points for the axes of each element; a line without an element is the default."""
     block.choice("LOCATION", ("ELEMENT",))
     registered("distribution", block.required("NAME"), content.distributions, block, block)
 
 
 def transform(content: Content, block: Block) -> None:
-    """*TRANSFORM: local axes of nodes."""
+    """Read *TRANSFORM: local axes of nodes."""
     cylindrical = block.choice("TYPE", ("R", "C")) == "C"
     if len(block.rows) != 1:
         raise block.refuse("one data line with six coordinates is needed")
@@ -61,7 +61,7 @@ def transform(content: Content, block: Block) -> None:
 
 
 def local_directions(assembly: Assembly) -> dict[int, Array]:
-    """Return the local axes (3, 3), as rows, of the points of all nodes with *TRANSFORM [-]."""
+    """Return the local axes (3, 3) [-], in rows, of each point with *TRANSFORM."""
     return {
         point: local_axes(axes, assembly.points[point])
         for axes in assembly.content.axes
@@ -70,7 +70,7 @@ def local_directions(assembly: Assembly) -> dict[int, Array]:
 
 
 def orientation_of(content: Content, name: str, location: Location) -> Axes:
-    """Return the axes of an *ORIENTATION; raises CaseError if there is none of that name."""
+    """Return the axes of an *ORIENTATION; CaseError if it is not defined, or is used outside sections but varies."""
     axes = content.orientations.get(folded(name))
     if axes is None:
         known = ", ".join(content.orientations).lower() or "none"
@@ -83,9 +83,9 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
 
 
 def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> Array:
-    """Return the axes (n, 3, 3) of the solids of the mesh, for `members` from a *DISTRIBUTION [-].
+    """Return the material axes (n, 3, 3) [-] of all solids, with those of `members` from a *DISTRIBUTION.
 
-    Other solids have the axes of the mesh. Raises CaseError if an element has no axes and there is no default line.
+    Other solids have the axes of the mesh. Raises CaseError if a member has no axes and there is no default.
     """
     block = assembly.content.distributions.get(folded(axes.distribution))
     if block is None:
@@ -114,7 +114,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
 
 
 def local_axes(axes: Axes, point: Array) -> Array:
-    """Return the local axes (3, 3) at a point as rows [-]; raises CaseError if they are not defined there."""
+    """Return the local axes (3, 3) [-] at a point in rows; CaseError if they are not defined at the point."""
     a, b = np.array(axes.points[:3]), np.array(axes.points[3:])
     if axes.cylindrical:
         third, first = b - a, point - a

@@ -1,4 +1,4 @@
-"""Materials of a deck: their keywords, and the materials of the model along axes, with expansion and conductivity."""
+"""Materials of a deck: their keywords, and the materials of the model with axes, expansion and conductivity."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ from fastcontact.elasticity.nonlinear_materials import (
     Yeoh,
 )
 
-# Numbers of constants of elastic materials.
+# Number of constants of each type of elastic material.
 CONSTANTS = {"ISOTROPIC": 2, "ENGINEERING CONSTANTS": 9, "ORTHOTROPIC": 9, "ANISOTROPIC": 21}
-# Poisson's ratio of hyperelastic materials with zero compressibility constant, as in CalculiX.
+# Poisson's ratio at small strains of hyperelastic materials whose compressibility constant D1 is zero, as in CalculiX.
 UNGIVEN = 0.475
-# Numbers of deviatoric constants, and of compressibility constants.
+# Number of deviatoric constants and of compressibility constants of each law; for Ogden, of each term.
 HYPERELASTIC = {"NEO HOOKE": (1, 1), "MOONEY-RIVLIN": (2, 1), "YEOH": (3, 3), "OGDEN": (2, 1)}
-# Numbers of coefficients of expansion and conductivity by type.
+# Number of coefficients of expansion and conductivity by type.
 COEFFICIENTS = {"ISO": 1, "ORTHO": 3}
-# The bodies in steps of pure heat conduction, which are fixed.
+# Material of bodies in steps of heat conduction alone, whose displacements are fixed.
 HELD = LinearElastic(E=1.0, nu=0.0)
 
 
 def material(content: Content, block: Block) -> Material:
-    """*MATERIAL: the beginning of a material."""
+    """Read *MATERIAL and return the new material, which later keywords set."""
     name = block.required("NAME")
     return registered("material", name, content.materials, Material(name, block.location), block)
 
 
 def elastic(content: Content, current: Material, block: Block) -> None:
-    """*ELASTIC: constants at one temperature."""
+    """Read *ELASTIC: elastic constants at one temperature."""
     kind = " ".join(block.get("TYPE", "ISOTROPIC").upper().split())
     kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
     if not kinds:
@@ -60,7 +60,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
 
 
 def _anisotropic(current: Material, block: Block, kind: str) -> None:
-    """Read the constants of a material with axes; they may span several lines, and a temperature may follow."""
+    """Read the constants of an anisotropic material, which may span several lines and be followed by a temperature."""
     numbers, count = block.numbers(), CONSTANTS[kind]
     if not count <= len(numbers) <= count + 1:
         raise block.refuse(
@@ -79,7 +79,10 @@ def _anisotropic(current: Material, block: Block, kind: str) -> None:
 
 
 def _moduli(values: list[float]) -> Array:
-    """Return moduli (6, 6) [pressure] from the upper triangle in a deck, by columns 11, 22, 33, 12, 13, 23."""
+    """Return the moduli (6, 6) [pressure] from the upper triangle of a deck, by columns in the order 11, 22, 33, 12, 13, 23.
+
+    Nine values are the constants of an orthotropic material. The result is in the order 11, 22, 33, 12, 23, 13.
+    """
     D = np.zeros((6, 6))
     places = [(i, j) for j in range(6) for i in range(j + 1)]
     if len(values) == CONSTANTS["ORTHOTROPIC"]:
@@ -91,14 +94,14 @@ def _moduli(values: list[float]) -> Array:
 
 
 def density(content: Content, current: Material, block: Block) -> None:
-    """*DENSITY."""
+    """Read *DENSITY: the mass per unit volume."""
     current.density = block.only().number(0)
     if not current.density > 0:
         raise block.refuse(f"material '{current.name}': the density {current.density:g} must be positive")
 
 
 def plastic(content: Content, current: Material, block: Block) -> None:
-    """*PLASTIC: yield stresses by equivalent plastic strain, after the *ELASTIC of the material."""
+    """Read *PLASTIC: yield stresses by equivalent plastic strain; *ELASTIC must precede it."""
     hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
     elastic = None if current.law is None else current.law(None)
     if type(elastic) is not LinearElastic:
@@ -124,7 +127,7 @@ def plastic(content: Content, current: Material, block: Block) -> None:
 
 
 def hyperelastic(content: Content, current: Material, block: Block) -> None:
-    """*HYPERELASTIC: constants of the deviatoric part, then of the compressibility."""
+    """Read *HYPERELASTIC: the deviatoric constants, then the compressibility constants."""
     kinds = [kind for kind in HYPERELASTIC if kind in block.parameters]
     if len(kinds) != 1:
         raise block.refuse(f"material '{current.name}': one of {', '.join(HYPERELASTIC)} is supported")
@@ -161,17 +164,17 @@ def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> 
 
 
 def conductivity(content: Content, current: Material, block: Block) -> None:
-    """*CONDUCTIVITY: stored until it is known whether heat is computed."""
+    """Read *CONDUCTIVITY, which is interpreted after all steps are read."""
     current.conductivity = block
 
 
 def specific_heat(content: Content, current: Material, block: Block) -> None:
-    """*SPECIFIC HEAT: without effect in static and steady-state steps."""
+    """Read *SPECIFIC HEAT, which has no effect in static and steady-state steps."""
     content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def expansion(content: Content, current: Material, block: Block) -> None:
-    """*EXPANSION: coefficients at one temperature."""
+    """Read *EXPANSION: coefficients of thermal expansion at one temperature."""
     current.expansion = along_axes(current, block)
     if "ZERO" in block.parameters:
         content.note(
@@ -180,7 +183,7 @@ def expansion(content: Content, current: Material, block: Block) -> None:
 
 
 def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
-    """Return coefficients at one temperature, one for all directions or one along each axis."""
+    """Return one coefficient, or one along each axis; CaseError if coefficients depend on the temperature."""
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
     if len(block.rows) != 1:
         raise block.refuse(
@@ -195,7 +198,7 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
 
 
 def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
-    """Return the material of the model along axes, with its expansion, and with incompatible modes if elements have them."""
+    """Return the material of the model for material axes; `modes` is whether its elements have incompatible modes."""
     if content.heat == "alone":
         return _with_axes(material, HELD, axes, conductivity=_conductivity(content, material))
     assert material.law is not None
@@ -218,7 +221,7 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; raises CaseError if heat is computed and there is none."""
+    """Return the conductivity of a material; CaseError if temperatures are computed and it has none."""
     block = material.conductivity
     if content.heat:
         if block is None:
@@ -230,7 +233,7 @@ def _conductivity(content: Content, material: Material) -> float | tuple[float, 
 
 
 def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
-    """Return a material with further constants; it becomes orthotropic where they differ along the axes."""
+    """Return a material with additional constants; it becomes orthotropic if a constant is given along each axis."""
     if isinstance(law, LinearElastic) and any(isinstance(value, tuple) for value in constants.values()):
         if isinstance(law, NonlinearElastic):
             raise material.refuse(
@@ -243,7 +246,7 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
 
 
 def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
-    """Return the conductivity of a material, one or three along its axes; raises CaseError unless all are positive."""
+    """Return one conductivity, or three along the material axes; CaseError unless all are positive."""
     values = along_axes(material, block)
     if not np.min(values) > 0.0:
         raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
@@ -251,7 +254,7 @@ def conductivity_of(material: Material, block: Block) -> float | tuple[float, ..
 
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:
-    """Return the strain measure of the model, and the reason why NLGEOM is not followed; empty if it is."""
+    """Return the strain measure of the model, and the reason why NLGEOM is ignored; empty if it is not."""
     if any("small" not in getattr(law, "strains", STRAINS) for law in laws):
         return "finite", ""
     if content.heat == "alone" or not any(step.nonlinear for step in content.steps):

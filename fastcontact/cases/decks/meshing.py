@@ -1,4 +1,4 @@
-"""The mesh of a deck: solids, facets of its surfaces, groups, and an extra point for each rotation."""
+"""The mesh of a deck: solids, facets of surfaces, groups, and a point for the rotation of each reference node."""
 
 from __future__ import annotations
 
@@ -16,26 +16,29 @@ from fastcontact.mesh import topology
 from fastcontact.mesh.mesh import Mesh, starts_of
 
 FACETS = {2: {2: "line2", 3: "line3"}, 3: {3: "tri3", 4: "quad4", 6: "tri6", 8: "quad8"}}
-# Largest distance of the points of a plane model from the plane, relative to its size.
+# Largest difference in z between the points of a plane model, relative to its size.
 FLAT = 1e-9
 
 
 @dataclass
 class DeckMesh(Assembly):
-    """The assembly of a deck, and its mesh under construction.
+    """The assembly of a deck with the facets and groups of its mesh.
 
     Attributes
     ----------
     rotations : dict of int to int
-        By reference point: the point whose displacement is its rotation [radian], in the plane its first component.
+        Point, for each reference point, whose displacement is the rotation of the reference point [radian]. In plane models
+        the first component is the rotation.
     facets : dict of str to list of tuple of int
-        Facets by facet type, each once.
+        Points of the distinct facets by facet type.
+    rows : dict of tuple of int to int
+        Row of a facet in the list of its type, by its sorted points.
     groups : dict of str to dict of str to list of int
         Groups of cells, as rows by element type.
     point_groups : dict of str to ndarray (n,) of int
-        Ascending.
+        Groups of points in ascending order.
     loose : dict of str to list of int
-        By group of the facets around a surface of nodes: the facet points that are not in the surface.
+        Points of the facets around a node-based surface that do not belong to the surface, by the group of the facets.
     """
 
     rotations: dict[int, int] = field(default_factory=dict)
@@ -47,7 +50,7 @@ class DeckMesh(Assembly):
 
     @cached_property
     def kinematics(self) -> str:
-        """Kinematics of its solids."""
+        """Kinematics of the solids."""
         return self.solids[0].solid.kinematics
 
     @property
@@ -56,12 +59,12 @@ class DeckMesh(Assembly):
         return 3 if self.kinematics == "3d" else 2
 
     def add_facets(self, group: str, faces: Iterable[Face]) -> str:
-        """Make a group of facets, given as elements and indices of their facets; return its name."""
+        """Make a group of facets and return its name; a facet is given as an element and the index of its facet."""
         self.groups[group] = self.facet_rows(faces)
         return group
 
     def facet_rows(self, faces: Iterable[Face]) -> dict[str, list[int]]:
-        """Return the rows of facets by type; missing facets are made."""
+        """Return the rows of facets by type; new facets are created."""
         members: dict[str, list[int]] = {}
         for face in faces:
             points = facet_points(*face)
@@ -74,12 +77,12 @@ class DeckMesh(Assembly):
         return members
 
     def add_solids(self, group: str, chosen: Iterable[Element]) -> str:
-        """Make a group of solids; return its name."""
+        """Make a group of solids and return its name."""
         self.groups[group] = rows_by_type(chosen)
         return group
 
     def add_points(self, group: str, points: Iterable[int]) -> str:
-        """Make a group of points, or find the group with the same points; return its name."""
+        """Return the name of the group with these points, which is created if there is none."""
         wanted = ascending(points)
         for name, members in self.point_groups.items():
             if np.array_equal(members, wanted):
@@ -88,7 +91,7 @@ class DeckMesh(Assembly):
         return group
 
     def rotation(self, point: int) -> int:
-        """Return the point that carries the rotation of a reference point; it is made if there is none."""
+        """Return the point that carries the rotation of a reference point, which is created if there is none."""
         if point not in self.rotations:
             self.rotations[point] = len(self.points)
             self.points = np.concatenate([self.points, self.points[[point]]])
@@ -113,7 +116,7 @@ class DeckMesh(Assembly):
 
 
 def ascending(points: Iterable[int]) -> Indices:
-    """Return the distinct points (n,), ascending."""
+    """Return the distinct points (n,) in ascending order."""
     return np.unique(points if isinstance(points, np.ndarray) else np.fromiter(points, np.intp))
 
 
@@ -127,9 +130,10 @@ def rows_by_type(chosen: Iterable[Element]) -> dict[str, list[int]]:
 
 
 def begun(content: Content) -> DeckMesh:
-    """Return the mesh of a deck, still without facets, with groups for its sets.
+    """Return the assembly of a deck with groups for its sets and surfaces.
 
-    Raises CaseError if there are no solids, if elements of several kinematics are mixed, or if a plane model is not flat.
+    Raises CaseError if there are no solids, if elements of several kinematics are mixed, if elements that only conduct heat
+    are used in other steps, or if a plane model is not flat.
     """
     deck_mesh = DeckMesh(content)
     assemble(deck_mesh)
@@ -155,7 +159,7 @@ def begun(content: Content) -> DeckMesh:
 
 
 def _name_sets(deck_mesh: DeckMesh) -> None:
-    """Name groups after the sets and surfaces of the deck; those of parts after ``Instance.name``."""
+    """Add groups for the sets and surfaces of the deck; groups of a part are named ``Instance.name``."""
     for scope in deck_mesh.scopes:
         part = deck_mesh.part(scope)
         prefix = f"{deck_mesh.content.instances[scope].name}." if scope else ""
@@ -176,7 +180,7 @@ def _name_sets(deck_mesh: DeckMesh) -> None:
 
 
 def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, scope: str) -> None:
-    """Name the facets around the nodes of a surface; facet points that are not in the surface are `loose`."""
+    """Add a group of the facets around the nodes of a node-based surface; other points of the facets are `loose`."""
     whole, further, left = deck_mesh.faces_of_nodes(definition, scope)
     if not (whole or further):  # the nodes belong to no solid
         return
@@ -187,7 +191,7 @@ def _name_nodes(deck_mesh: DeckMesh, group: str, definition: SurfaceDefinition, 
 
 
 def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
-    """Return the group of a surface, of faces or nodes, as secondary side; raises CaseError for nodes on no outer face."""
+    """Return the group of a surface of faces or nodes; CaseError if a node is on no outer face of a solid."""
     definition, scope = deck_mesh.surface(name, location)
     if not definition.of_nodes:
         return group_of_surface(deck_mesh, name)
@@ -203,6 +207,6 @@ def secondary_group(deck_mesh: DeckMesh, name: str, location: Location) -> str:
 
 
 def group_of_surface(deck_mesh: DeckMesh, name: str) -> str:
-    """Return the name of the group of a surface, in whatever case a pair writes it."""
+    """Return the name of the group of a surface; the case of letters is ignored."""
     wanted = folded(name)
     return next(group for group in deck_mesh.groups if folded(group) == wanted)

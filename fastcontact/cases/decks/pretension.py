@@ -1,4 +1,4 @@
-"""Pretension sections of a deck: *PRE-TENSION SECTION, and *BOUNDARY, FIXED at its node, which locks its length."""
+"""Pretension sections of a deck: *PRE-TENSION SECTION, and *BOUNDARY, FIXED, which locks the length of a section."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.model.model import Model
 
 
 def pretension_section(content: Content, block: Block) -> None:
-    """*PRE-TENSION SECTION: a surface through a bolt, and the node that carries its shortening and force."""
+    """Read *PRE-TENSION SECTION: a surface across a bolt, and the node for the shortening and the force of the bolt."""
     if len(block.rows) > 1:
         raise block.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
     row = block.rows[0] if block.rows else None
@@ -29,7 +29,7 @@ def pretension_section(content: Content, block: Block) -> None:
 
 
 def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
-    """Return the sections by the point of their node; raises CaseError if it belongs to a body or another section."""
+    """Return the sections by the point of their node; CaseError if the node belongs to a body or another section."""
     sections: dict[int, PretensionSection] = {}
     for section in assembly.content.pretensions:
         point = assembly.node(section.node, section.location)
@@ -42,7 +42,17 @@ def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
 
 
 class Locks:
-    """The load factors from which pretension sections keep their length."""
+    """Load factors at which pretension sections are locked.
+
+    Attributes
+    ----------
+    points : dict of int to PretensionSection
+        Sections by the point of their node.
+    begins : dict of int to float
+        Load factor from which a section keeps its length, by the point of its node [-].
+    number : int
+        Number of the current step, counted from 1.
+    """
 
     def __init__(self, assembly: Assembly) -> None:
         self.points = section_points(assembly)
@@ -50,7 +60,7 @@ class Locks:
         self.number = 0
 
     def begin(self, number: int, supports: list[Given], assembly: Assembly) -> None:
-        """Advance to a step; raises CaseError if it releases a section that was locked before."""
+        """Advance to step `number`; CaseError if it releases a locked section."""
         self.number = number
         if not any(given.new for given in supports):
             return
@@ -65,7 +75,7 @@ class Locks:
                 )
 
     def take(self, point: int, component: int, fixed: bool) -> bool:
-        """Return whether a support locks a section, and record the lock."""
+        """Record the lock if a support locks a section, and return whether it does."""
         if point not in self.points or component != 1 or not fixed:
             return False
         self.begins.setdefault(point, float(self.number - 1))
@@ -73,7 +83,7 @@ class Locks:
 
 
 def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
-    """Return the mesh cut along all pretension sections."""
+    """Return the mesh cut along all pretension sections; CaseError if it cannot be cut or a surface has two sections."""
     sections: set[str] = set()
     for section in deck_mesh.content.pretensions:
         deck_mesh.faces(section.surface, section.location)
@@ -88,7 +98,7 @@ def cut_sections(deck_mesh: DeckMesh, mesh: Mesh) -> Mesh:
 
 
 def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiPointConstraint]:
-    """Add the pretension sections to a model; return all their constraints, and those to their nodes."""
+    """Add the pretension sections to a model and return their constraints, including those of locked lengths."""
     before, links, locked = len(model.relations), [], []
     for point, section in locks.points.items():
         group, location = group_of_surface(deck_mesh, section.surface), section.location
@@ -104,9 +114,9 @@ def add_sections(model: Model, deck_mesh: DeckMesh, locks: Locks) -> list[MultiP
 
 
 def _side(deck_mesh: DeckMesh, section: PretensionSection) -> float:
-    """Return 1.0 if the normal of a section points out of the elements of its surface, -1.0 if it points into them.
+    """Return 1.0 if the normal of a section points out of the elements of its surface, and -1.0 if it points into them.
 
-    A positive force acts along the normal on these elements: it pulls the sides together only in the first case.
+    A positive force acts on these elements along the normal. It pulls the sides together only if the normal points out.
     """
     if section.normal is None:
         return 1.0

@@ -1,4 +1,4 @@
-"""Linear constraints of a deck: equations, multi-point constraints, rigid bodies and couplings, for small displacements."""
+"""Linear constraints of a deck: equations, multi-point constraints, rigid bodies and couplings at small displacements."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.couplings import ReferencePoint, Term, distributing_rows, relation, rigid_rows
 
-# Least numbers of nodes by kind.
+# Smallest number of nodes of each kind of multi-point constraint.
 LEAST = {"PLANE": 4, "STRAIGHT": 3, "MEANROT": 3}
-# Points closer to a line or point than this fraction of their extent have no direction from it.
+# Tolerance of the tests for collinear points and for points at the centre, relative to squared distances.
 FLAT = 1e-9
 
 
 def make_rotations(deck_mesh: DeckMesh) -> None:
-    """Add a rotation point for every reference node, before the mesh is made."""
+    """Add the rotation point of each reference node, which must precede the mesh; CaseError in axisymmetric models."""
     for link in deck_mesh.content.links:
         point = deck_mesh.node(link.reference, link.location)
         if link.rotation:
@@ -51,7 +51,7 @@ def relations_of(deck_mesh: DeckMesh, mesh: Mesh) -> list[MultiPointConstraint]:
 
 
 def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]) -> list[Term]:
-    """Return the terms of an equation along the global axes; its components refer to the local `axes` of points."""
+    """Return the terms of an equation along the global axes from components along the local `axes` of points."""
     terms: list[Term] = []
     for name, component, coefficient in equation.terms:
         point = deck_mesh.node(name, equation.location)
@@ -65,7 +65,7 @@ def _equation(deck_mesh: DeckMesh, equation: Equation, axes: Mapping[int, Array]
 
 
 def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
-    """Return the equations that set the displacements of nodes equal to those of others."""
+    """Return the equations of nodes with the same displacement; CaseError if the numbers of nodes do not match."""
     first, second = (deck_mesh.nodes(name, pin.location) for name in (pin.first, pin.second))
     if len(second) == 1:
         second = second * len(first)
@@ -80,7 +80,7 @@ def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
 
 
 def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
-    """Return the points that follow a reference point, without the point itself."""
+    """Return the points that a link relates to its reference point; CaseError if there are none."""
     if link.kind == "nodes":
         points = deck_mesh.nodes(link.group, link.location)
     elif link.kind == "elements":
@@ -100,7 +100,11 @@ def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
 
 
 def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
-    """Return the rows that make nodes follow a reference point, or it the area-weighted mean motion of a surface."""
+    """Return the constraint rows of a link.
+
+    Nodes follow the reference point, or, if the link is distributing, the reference point has the area-weighted mean motion
+    of a surface.
+    """
     n_dofs = mesh.points.size
     point = deck_mesh.node(link.reference, link.location)
     reference = ReferencePoint(
@@ -120,7 +124,7 @@ def _link_rows(deck_mesh: DeckMesh, mesh: Mesh, link: Link) -> csr_array:
 
 
 def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
-    """Return the directions (n, dim) that a coupling constrains at a point [-]."""
+    """Return the directions (n, dim) [-] in which a coupling constrains a point."""
     axes = np.eye(3)
     if link.orientation:
         axes = local_axes(orientation_of(deck_mesh.content, link.orientation, link.location), deck_mesh.points[point])
@@ -128,7 +132,7 @@ def _directions(deck_mesh: DeckMesh, link: Link, point: int) -> Array:
 
 
 def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[Term]]:
-    """Return the equations of a multi-point constraint; raises CaseError if its nodes do not determine it."""
+    """Return the equations of a multi-point constraint; CaseError if the model is plane or the nodes do not suffice."""
     nodes = [point for name in constraint.nodes for point in deck_mesh.nodes(name, constraint.location)]
     nodes = [*dict.fromkeys(nodes[:-1] if constraint.kind == "MEANROT" else nodes), *nodes[-1:]]
     nodes = nodes if constraint.kind == "MEANROT" else nodes[:-1]
@@ -159,17 +163,18 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
 
 
 def _normals_to(constraint: MultiPoint, line: Array) -> Array:
-    """Return two directions (2, 3) normal to a line [-]."""
+    """Return two unit vectors (2, 3) [-] normal to a line."""
     if not line.any():
         raise constraint.refuse("the first two nodes of STRAIGHT are at one place")
     return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
 def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
-    """Return the equation that sets the first component of the last node to the mean rotation of the others about an axis.
+    """Return the equation by which the first component of the last node is the mean rotation of the other nodes.
 
-    The mean rotation is the mean of the nodal angles about the centre, as in CalculiX: ``mean(a . (p x u) / p . p)`` with the
-    axis a and the offsets p from the centre normal to it. The coordinates of the last node are the direction of the axis.
+    As in CalculiX, the mean rotation is the mean of the nodal angles about the centre, ``mean(a . (p x u) / p . p)``, with
+    the unit vector a along the axis, the offsets p from the centre normal to the axis, and the displacements u. The
+    coordinates of the last node are the direction of the axis.
     """
     axis, places = where[-1], where[:-1] - where[:-1].mean(axis=0)
     length = np.linalg.norm(axis)
@@ -188,7 +193,7 @@ def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> li
 
 
 def _terms(points: list[int], coefficients: Array) -> list[Term]:
-    """Return the terms of an equation with coefficients (n, 3) for the displacements of points."""
+    """Return the terms of an equation from coefficients (n, 3) of the displacements of points."""
     return [
         (point, axis, value)
         for point, row in zip(points, coefficients.tolist(), strict=True)

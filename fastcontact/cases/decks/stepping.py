@@ -1,4 +1,4 @@
-"""Keywords of steps: *STEP, *STATIC, *FREQUENCY, *AMPLITUDE, and the blocks of supports and loads in them."""
+"""Keywords of steps: *STEP, its procedures and *AMPLITUDE, and the supports and loads of steps."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from itertools import pairwise
 from fastcontact.cases.decks.blocks import Block, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 
-# Largest number of increments of a step with friction.
+# Largest number of increments of a step, in models with friction or cohesive contact.
 MOST_PARTS = 20
 
 
 def new_step(content: Content, block: Block) -> Step:
-    """*STEP."""
+    """Read *STEP and return the new step."""
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
     if content.modes is not None:
         raise block.refuse("follows a step with *FREQUENCY, which is supported as the last one only")
@@ -22,7 +22,7 @@ def new_step(content: Content, block: Block) -> Step:
 
 
 def static(content: Content, step: Step, block: Block) -> None:
-    """*STATIC: first increment and length of the step, which determine its division into increments."""
+    """Read *STATIC: the initial increment and the duration of the step, which determine the number of increments."""
     if step.static:
         raise block.refuse("the step has this keyword twice")
     if step.modes:
@@ -42,7 +42,7 @@ def static(content: Content, step: Step, block: Block) -> None:
 
 
 def heated(content: Content, step: Step, block: Block) -> None:
-    """*HEAT TRANSFER, *COUPLED and *UNCOUPLED TEMPERATURE-DISPLACEMENT: as *STATIC, with steady heat conduction."""
+    """Read *HEAT TRANSFER, *COUPLED or *UNCOUPLED TEMPERATURE-DISPLACEMENT like *STATIC, with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
         raise block.refuse("only STEADY STATE is supported: heat is not followed in time")
     static(content, step, block)
@@ -52,7 +52,7 @@ def heated(content: Content, step: Step, block: Block) -> None:
 
 
 def frequency(content: Content, step: Step, block: Block) -> None:
-    """*FREQUENCY: the number of modes."""
+    """Read *FREQUENCY: the number of modes, by default 10."""
     if step.static or step.modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
@@ -62,7 +62,7 @@ def frequency(content: Content, step: Step, block: Block) -> None:
 
 
 def end_step(content: Content, step: Step) -> None:
-    """*END STEP: a step with *FREQUENCY becomes a request for modes, not a load step."""
+    """Read *END STEP; a step with *FREQUENCY becomes a request for modes instead of a load step."""
     if not step.modes:
         if not step.static:
             raise step.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
@@ -84,7 +84,7 @@ def end_step(content: Content, step: Step) -> None:
 
 
 def given(content: Content, step: Step | None, block: Block) -> None:
-    """Store a block of supports or loads, in its step or before all steps."""
+    """Store a block of supports or loads of a step, or a *BOUNDARY before all steps."""
     name = block.get("AMPLITUDE")
     if name and folded(name) not in content.amplitudes:
         known = ", ".join(content.amplitudes) or "none"
@@ -99,7 +99,7 @@ def given(content: Content, step: Step | None, block: Block) -> None:
 
 
 def amplitude(content: Content, block: Block) -> None:
-    """*AMPLITUDE: pairs of time and multiplier."""
+    """Read *AMPLITUDE: pairs of a time and a multiplier."""
     name = block.required("NAME")
     block.choice("DEFINITION", ("TABULAR",))
     block.choice("VALUE", ("RELATIVE",))

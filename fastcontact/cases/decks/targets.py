@@ -1,4 +1,4 @@
-"""Targets of distributed loads of a deck: faces of elements, or elements."""
+"""Targets of distributed loads of a deck: elements or faces of elements."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fastcontact.cases.decks.assembled import Assembly, Element, Face
 from fastcontact.cases.decks.blocks import Row
 
-# By keyword: the letter of loads on faces, and the loads on elements with the number of their further entries.
+# For each keyword, the letter of loads on faces, and the loads on elements with the number of their additional entries.
 BODY_FORCES = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}
 ON_ELEMENTS: dict[str, tuple[str, dict[str, int]]] = {
     "DLOAD": ("P", BODY_FORCES),
@@ -19,9 +19,9 @@ ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """Target of a distributed load: keyword and kind of the load, a face or elements.
+    """Keyword, kind and target of a distributed load, which is a face or some elements.
 
-    `numbers` are the direction or axis of a body force, or the coefficient of a film.
+    `numbers` contains the direction or the axis of a body force, or the coefficient of a film.
     """
 
     keyword: str
@@ -32,7 +32,7 @@ class Target:
 
 
 def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> list[Target]:
-    """Return the targets of a line of a distributed load, with `numbers`; raises CaseError for unsupported loads."""
+    """Return the targets of a line of a distributed load; CaseError if the load is not supported."""
     keyword, label = row.location.keyword, row.text(1).upper()
     load = "load " if keyword.endswith("LOAD") else ""
     if keyword in ON_SURFACES:

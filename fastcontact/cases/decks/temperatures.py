@@ -1,4 +1,4 @@
-"""Temperatures of a deck: initial values, histories over the steps, and temperature loads of the model."""
+"""Temperatures of a deck: initial values, histories over the steps, and temperature fields of the model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.model.ramp import Table
 
 
 def initial_conditions(content: Content, block: Block) -> None:
-    """*INITIAL CONDITIONS: nodal temperatures or element stresses before the first step."""
+    """Read *INITIAL CONDITIONS: nodal temperatures or element stresses before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
         raise block.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
@@ -24,7 +24,7 @@ def initial_conditions(content: Content, block: Block) -> None:
 
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
-    """Return initial temperatures by point; of several for a point, the last one counts."""
+    """Return the initial temperatures by point; the last of several values at a point is used."""
     return {point: value for block in blocks for point, value, _ in _by_point(assembly, block)}
 
 
@@ -37,7 +37,7 @@ def give(assembly: Assembly, histories: Histories[int], given: Given) -> None:
 
 
 def _by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
-    """Yield the temperatures of a block by point, with the location of each."""
+    """Yield the points of a block with their temperatures and the locations of the lines."""
     for row in block.each():
         if any(row.entries[2:]):
             raise row.refuse("gradients of the temperature are those of beams and shells: give one number")
@@ -46,7 +46,10 @@ def _by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Lo
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
-    """Add the temperatures relative to the initial ones to a model, with as few fields as the histories allow."""
+    """Add temperatures relative to the initial temperatures to a model, as the smaller of two numbers of fields.
+
+    There is one field for each shape of history, or one for each time at which a history has a corner.
+    """
     fields = list(ByShape.of((_rise(table), points) for table, points in histories.alike()))
     times = sorted({time for *_, table in fields for time, _ in table})
     if len(fields) <= len(times):
@@ -55,7 +58,7 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
             rises[points] = sizes(points) if callable(sizes) else sizes
             _add(model, rises, table)
         return
-    for k, time in enumerate(times):  # histories that differ between nodes: one field for each of their corners
+    for k, time in enumerate(times):  # fewer corners than shapes: one field for each corner
         around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         rises = np.zeros(model.mesh.n_points)
         for _, points, sizes, table in fields:
