@@ -1,4 +1,4 @@
-"""Case files: a contact problem as TOML data without code, checked as a whole before anything runs."""
+"""Case files: contact problems as TOML data, checked as a whole before the solution begins."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from fastcontact.results.units import known_units
 if TYPE_CHECKING:
     from fastcontact.cases.decks.deck import Deck
 
-# Label of a quantity or a parameter of sensitivities.
+# Label of a quantity or a parameter of a sensitivity.
 Label = tuple[str | int, ...]
 # File suffix of input decks of Abaqus and CalculiX.
 DECK = ".inp"
@@ -38,32 +38,43 @@ DECK = ".inp"
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A case file, checked and ready to run.
+    """A checked case file with its model.
 
     Attributes
     ----------
-    name, title, text : str
-        File name without suffix, its title, its text.
+    name : str
+        File name without its suffix.
+    title : str
+        Title of the case.
+    text : str
+        Text of the case file.
     mesh : Mesh
+        Mesh of the model.
     model : Model
+        Model of the contact problem.
     ramp : Ramp
+        Load steps.
     criteria : Criteria
+        Convergence criteria.
     linear_solver : str
+        Name of the linear solver.
     linear_tolerance : float
+        Relative tolerance of iterative linear solvers [-].
     probes : dict of str to int
         Point number by probe name.
     theories : dict of str to dict
-        By contact pair: ``"theory"`` and optionally ``"mesh_converged"``, objects of `fastcontact.analytic`; and
-        ``"share"``, the modelled fraction of the theory's contact, e.g. 0.25 for a quarter.
+        Theories by contact pair: ``"theory"`` and optionally ``"mesh_converged"`` are objects of `fastcontact.analytic`;
+        ``"share"`` is the modelled fraction of the theory's contact, for example 0.25 for a quarter.
     checks : list of Check
+        Comparisons with theories and documented values.
     units : dict of str to str
         Names of the units of length, force and pressure, for labels.
     approach : dict of str to float
-        Approach of the theory by contact pair, if given [length].
+        Approach by contact pair, for theories with an approach [length].
     folder : pathlib.Path
-        Folder of the files that the case names, absolute.
+        Absolute path of the folder to which the file names in the case are relative.
     sensitivities : list of (tuple, list of tuple)
-        Quantities and their parameters, see `fastcontact.sensitivities`.
+        Quantities and their parameters, as in `fastcontact.sensitivities`.
     modes : dict, optional
         Arguments of `fastcontact.modes` at the last step; None without ``[modes]``.
     deck : Deck, optional
@@ -91,17 +102,26 @@ class Case:
 
     @property
     def solution(self) -> dict[str, Any]:
-        """How the case is solved: keyword arguments of `solve`."""
+        """Keyword arguments of `solve` that the case specifies."""
         chosen = {"linear_solver": self.linear_solver, "linear_tolerance": self.linear_tolerance}
         return {**chosen, "criteria": self.criteria}
 
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step of the model as in results; for a deck with forces for the whole thickness."""
+        """Return a step as it is stored in results; a deck scales the forces of plane models by the thickness."""
         return step if self.deck is None else self.deck.finished(step)
 
 
 def read_case(path: str | Path) -> Case:
-    """Read a case file, a ready-made case by its name, or an input deck (``.inp``), and build its model.
+    """Read a case file, a ready-made case or an input deck, and build the model.
+
+    Parameters
+    ----------
+    path : str or pathlib.Path
+        Path of a TOML file or of an input deck of Abaqus or CalculiX (``.inp``), or the name of a ready-made case.
+
+    Returns
+    -------
+    Case
 
     Raises
     ------
@@ -118,13 +138,13 @@ def read_case(path: str | Path) -> Case:
         with in_file(path):
             return build_case(data, name=path.stem, folder=path.parent, text=text)
     except (ArithmeticError, AttributeError, LookupError, MemoryError, RecursionError, TypeError, ValueError) as error:
-        # A value that passed all checks by key: only Python's message says what is wrong.
+        # The checks by key do not cover this value, and only Python's own message describes the fault.
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise CaseError(f"{path}: a value is of the wrong kind or size ({reason}): see the ready-made cases") from error
 
 
 def _case_of_deck(path: Path) -> Case:
-    """Return the case made from an input deck of Abaqus or CalculiX."""
+    """Return the case of an input deck of Abaqus or CalculiX."""
     from fastcontact.cases.decks.deck import read_deck
 
     deck = read_deck(path)
@@ -144,9 +164,9 @@ def _case_of_deck(path: Path) -> Case:
 
 
 def files_of_case(path: str | Path) -> list[Path]:
-    """Return a case file and all files that it names, or a deck and what it includes.
+    """Return the paths of a case file and of all files that it names, or of a deck and its included files.
 
-    Raises CaseError or FileError if one cannot be read.
+    Raises CaseError or FileError if a file cannot be read.
     """
     path = case_path(path)
     if path.suffix.lower() == DECK:
@@ -157,7 +177,7 @@ def files_of_case(path: str | Path) -> list[Path]:
 
 
 def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
-    """Return the text of a case file, and its data."""
+    """Return the text of a case file and the data parsed from it; CaseError if it cannot be read or is not TOML."""
     try:
         if is_stream(path):
             raise CaseError(f"'{path}' is a pipe or a terminal, and a case is read more than once: save it in a file")
@@ -166,7 +186,7 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
                 f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
             )
         text = path.read_text(encoding="utf-8-sig")  # Windows editors begin files with a byte order mark
-    except (OSError, ValueError) as error:  # also a name with a null byte, and text that is not UTF-8
+    except (OSError, ValueError) as error:  # ValueError: a null byte in the name, or text that is not UTF-8
         raise CaseError(f"cannot read the case file '{path}': {_unreadable(path, error)}") from error
     try:
         return text, toml_text.parsed(text)
@@ -193,8 +213,8 @@ def build_case(
 ) -> Case:
     """Build a case from the parsed data of a case file, as `tomllib` returns them.
 
-    The path of its mesh file is relative to `folder`; `mesh` replaces the mesh of ``[mesh]``. Result files and studies
-    store `text`; studies otherwise generate it from the data. CaseError if a key is unknown or a value invalid,
+    Paths in the data are relative to `folder`, and `mesh` replaces the mesh of ``[mesh]``. Result files and studies store
+    `text`, which is generated from the data if it is empty. Raises CaseError if a key is unknown or a value is invalid, and
     FastcontactError if the mesh or the model is invalid.
     """
     check_keys("", data, {**TOP, **dict.fromkeys(LISTS, list)})
@@ -234,7 +254,7 @@ def build_case(
 
 
 def _text(data: dict[str, Any]) -> str:
-    """Return data as the text of a case file, from which studies make their cases; empty where TOML cannot express it."""
+    """Return the text of a case file with the data, from which studies build cases; empty if TOML cannot represent them."""
     try:
         return toml_text.written(data)
     except ValueError:
@@ -242,7 +262,7 @@ def _text(data: dict[str, Any]) -> str:
 
 
 def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
-    """Return the table of each contact pair and obstacle; pairs found automatically share one."""
+    """Return the table of each contact pair and obstacle; automatically detected pairs share the table ``[contacts]``."""
     named = data.get("contact", {})
     named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
     return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
@@ -261,7 +281,7 @@ def _checks(
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
     asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
     if entries:
-        from fastcontact.analysis.sensitivities import check_labels  # imports half of the solver
+        from fastcontact.analysis.sensitivities import check_labels  # imports most of the solver
     for i, entry in enumerate(entries):
         where = f"sensitivity[{i}]"
         check_keys(where, entry, SENSITIVITY)
@@ -322,9 +342,9 @@ def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
 def _theories(
     data: dict[str, Any], pairs: Mapping[str, Any] | None = None
 ) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
-    """Return the theories of ``[theory.PAIR]`` and, below it, ``mesh_converged``; and their approaches [length].
+    """Return the theories of the tables ``[theory.PAIR]`` and ``[theory.PAIR.mesh_converged]``, and approaches [length].
 
-    Raises CaseError if a pair is none of `pairs`, where they are known.
+    Raises CaseError if `pairs` is given and does not contain the pair of a theory.
     """
     theories: dict[str, dict[str, Any]] = {}
     approach = {}
@@ -343,7 +363,7 @@ def _theories(
 
 
 def _share(where: str, data: dict[str, Any]) -> float:
-    """Return the fraction of the theory's contact that the model represents, 1 by default."""
+    """Return the fraction of the theory's contact that the model represents [-], 1 by default."""
     check_keys(where, {"share": data.get("share", 1.0)}, {"share": NUMBER})
     share = float(data.get("share", 1.0))
     if not 0.0 < share <= 1.0:
@@ -361,9 +381,9 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 
 
 def described(data: dict[str, Any]) -> dict[str, Any]:
-    """Return title, theories, approach and the table of the ramp of a case, as `Case` holds them.
+    """Return the title, the theories, the approaches and the table of the ramp of a case, as in `Case`.
 
-    `data` is the parsed text kept in a result file; it may be empty.
+    `data` are the parsed text of a case file that is stored in a result file; they may be empty.
     """
     theories, approach = _theories(data)
     return {

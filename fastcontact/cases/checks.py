@@ -1,4 +1,4 @@
-"""Checks of a case: a number of its last step compared with a theory or with a documented value."""
+"""Checks of a case: quantities of the last step compared with a theory or a documented value."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fastcontact.results.step import ContactResult, StepResult
 STRESS = {"xx": 0, "yy": 1, "zz": 2, "xy": 3, "yz": 4, "xz": 5}
 _AXES = {"x": 0, "y": 1, "z": 2}
 ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.x", "moment.y")
-# Quantities that need an option of the pair, and the message where it is missing.
+# Quantities that need an option of the pair: the option, and the message if it is missing.
 NEEDED = {
     "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
     "heat": ("conductance", "only a contact with the option 'conductance' passes any"),
@@ -27,7 +27,7 @@ NEEDED = {
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the contact whose secondary side contains a point, the last of several, and the row of the point there."""
+    """Return the last contact whose secondary side contains a point and the row of the point there; None if there is none."""
     contact_row = None
     for contact in step.contact.values():
         rows = np.flatnonzero(contact.points == point)
@@ -37,13 +37,13 @@ def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
 
 
 def _middle(bracket: tuple[float, float]) -> float:
-    """Return the middle of the bracket of a radius, or its lower end where the upper one is unknown."""
+    """Return the midpoint of the bracket of a radius [length], or its lower bound if the upper bound is infinite."""
     inside, outside = bracket
     return 0.5 * (inside + outside) if math.isfinite(outside) else inside
 
 
 def _at_surface(field: str) -> Callable[[StepResult, int], float]:
-    """Return a function for the magnitude of a contact field at a point; NaN where the point is not in contact."""
+    """Return a function for the magnitude of a contact field at a point; NaN unless a secondary side has the point."""
 
     def value(step: StepResult, point: int) -> float:
         contact, row = at_point(step, point) or (None, 0)
@@ -53,11 +53,11 @@ def _at_surface(field: str) -> Callable[[StepResult, int], float]:
 
 
 def _entry(vector: Callable[..., Any], index: int) -> Callable[..., Any]:
-    """Return a function for one entry of what another function returns."""
+    """Return a function for one entry of the result of `vector`."""
     return lambda *of: vector(*of)[index]
 
 
-# Quantities of a contact pair: the kind of their unit, and the function that evaluates them; None where there is none.
+# Quantities of a contact pair: the kind of unit and the function that evaluates the quantity, or returns None.
 OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     "force": ("force", lambda contact: np.linalg.norm(contact.force)),
     "pressure_max": ("pressure", lambda contact: contact.pressure_max),
@@ -69,7 +69,7 @@ OF_PAIRS: dict[str, tuple[str, Callable[[ContactResult], Any]]] = {
     **{f"force.{axis}": ("force", _entry(lambda contact: contact.force, i)) for axis, i in _AXES.items()},
     **{f"moment.{axis}": ("moment", _entry(contact_moment, i)) for axis, i in {**_AXES, "z": -1}.items()},
 }  # fmt: skip
-# The same for a probe, evaluated from the step and the point.
+# Quantities of a probe, evaluated from the step and the point.
 OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
     "pressure": ("pressure", _at_surface("pressure")),
     "shear": ("pressure", _at_surface("shear")),
@@ -83,31 +83,33 @@ OF_PROBES: dict[str, tuple[str, Callable[[StepResult, int], Any]]] = {
 
 @dataclass(frozen=True)
 class Check:
-    """Comparison of a number of the last step with a theory or a documented value.
+    """Comparison of a quantity of the last step with a theory or a documented value.
 
     Attributes
     ----------
-    name, quantity : str
-        `quantity` is ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.stress.yy"`` or
-        ``"PROBE.displacement.x"``; or ``"PAIR.force"`` and its component ``"PAIR.force.x"``, on the secondary side;
-        ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or ``"PAIR.stick_radius"``, the mean of their brackets;
-        ``"PAIR.moment.z"`` about the middle of the contact; ``"PAIR.torque"`` of a rotating obstacle about its axis;
-        ``"PAIR.wear_max"``, the largest depth of wear; ``"PAIR.heat"``, the heat flow to the primary side; and
-        ``"PROBE.temperature"``.
+    name : str
+        Name of the check.
+    quantity : str
+        Quantity of a probe: ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.temperature"``,
+        ``"PROBE.stress.yy"`` or ``"PROBE.displacement.x"``. Quantity of a contact pair: ``"PAIR.force"`` and its
+        component ``"PAIR.force.x"``, on the secondary side; ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or
+        ``"PAIR.stick_radius"``, the midpoint of the bracket; ``"PAIR.moment.z"``, about the centre of the contact;
+        ``"PAIR.torque"``, of a rotating obstacle about its axis; ``"PAIR.wear_max"``, the largest depth of wear; or
+        ``"PAIR.heat"``, the heat flow to the primary side.
     tolerance : float
-        Largest admissible relative deviation.
+        Largest admissible relative deviation [-].
     theory : str
         Contact pair whose theory provides the target; empty for a documented value.
     of : str
         Name of the target in the theory, such as ``"stick_radius"`` or ``"normal.pressure_max"``. For a stress, the
         sign of the target is reversed, since pressures are positive in compression.
     value : float, optional
-        The documented value.
+        The documented value [unit of the quantity].
     source : str
         Source of the documented value.
     factor : float
-        Factor by which the number is multiplied first; by default e.g. 4 for the force on a quarter of the theory's
-        contact.
+        Factor by which the quantity is multiplied before the comparison [-]. Its default is 1, except for forces if the
+        model represents a fraction of the theory's contact: 4 for a quarter.
     """
 
     name: str
@@ -121,11 +123,11 @@ class Check:
 
     @property
     def unit(self) -> str:
-        """Kind of the number: ``"pressure"``, ``"force"``, ``"moment"``, ``"length"``, ``"power"`` or ``"temperature"``."""
+        """Kind of unit: ``"pressure"``, ``"force"``, ``"moment"``, ``"length"``, ``"power"`` or ``"temperature"``."""
         return {**OF_PROBES, **OF_PAIRS}[self.quantity.partition(".")[2]][0]
 
     def target(self, theory: Any) -> float:
-        """Return the number to compare with; `theory` is that of the pair, or None for a documented value."""
+        """Return the target; `theory` is the theory of the pair, or None for a documented value."""
         if theory is None:
             assert self.value is not None
             return self.value
@@ -133,7 +135,7 @@ class Check:
         return -number if ".stress." in self.quantity and self.theory else number
 
     def described(self) -> str:
-        """Return a description of the comparison in one line."""
+        """Return a one-line description of the comparison."""
         source = f" ({self.source})" if self.source else ""
         against = f"the theory's {self.of}" if self.theory else f"{self.value:g}{source}"
         return f"{self.quantity} against {against} within {self.tolerance:g}"
@@ -150,7 +152,7 @@ def read_check(
     theories: Mapping[str, Any],
     kinematics: str = "3d",
 ) -> Check:
-    """Return the check that an entry of a case file describes. Its keys are checked; wrong values raise CaseError."""
+    """Return the check of an entry of a case file with checked keys; CaseError if a value is invalid."""
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")
@@ -182,7 +184,7 @@ def read_check(
 
 
 def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics: str) -> None:
-    """Raise CaseError for a quantity that the kinematics lack, such as a force along z in a plane model."""
+    """Raise CaseError if the kinematics do not define a quantity, such as a force along z in a plane model."""
     if kinematics != "3d":
         allowed = [name for name in allowed if name not in ONLY_IN_SPACE]
     if kinematics == "axisymmetric":  # moments and radial forces cancel over the circle
@@ -191,12 +193,12 @@ def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics
 
 
 def _whole(field: str, theory: Mapping[str, Any]) -> float:
-    """Return the factor from the force of the modelled fraction of a contact to the whole, 1 for other quantities."""
+    """Return the ratio of the force of the whole contact to that of the modelled fraction; 1 for other quantities."""
     return 1.0 / float(theory.get("share", 1.0)) if field.split(".")[0] == "force" else 1.0
 
 
 def check_target(where: str, check: Check, theory: Any) -> None:
-    """Raise CaseError if the theory has no such number, or if it is zero, so that no relative deviation exists."""
+    """Raise CaseError if the theory lacks the target, or if the target is zero or infinite."""
     try:
         target = check.target(theory)
     except (AttributeError, TypeError):
@@ -212,7 +214,7 @@ def _is_number(theory: Any, name: str) -> bool:
 
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:
-    """Return the number that a check measures in a step; NaN where there is none, such as a radius without contact."""
+    """Return the quantity of a check in a step, times its factor; NaN if undefined, such as wear before any contact."""
     owner, _, field = check.quantity.partition(".")
     if owner in probes:
         value = OF_PROBES[field][1](step, probes[owner])
@@ -224,10 +226,10 @@ def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float
 
 
 def evaluated(check: Check, step: StepResult, probes: Mapping[str, int], theories: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a check with its outcome: value, target, deviation and whether it passed.
+    """Return a check with its value, its target, its relative deviation and whether it passed.
 
-    If the theory comes with a mesh-converged solution, the deviation of the value from it and its deviation from the
-    theory are added.
+    If a mesh-converged solution is known, the deviation of the value from this solution and the deviation of this solution
+    from the theory are included.
     """
     theory = theories[check.theory] if check.theory else {}
     value, target = measured(check, step, probes), check.target(theory.get("theory"))

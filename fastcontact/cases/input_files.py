@@ -1,4 +1,4 @@
-"""Files that a case reads: itself, meshes, fields, obstacle surfaces, and the files that these include."""
+"""Files that a case reads: meshes, fields, obstacle surfaces, and the files that these include."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.mesh.files.meshio_files import files_of
 
 
 def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
-    """Yield all files that the parsed data of a case file name, relative to `folder`, and the files read with them."""
+    """Yield the files named in the parsed data of a case file, relative to `folder`, and the files that they include."""
     for key, value in data.items():
         entries = value if isinstance(value, list) else [value]
         for entry in entries:
@@ -23,7 +23,7 @@ def files_named(data: dict[str, Any], folder: Path) -> Iterator[Path]:
 
 
 def digest(paths: Iterator[Path]) -> str:
-    """Return a hash of the contents of files, independent of their folder; an unreadable file counts as missing."""
+    """Return the SHA-256 hash of the contents of files; files that cannot be read are hashed as missing."""
     hash_of_all = hashlib.sha256()
     for path in paths:
         try:

@@ -17,7 +17,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.errors import CaseError, FastcontactError, unknown
 
 NUMBER = (int, float)
-# Numbers, functions of the position and time series in a case file.
+# Types in a case file of numbers, of functions of the position, and of sequences.
 _TOML: dict[Any, tuple[type, ...]] = {
     float: NUMBER,
     abc.Callable: (dict,),
@@ -26,7 +26,7 @@ _TOML: dict[Any, tuple[type, ...]] = {
 
 
 def toml_types(annotation: Any) -> tuple[type, ...]:
-    """Return the case-file types that an annotated argument takes; a function is given as a table."""
+    """Return the types in a case file of an argument with an annotation; a function is given as a table."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if kind in (typing.Union, types.UnionType):
         return tuple(dict.fromkeys(type_of_member for member in members for type_of_member in toml_types(member)))
@@ -36,7 +36,7 @@ def toml_types(annotation: Any) -> tuple[type, ...]:
 
 
 def keys_of(described: Callable[..., Any]) -> dict[str, tuple[type, ...]]:
-    """Return the case-file types of the fields of a class, or the arguments of a function, by name."""
+    """Return the types in a case file of the fields of a class or the arguments of a function, by name."""
     return {name: toml_types(annotation) for name, annotation in types_of(described).items()}
 
 
@@ -45,13 +45,13 @@ AXES = {"x": NUMBER, "y": NUMBER, "z": NUMBER}
 UNITS = {"length": str, "force": str, "pressure": str}
 RAMP = {"steps": int, "end": NUMBER, "instants": list, "table": list}
 SOLVE: dict[str, Any] = {"linear_solver": str, "linear_tolerance": NUMBER, **keys_of(Criteria)}
-# A rigid surface: the facets of a group, in a file or in the mesh of the model.
+# A rigid surface, which consists of the facets of a group in a file or in the mesh of the model.
 SURFACE = {"file": str, "group": str, "flip": bool, "crease": NUMBER}
 # Rotation of a rigid obstacle or a support.
 ROTATION: dict[str, Any] = {"angle": NUMBER, "centre": list, "axis": list, "ramp": list}
 SENSITIVITY: dict[str, Any] = {"quantity": list, "by": list}
 FIELD: dict[str, Any] = {"file": str, "field": str, "over": str, "instant": NUMBER}
-# Studies of this case; `fastcontact.studies.settings` reads them.
+# Settings of studies of the case, which `fastcontact.studies.settings` reads.
 STUDY: dict[str, Any] = {
     "generator": str,
     "contact": str,
@@ -59,7 +59,7 @@ STUDY: dict[str, Any] = {
     **dict.fromkeys(("halve", "double", "curves", "combinations", "quantities"), list),
     **dict.fromkeys(("triangles", "quadrangles", "options", "parameters"), dict),
 }
-# Entries of the lists and tables in it, each with an example of the notation.
+# Types of the entries of lists and tables in these settings, with an example of the notation.
 STUDY_ENTRIES: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("halve", "double"), (str, 'the name of an argument, "size"')),
     "quantities": (str, 'the name of a quantity, "PROBE.stress.yy"'),
@@ -81,7 +81,7 @@ TOP: dict[str, Any] = {
 
 
 def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
-    """Raise CaseError for a key that is not in `known`, or a value that is not of its type (None: any)."""
+    """Raise CaseError for a key that is not in `known`, or a value of another type; the type None admits any value."""
     if not isinstance(data, dict):
         raise CaseError(f"'{where}' must be a table of keys, not {repr(data)}")
     for key, value in data.items():
@@ -97,7 +97,7 @@ def check_keys(where: str, data: Any, known: Mapping[str, Any]) -> None:
 
 
 def check_settings(data: Mapping[str, Any]) -> None:
-    """Raise CaseError if a table of settings such as ``[study]`` has an unknown key or a value of a wrong type."""
+    """Raise CaseError if a table of settings, such as ``[study]``, has an unknown key or an invalid value."""
     for key, known in (("study", STUDY), ("units", UNITS), ("solve", SOLVE), ("modes", MODES)):
         if not (key == "units" and isinstance(data.get(key), str)):
             check_keys(key, data.get(key, {}), known)
@@ -120,8 +120,7 @@ def check_settings(data: Mapping[str, Any]) -> None:
 def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Any:
     """Call `function` with the keys of a table of a case file.
 
-    Raises CaseError if a key is unknown or missing, or a value is of another type than the function takes, or refused
-    by it.
+    Raises CaseError if a key is unknown or missing, or if the function rejects the type or the value of a key.
     """
     parameters = inspect.signature(function).parameters
     check_keys(where, arguments, dict.fromkeys(parameters))
@@ -143,13 +142,13 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
 
 @contextlib.contextmanager
 def at(where: str) -> Iterator[None]:
-    """Prefix errors raised in the block with the table of the case file."""
+    """Prefix the messages of errors raised in the block with the name of the table in the case file."""
     try:
         yield
     except CaseError:
         raise
     except FastcontactError as error:
-        if where.replace(".", " '", 1) + "'" in str(error):  # it names the table already
+        if where.replace(".", " '", 1) + "'" in str(error):  # the message names the table
             raise
         if message := _of_key(where, str(error)):
             raise CaseError(message) from error
@@ -157,7 +156,7 @@ def at(where: str) -> Iterator[None]:
 
 
 def _of_key(where: str, text: str) -> str:
-    """Return a message on an argument of a function as a message on the key; empty for other messages."""
+    """Translate a message about an argument of a function into one about the key; empty for other messages."""
     wrong = _ARGUMENT.fullmatch(text)
     if wrong is None:
         return ""
@@ -166,7 +165,7 @@ def _of_key(where: str, text: str) -> str:
 
 
 def tables(where: str, entries: Any) -> list[dict[str, Any]]:
-    """Return a list of tables, after a check that it is one."""
+    """Return `entries`; CaseError if they are not a list of tables."""
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise CaseError(f"'{where}' must be a list of tables: write [[{where}]] above each")
     return entries

@@ -28,16 +28,17 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Keys whose values may depend on the position.
+# Keys with values that may depend on the position.
 VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
 
 
 def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
-    """Add a material with the given constants, see `_material_law`."""
+    """Add a material with the given constants; `_material_law` selects its law."""
     kind = _material_law(constants)
     constants.pop("law", None)
     if kind is LinearElastic:
-        if isinstance(constants.get("expansion"), list):  # not an array over cells: case files use tables for these
+        # A list is not an array over cells, for which case files use tables.
+        if isinstance(constants.get("expansion"), list):
             check_expansion(constants["expansion"], 1)
         if isinstance(constants.get("conductivity"), list):
             check_conductivity(constants["conductivity"], 1)
@@ -46,7 +47,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
 
 
 def _add_temperature(model: Model, **given: Any) -> None:
-    """Add a temperature given by a value or by a field in files."""
+    """Add a temperature that is given by a value or by a field in files."""
     if ("value" in given) == ("file" in given):
         raise CaseError("a temperature needs either 'value', or 'file' and 'field'")
     if "value" in given:
@@ -62,12 +63,16 @@ def _add_temperature(model: Model, **given: Any) -> None:
 
 @functools.wraps(Model.add_coupling)
 def _add_coupling(model: Model, place: Any = None, **given: Any) -> None:
-    """Add a coupling; its reference point, whose `place` one of the couplings gives, is in the mesh already."""
+    """Add a coupling; `_with_references` has added its reference point at `place` to the mesh."""
     model.add_coupling(**given)
 
 
 def _material_law(entry: dict[str, Any]) -> type[Material]:
-    """Return the `law` of a material; by default isotropic, orthotropic if E, nu or G are lists, anisotropic with D."""
+    """Return the law of a material from its key `law` or, without it, from the other keys.
+
+    A material with `yield_stress` is elastic-plastic, a material with D is anisotropic, a material with G or with a list E or
+    nu is orthotropic, and others are isotropic.
+    """
     law = entry.get("law", "elastic_plastic" if "yield_stress" in entry else "linear_elastic")
     check_known("law", law, ["linear_elastic", *NONLINEAR], CaseError)
     if law in NONLINEAR:
@@ -92,7 +97,7 @@ def _check_material(where: str, entry: dict[str, Any]) -> None:
             raise CaseError(f"the key '{where}.{key}' does not belong to a material that is {_LAWS[law]}")
 
 
-# Nonlinear laws by their names in case files.
+# Nonlinear laws by name in case files.
 NONLINEAR: dict[str, type[Material]] = {
     "elastic_plastic": ElasticPlastic,
     "neo_hookean": NeoHookean,
@@ -107,12 +112,12 @@ _LAWS: dict[type[Material], str] = {
     Anisotropic: "anisotropic (D is a matrix)",
     **{law: f"{name} (its law)" for name, law in NONLINEAR.items()},
 }
-# Names of the types of values in messages.
+# Order in which messages list the types of a value.
 _ORDER = (*NUMBER, list, dict)
 
 
 def _constants() -> dict[str, tuple[type, ...]]:
-    """Return the types of values for the keys of all material laws, from the annotations of their fields."""
+    """Return the types of the keys of all material laws from the annotations of their fields."""
     known: dict[str, set[type]] = {}
     for law in _LAWS:
         for key, annotation in {k: v for base in reversed(law.__mro__) for k, v in types_of(base).items()}.items():
@@ -121,7 +126,7 @@ def _constants() -> dict[str, tuple[type, ...]]:
     return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
-# Functions by kind of table that are not called like it.
+# Functions by kind of table, for kinds without a method `add_KIND` of `Model` that takes the table.
 _NAMED: dict[str, Callable[..., None]] = {
     "material": _add_material,
     "support": Model.prescribe,
@@ -142,17 +147,17 @@ _ADD: dict[str, Callable[..., None]] = {
         "cyclic_symmetry", "spring", "pretension",
     )
 }  # fmt: skip
-# Tables that refer to contact pairs, to be added after these.
+# Tables that refer to contact pairs, which are added after the pairs.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
 
 
 def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
-    """Return the value types of the keys of a table, and its required keys, from the signatures of `adding`."""
+    """Return the types of the keys of a table and its required keys, from the signatures of `adding`."""
     known: dict[str, Any] = {}
     needed = []
     for add in adding:
         annotated = types_of(inspect.unwrap(add))
-        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # without the model
+        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first one is the model
             kinds = toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
                 known |= AXES
@@ -162,7 +167,7 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
     return {**known, **further}, needed
 
 
-# By kind of table: the value types of its keys, and its required keys.
+# Types of the keys and required keys by kind of table.
 LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
     **{
         kind: _keys(add)
@@ -178,13 +183,13 @@ LISTS: dict[str, tuple[dict[str, Any], Sequence[str]]] = {
         },
         (),
     ),
-    # Given by a value or by a file: neither needs the keys of the other.
+    # A temperature is given by a value or by a file, so no key is required in both cases.
     "temperature": (_keys(Model.add_temperature, Model.add_temperature_file)[0], ()),
 }
 
 
 def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Model:
-    """Return the model of the parsed `data` of a case file; paths of obstacle meshes are relative to `folder`."""
+    """Return the model of the parsed `data` of a case file; paths in the data are relative to `folder`."""
     mesh = _with_references(_cut(mesh, data.get("pretension", [])), data.get("coupling", []))
     model = Model(
         mesh,
@@ -203,7 +208,7 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
 
 
 def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
-    """Add the entries of the lists of tables of some kinds."""
+    """Add the entries of the lists of tables of the kinds in `adding`; CaseError if one is invalid."""
     for kind, add in adding.items():
         known, needed = LISTS[kind]
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
@@ -220,7 +225,7 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
-    """Add the contact pairs named in the data, then those to be found automatically."""
+    """Add the contact pairs of the data, then those that are detected automatically if the data request it."""
     named = data.get("contact", {})
     if isinstance(named, str) and named != "auto":
         raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(named)}")
@@ -238,7 +243,7 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
 
 
 def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> dict[str, Any]:
-    """Return a material with arrays in place of constants given as fields in files."""
+    """Return a material entry in which arrays replace constants that are given as fields in files."""
 
     def read(name: str, value: Any) -> Any:
         if not (isinstance(value, dict) and "file" in value):
@@ -254,7 +259,10 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
 def _changed(
     where: str, entry: dict[str, Any], keys: Sequence[str], change: Callable[[str, Any], Any]
 ) -> dict[str, Any]:
-    """Return an entry with the values of some keys changed, those in a list one by one, by their place in the case."""
+    """Return an entry with `change` applied to the values of `keys`, or to each value of a list.
+
+    `change` is called with the location of the value in the case file, for messages, and the value.
+    """
     values = dict(entry)
     for key in (key for key in keys if key in entry):
         value = entry[key]
@@ -266,7 +274,7 @@ def _changed(
 
 
 def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry with its paths taken relative to the folder of the case file."""
+    """Return an entry with the paths in `file` resolved relative to the folder of the case file."""
     file = entry.get("file")
     if file is None:
         return entry
@@ -278,12 +286,12 @@ def _with_paths(folder: Path, entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def _function(where: str, value: Any) -> Any:
-    """Return a function in place of a table of values that depend on the position."""
+    """Return the function that a table of values by position defines; other values are returned unchanged."""
     return called(where, Tabulated, value) if isinstance(value, dict) else value
 
 
 def _cut(mesh: Mesh, sections: Any) -> Mesh:
-    """Return the mesh cut along the pretension sections that have no opposite side yet."""
+    """Return the mesh cut along the pretension sections without an opposite side."""
     for i, entry in enumerate(tables("pretension", sections)):
         name = entry.get("section")
         if isinstance(name, str) and "opposite" not in entry and name + OPPOSITE not in mesh.group_names:
@@ -303,13 +311,13 @@ def _with_references(mesh: Mesh, couplings: Any) -> Mesh:
 
 
 def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
-    """Add a rigid obstacle: its shape from kind and arguments, the other keys as for `Model.add_obstacle`."""
+    """Add a rigid obstacle with the `shape` of the entry; the other keys are arguments of `Model.add_obstacle`."""
     where = f"obstacle.{name}"
     if not isinstance(entry, dict) or not isinstance(entry.get("secondary"), str):
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
     rest = {key: value for key, value in entry.items() if key != "shape"}
     shape = entry.get("shape")
-    if shape == "mesh":  # its arguments may be keys of the obstacle itself
+    if shape == "mesh":  # the arguments of the shape may be keys of the obstacle
         shape = {"kind": "mesh", **{key: rest.pop(key) for key in SURFACE if key in rest}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
     for key in ("motion", "force"):
@@ -320,7 +328,7 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
 
 
 def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
-    """Return the rigid shape of a table with a kind and its arguments; `mesh` is that of the model."""
+    """Return the rigid shape of a table with its kind and its arguments; `mesh` is the mesh of the model."""
     kind = shape.get("kind", "") if isinstance(shape, dict) else shape if isinstance(shape, str) else ""
     if not isinstance(shape, dict) or kind not in (*SHAPES, "mesh"):
         raise CaseError(unknown(f"{where}.kind", str(kind), (*SHAPES, "mesh")))
@@ -336,7 +344,7 @@ def _obstacle(where: str, shape: Any, mesh: Mesh, folder: Path) -> Obstacle:
 
 
 def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
-    """Return an entry as arguments of a model method, with its lists of numbers and terms checked."""
+    """Return an entry as arguments of a method of `Model`, with checked axes, rotation, ramp and terms."""
     arguments = dict(entry)
     if isinstance(entry.get("axes"), dict):
         arguments["axes"] = called(f"{where}.axes", CylindricalAxes, entry["axes"])
@@ -355,7 +363,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
 
 
 def points(table: list[Any], where: str = "ramp.table") -> Table:
-    """Return a ramp as pairs of instant and multiplier of the loads [-]."""
+    """Return a ramp as pairs of instant and load multiplier [-]; CaseError if it is not a list of pairs of numbers."""
     pairs = isinstance(table, list) and all(
         isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table
     )

@@ -1,4 +1,4 @@
-"""Ready-made cases: the case files that come with the package, available by name."""
+"""Ready-made cases: the case files of the package by name."""
 
 from __future__ import annotations
 
@@ -7,30 +7,34 @@ from pathlib import Path
 from fastcontact.errors import CaseError, check_known
 
 _PACKAGE = Path(__file__).resolve().parents[1]
-# The folders in an installed package and in a checkout.
+# Folders of the case files in an installed package and in a checkout.
 _FOLDERS = (_PACKAGE / "data" / "cases", _PACKAGE.parent / "data" / "cases")
 
 
 def shipped_cases() -> dict[str, Path]:
-    """Return the case files that come with fastcontact by name, in alphabetical order."""
+    """Return the case files of the package by name, in alphabetical order."""
     folder = next((folder for folder in _FOLDERS if folder.is_dir()), None)
     return {} if folder is None else {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
 def shipped_case(name: str) -> Path:
-    """Return the case file of a ready-made case; raises CaseError if there is none, with the nearest names."""
+    """Return the path of a ready-made case; CaseError with the nearest names if there is none."""
     cases = shipped_cases()
     check_known("ready-made case", name, cases, CaseError)
     return cases[name]
 
 
 def case_path(given: str | Path) -> Path:
-    """Return the file of a path, or of the name of a ready-made case if there is no such file; raises CaseError if none."""
+    """Return a path or, for the name of a ready-made case, the path of its file.
+
+    A file with the name takes precedence, and "-" is the standard input. Raises CaseError if `given` is neither a path nor
+    the name of a ready-made case.
+    """
     path = Path(given)
     try:
         if path.exists() or path.suffix or path.name != str(given):
             return path
-        if path.name == "-":  # the standard input, to other programs
+        if path.name == "-":  # the usual notation for the standard input
             return Path("/dev/stdin")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error

@@ -1,4 +1,4 @@
-"""Summary of a run: the dictionary that ``--json`` writes, and lines for a person."""
+"""Summary of a run: the dictionary that ``--json`` writes, and its lines of text."""
 
 from __future__ import annotations
 
@@ -32,9 +32,10 @@ def summarise(
     warnings: Sequence[str],
     modes: Modes | None = None,
 ) -> dict[str, Any]:
-    """Return the summary of a run, given its last step and `of_step` of all: numbers, strings, lists and dictionaries.
+    """Return the summary of a run, which contains numbers, strings, lists and dictionaries only.
 
-    `modes` are its modes, where they were asked for.
+    `last` is the last step, `steps` are the results of `of_step` for all steps, and `modes` are the modes at the last step,
+    if they were requested.
     """
     mesh = case.mesh
     top = int(np.argmax(last.von_mises))
@@ -70,7 +71,7 @@ def summarise(
 
 
 def _sensitivity(case: Case, last: StepResult, quantity: Label, by: Sequence[Label]) -> dict[str, Any]:
-    """Return the derivatives of a quantity, or the reason why there are none in this state."""
+    """Return the derivatives of a quantity, or the reason why they are not defined."""
     from fastcontact.analysis.sensitivities import sensitivities
 
     try:
@@ -97,7 +98,7 @@ def _modes(modes: Modes) -> dict[str, Any]:
 
 
 def of_step(step: StepResult) -> dict[str, Any]:
-    """Return the entry of a step in the summary: its load factor and the counts of its solution."""
+    """Return the entry of a step in the summary: load factor, counts of iterations, work and pretension."""
     counts = ("geometry_updates", "active_set_iterations", "linear_iterations")
     summary = {"load_factor": step.load_factor, **{name: step.iterations[name] for name in counts}}
     if "substeps" in step.iterations:
@@ -131,7 +132,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
 
 
 def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return `contact_resultants` of the last step, with the friction work of all `steps`."""
+    """Return the contact resultants of the last step and the frictional work of all `steps`."""
     (resultants,) = contact_resultants(case.model, [last], name)
     return {
         **{name: _plain(getattr(resultants, name)) for name in RESULTANTS},
@@ -140,17 +141,17 @@ def _resultants(case: Case, last: StepResult, name: str, steps: Sequence[Mapping
 
 
 def _plain(value: Any) -> Any:
-    """Return a number or an array in a form for JSON."""
+    """Return a number or an array in a form that JSON can represent."""
     return [finite(member) for member in value] if np.ndim(value) else finite(value)
 
 
 def finite(value: float) -> float | None:
-    """Return a number for JSON: None for NaN and infinity."""
+    """Return a finite number unchanged, and None for NaN and infinity, which JSON cannot represent."""
     return float(value) if np.isfinite(value) else None
 
 
 def _extremes(step: StepResult) -> dict[str, list[float]]:
-    """Return the smallest and largest values of the cell fields."""
+    """Return the smallest and the largest value of each cell field."""
     return {name: _range(values) for name, values in step.cell_fields.items()}
 
 
@@ -170,7 +171,7 @@ def _probe(step: StepResult, point: int) -> dict[str, Any]:
 
 
 def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
-    """Return the stress of each side at a point where materials meet, by material number; otherwise empty."""
+    """Return the stress of each material at a point on an interface, by material number; empty at other points."""
     values = step.material_stress.at(point) if step.material_stress is not None else {}
     return {str(number): stress.tolist() for number, stress in values.items()}
 
@@ -178,7 +179,7 @@ def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
 def _against_theory(
     contact: ContactResult, approach: float | None, theory: Any, mesh_converged: Any = None, share: float = 1.0
 ) -> dict[str, Any]:
-    """Compare a contact with its theory at the given approach and at equal force; the model holds a `share` of it."""
+    """Compare a contact with its theory at equal approach and at equal force; `share` is the modelled fraction."""
     force = float(np.linalg.norm(contact.force)) / share
     computed = {"force": force, "pressure_max": contact.pressure_max, "radius": 0.5 * sum(contact.radius)}
     compared = {"equal_approach": {"approach": approach, **_deviations(computed, theory)}}
@@ -190,14 +191,14 @@ def _against_theory(
 
 
 def _deviations(computed: Mapping[str, float], theory: Any) -> dict[str, Any]:
-    """Return the theory's numbers, and the relative deviations of the computed ones from them."""
+    """Return the quantities of the theory and the relative deviations of the computed quantities."""
     exact = {name: finite(getattr(theory, name)) for name in COMPARED}  # the pressure under a tip is unbounded
     off = {name: finite(computed[name] / value - 1.0) if value else None for name, value in exact.items()}
     return {**exact, "deviation": off}
 
 
 def lines(summary: Mapping[str, Any]) -> list[str]:
-    """Return the summary as lines of text: contact, maximum von Mises stress, theory, checks."""
+    """Return the summary as lines of text."""
     unit = summary["units"]
     steps = summary["steps"]
     rows = [
@@ -207,7 +208,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         f"{sum(s['geometry_updates'] for s in steps)} geometry updates",
     ]
     if parts := [len(s["substeps"]) for s in steps if "substeps" in s]:
-        rows.append(f"  {count(len(parts), 'load step')} did not converge as a whole and went in {sum(parts)} parts")
+        rows.append(f"  {count(len(parts), 'load step')} did not converge as a whole, {sum(parts)} substeps instead")
     strained = summary["von_mises_max"]["value"] > 0.0 or "heat" not in summary
     for name, contact in summary["contact"].items() if strained else ():
         rows += _contact_lines(name, contact, unit)
@@ -243,7 +244,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
 
 
 def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
-    """Return lines of frequencies, one for each number of nodal diameters; pairs of modes are listed once."""
+    """Yield a line of frequencies for each number of nodal diameters; pairs of modes are listed once."""
     frequencies = table["frequencies"]
     diameters = table.get("nodal_diameters", [None] * len(frequencies))
     twins = table.get("twins", range(len(frequencies)))
@@ -256,7 +257,7 @@ def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
 
 
 def count(number: int, noun: str) -> str:
-    """Return a number with its noun in singular or plural: "1 load step", "2 load steps"."""
+    """Return a number and its noun in the singular or the plural: "1 load step", "2 load steps"."""
     return f"{number} {noun}" + "s" * (number != 1)
 
 
@@ -271,7 +272,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
     )
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
-        yield f"  obstacle '{name}' stands {with_unit(f'({moved})', unit, 'length')} from its place at rest"
+        yield f"  obstacle '{name}' is displaced by {with_unit(f'({moved})', unit, 'length')}"
     if "torque" in contact:
         yield (
             f"  obstacle '{name}' has turned by {contact['obstacle_angle']:.6g} radian, with a torque of "
@@ -287,7 +288,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
 
 
 def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
-    """Return the radius of a contact as text; `outside` is None if it reaches the end of the surface."""
+    """Return the radius of a contact as text; `outside` is None if the contact extends to the end of the surface."""
     if inside is None:
         return "open"
     if outside is None:
@@ -344,7 +345,7 @@ def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
 
 
 def _why(check: Mapping[str, Any]) -> list[str]:
-    """Return a line of explanation if a check fails because of its theory, not the mesh."""
+    """Return a line of explanation if a check fails because of its theory rather than the mesh."""
     off = check["mesh_converged_deviation"]
     if check["passed"] or off is None or abs(off) <= check["tolerance"]:
         return []
