@@ -1,4 +1,4 @@
-"""The command line, with one file per sub-command; only these modules print and parse arguments."""
+"""The command line, with a module for each subcommand; only these modules print and parse arguments."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import signal
 import sys
 from collections.abc import Sequence
 
-INTERRUPTED = 130  # exit code of shells
-STOPPED = (129, 130, 143)  # exit codes after a signal
+INTERRUPTED = 130  # exit code after SIGINT, as in shells
+STOPPED = (129, 130, 143)  # exit codes after SIGHUP, SIGINT and SIGTERM
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     try:
-        from fastcontact.cli._main import main as run  # the import may be interrupted, too
+        from fastcontact.cli._main import main as run  # the import can be interrupted as well
 
         return run(argv)
     except KeyboardInterrupt:
@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def entry_point() -> None:
     """Run the command line and exit with its code."""
     _open_standard_files()
-    # BLAS threads spin between the small products here; the loops of the package use threads of Numba.
+    # BLAS threads would spin between the small products of the package, whose loops use Numba threads.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = main()
@@ -37,16 +37,16 @@ def entry_point() -> None:
     code = flushed(code)
     if code in STOPPED:
         for stopped in STOPPED:  # later signals do not change the exit code
-            with contextlib.suppress(ValueError):  # the system lacks this signal
+            with contextlib.suppress(ValueError):  # the platform lacks this signal
                 signal.signal(stopped - 128, signal.SIG_IGN)
-        sys.unraisablehook = lambda ignored: None  # from finalisers of partly made objects
+        sys.unraisablehook = lambda ignored: None  # errors in finalisers of partly created objects
     else:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is done: Ctrl-C ends at once
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # all output is written, and Ctrl-C may end the process
     sys.exit(code)
 
 
 def _open_standard_files() -> None:
-    """Open missing standard files 0 to 2 on the null device: otherwise the next opened file would take their place."""
+    """Open missing standard files 0 to 2 on the null device, since the next opened file would take their descriptors."""
     for number in range(3):
         try:
             os.fstat(number)

@@ -1,18 +1,18 @@
-"""Arguments of commands as tables, from which those of argparse are made."""
+"""Tables of command-line arguments, which are converted to arguments of argparse."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-# By usage, such as ``"-o --output FILE"``, the help, or the kind of the value and the help. The kind is a type, a default
-# value, or further settings of argparse. A nested table is a group with its key as title; without a title, the arguments
-# exclude each other.
+# The key is the usage, such as ``"-o --output FILE"``, and the value is the help, or the kind of the argument and the help.
+# The kind is a type, a default value, or a dictionary of settings of argparse. A nested table is a group with its key as
+# title; the arguments of a group without a title are mutually exclusive.
 Arguments = Mapping[str, Any]
 
 
 def declare(parser: Any, table: Arguments, **common: Any) -> None:
-    """Add the arguments of a table to a parser or to a group of one; `common` are settings of argparse for all."""
+    """Add the arguments of a table to a parser or to an argument group; `common` are settings of all arguments."""
     for usage, entry in table.items():
         if isinstance(entry, Mapping):
             declare(parser.add_argument_group(usage) if usage else parser.add_mutually_exclusive_group(), entry)

@@ -1,4 +1,4 @@
-"""Shell completion of commands, options and file names, by the library shtab."""
+"""Shell completion of commands, options and file names with the library shtab."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError
 
 SHELLS = ("bash", "zsh", "tcsh")
-# Arguments whose values are files, by name or metavar.
+# Names and metavars of arguments whose values are file names.
 FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
 
 
 class PrintCompletion(argparse.Action):
-    """``--print-completion SHELL``: print the completion script of a shell for this command line, and exit."""
+    """Action of ``--print-completion SHELL``: print the completion script of a shell and exit."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
-        """Print the script; raises FastcontactError without shtab."""
+        """Print the script; FastcontactError if shtab is not installed."""
         try:
             import shtab
         except ImportError as error:
@@ -28,7 +28,7 @@ class PrintCompletion(argparse.Action):
 
 
 def _mark_files(parser: argparse.ArgumentParser, kind: Any) -> None:
-    """Mark for shtab the arguments of a parser and its sub-commands that are file names."""
+    """Mark the arguments of a parser and its subcommands that are file names, for shtab."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for sub in action.choices.values():

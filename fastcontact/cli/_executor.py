@@ -1,4 +1,4 @@
-"""Executors of the runs of a study: processes of this machine, of MPI, or of a Dask cluster."""
+"""Executors of the runs of a study: local processes, MPI processes or a Dask cluster."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MPI_COMMAND = "mpiexec -n N python -m mpi4py.futures -m fastcontact ..."
 
 @contextlib.contextmanager
 def executor(where: str) -> Iterator[Any]:
-    """Yield an executor, None for processes of this machine, and shut it down at the end.
+    """Yield an executor, or None for local processes, and shut it down at the end.
 
-    Raises CaseError if its library is not installed, no process can be started, a process is lost, there is no scheduler at
-    the address, or the word is unknown.
+    Raises CaseError if `where` is unknown, the library is not installed, no process can be started, a process is lost, or no
+    scheduler answers at the address.
     """
     if where == "processes":
         yield None
@@ -47,8 +47,8 @@ def executor(where: str) -> Iterator[Any]:
 def _mpi() -> Iterator[Any]:
     """Yield the executor of MPI.
 
-    Most launchers end all processes when one of them dies. Otherwise the communication thread of mpi4py fails, and the
-    remaining runs would never be answered.
+    Most launchers end all processes when a process dies. With other launchers the communication thread of mpi4py fails, and
+    the main thread would wait for the remaining runs without end.
     """
     try:
         from mpi4py.futures import MPIPoolExecutor
@@ -70,7 +70,7 @@ def _mpi() -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
-    """Interrupt the main thread when another thread ends with an error; collect these errors instead of printing them."""
+    """Interrupt the main thread when another thread fails; yield a list that collects the errors, which are not printed."""
     failures: list[BaseException] = []
     before = threading.excepthook
 

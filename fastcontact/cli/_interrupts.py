@@ -1,10 +1,11 @@
-"""Handle Ctrl-C, SIGTERM and SIGHUP, which are repeated if Python loses the exception.
+"""Handling of Ctrl-C, SIGTERM and SIGHUP, which are sent again if Python loses the exception.
 
-SIGTERM, sent by schedulers, and SIGHUP, sent by a closing terminal, are handled like Ctrl-C: by default they would leave
-incomplete files.
-Python raises KeyboardInterrupt at any point of the program. In a finaliser, and in a callback from a C library, such as LLVM
-while a kernel is compiled, the exception is printed and dropped, and the command would continue. C extension modules turn
-it into another error while they are imported.
+SIGTERM, which schedulers send, and SIGHUP, which a closing terminal sends, are handled like Ctrl-C, because by default they
+would leave incomplete files.
+
+Python can raise KeyboardInterrupt at any point of a program. In a finaliser or in a callback from a C library, such as LLVM
+during the compilation of a kernel, Python prints the exception and discards it, and the command would continue. While a C
+extension module is imported, the exception may become another error.
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ from types import FrameType
 from typing import Any
 
 AGAIN = 0.05  # delay before a signal is repeated [s]
-# Time within which a further signal counts as the same [s].
+# Time in which another signal is taken for a repetition of the last one [s].
 REPEATED = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):
     HANDLERS[signal.SIGHUP] = signal.SIG_DFL
-# Exit codes of shells.
+# Exit codes by signal, as in shells.
 CODES: dict[int, int] = {number: 128 + number for number in HANDLERS}
 IMPORTING = ("importlib._bootstrap", "_frozen_importlib")
 COMMAND_LINE = "fastcontact.cli._main"
@@ -35,9 +36,10 @@ COMMAND_LINE = "fastcontact.cli._main"
 def interruptible(raised: list[int] | None = None) -> Iterator[None]:
     """Let Ctrl-C, SIGTERM and SIGHUP interrupt the block at a point where the exception is not lost.
 
-    The numbers of these signals are appended to the list `raised`. Signals with another handler keep it.
+    The numbers of the signals received are appended to the list `raised`. Signals whose handler is not the default keep
+    their handler.
     """
-    heard: list[float] = []  # times at which signals interrupted the block, unless the exception was lost
+    heard: list[float] = []  # times of signals whose exception was not lost
     raised = [] if raised is None else raised
     in_main_thread = threading.current_thread() is threading.main_thread()
     numbers = [number for number, usual in HANDLERS.items() if in_main_thread and signal.getsignal(number) == usual]
@@ -64,20 +66,20 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def meant(raised: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt if a signal was `raised` and C functions turned it into another error."""
+    """Raise KeyboardInterrupt in place of an error that a C function has made of it, if a signal was `raised`."""
     try:
         yield
     except Exception as error:
         if raised and not isinstance(
             error.__context__, KeyboardInterrupt
-        ):  # otherwise it was caught, and the error is genuine
+        ):  # otherwise the exception was not lost, and the error is genuine
             raise KeyboardInterrupt from error
         raise
 
 
 @contextlib.contextmanager
 def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[None]:
-    """Repeat an interruption that Python would print and drop; once one was `raised`, finalisers print nothing."""
+    """Repeat an interruption that Python would discard; after a signal was `raised`, errors in finalisers are not printed."""
     before = sys.unraisablehook
 
     def lost(unraisable: sys.UnraisableHookArgs) -> None:
@@ -95,7 +97,7 @@ def _lost_ones_come_again(raised: list[int], heard: list[float]) -> Iterator[Non
 
 
 def forget(error: BaseException | None) -> None:
-    """Release the objects under construction when a command was interrupted: their finalisers may fail and print."""
+    """Release the objects that an interrupted command was creating, without the messages of failing finalisers."""
     before, sys.unraisablehook = sys.unraisablehook, lambda ignored: None
     try:
         while error is not None:
@@ -106,7 +108,7 @@ def forget(error: BaseException | None) -> None:
 
 
 def to_main_thread(number: int) -> None:
-    """Send a signal to the main thread, which wakes it even while it waits for a lock."""
+    """Send a signal to the main thread, which interrupts it even while it waits for a lock."""
     main = threading.main_thread().ident
     if hasattr(signal, "pthread_kill") and main is not None:
         signal.pthread_kill(main, number)
@@ -121,7 +123,7 @@ def _again(number: int) -> None:
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Return whether a frame lies within an import below the command line."""
+    """Return whether a frame belongs to an import that the command has begun."""
     while frame is not None and frame.f_globals.get("__name__") != COMMAND_LINE:
         if frame.f_globals.get("__name__") in IMPORTING:
             return True

@@ -1,7 +1,8 @@
-"""Dispatch to the sub-commands, and conversion of errors to exit codes.
+"""Dispatch to the subcommands, and conversion of errors to exit codes.
 
-0: success; 1: wrong input, one clear line; 2: no convergence, the result file keeps all converged steps; 3: a check of the
-case failed (``run --strict``); 130: interrupted from the keyboard, files as for 2; 143, 129: likewise by SIGTERM, SIGHUP.
+The exit codes are 0 for success, 1 for invalid input, 2 for failed convergence, 3 for a failed check of the case
+(``run --strict``), 130 for an interruption from the keyboard, 143 for SIGTERM and 129 for SIGHUP. Invalid input is reported
+in one line. After failed convergence or an interruption, the result file contains all converged steps.
 """
 
 from __future__ import annotations
@@ -28,39 +29,39 @@ from fastcontact.errors import ConvergenceError, FastcontactError, printable, un
 
 log = logging.getLogger("fastcontact")
 _FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
-# Message of argparse for a wrong choice, with the names that it lists.
+# Message of argparse for an invalid choice, with the valid names.
 _CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)")
 _NAME = re.compile(r"[\w-]+")
 
 
 class _Printable(logging.StreamHandler[Any]):
-    """A handler that escapes terminal control characters, which names from files may contain."""
+    """A log handler that escapes the control characters that names from files may contain."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the line to write; on a terminal it overwrites the progress bar."""
+        """Return the line for a record; on a terminal it overwrites the progress bar."""
         line = encodable(printable(super().format(record)), self.stream)
         return f"\r\x1b[K{line}" if somebody_watches() else line
 
 
 class Parser(argparse.ArgumentParser):
-    """An argument parser that reports errors like the library: one line, exit code 1."""
+    """An argument parser that reports errors as the library does, in one line and with exit code 1."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
-        """Raise instead of exiting with code 2, which means no convergence; for a wrong choice suggest the nearest."""
+        """Raise FastcontactError with the nearest valid choice; argparse would exit with code 2, which is in use."""
         wrong = _CHOICE.search(message)
         if wrong:
             message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
     def print_help(self, file: Any = None) -> None:
-        """Print the help; argparse would ignore write errors."""
+        """Print the help and report write errors, which argparse would ignore."""
         if file is None:
             say(self.format_help().rstrip("\n"))
         else:
             super().print_help(file)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Refuse an unknown flag of this command and suggest the nearest; argparse would leave it to the parent parser."""
+        """Raise an error with the nearest option for an unknown flag, which argparse would leave to the parent parser."""
         options, rest = super().parse_known_args(args, namespace)
         for flag in (text.partition("=")[0] for text in rest if _FLAG.match(text)):
             known = [*_FLAG.findall(self.format_usage()), "--help"]
@@ -69,16 +70,16 @@ class Parser(argparse.ArgumentParser):
 
 
 class PrintVersion(argparse.Action):
-    """``--version``: print the version and exit; argparse would ignore write errors."""
+    """Action of ``--version``: print the version, report write errors, which argparse would ignore, and exit."""
 
     def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
-        """Print the version."""
+        """Print the version and exit."""
         say(f"fastcontact {__version__}")
         parser.exit()
 
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
-    """Return the parser of the sub-command `command`, or of all sub-commands if there is none of this name."""
+    """Return the parser of the subcommand `command`, or of all subcommands if there is none with this name."""
     top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
@@ -102,12 +103,12 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
     raised: list[int] = []
-    with interruptible(raised):  # also while the reason of the end is printed
+    with interruptible(raised):  # covers also the output of error messages
         return _run_with_exit_code(sys.argv[1:] if argv is None else list(argv), raised)
 
 
 def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
-    """Run a command; print an error and return its exit code. `raised` are the signals received."""
+    """Run a command, print its error and return the exit code; `raised` contains the signals received."""
     try:
         with meant(raised):
             return _run(words)
@@ -116,7 +117,7 @@ def _run_with_exit_code(words: list[str], raised: list[int]) -> int:
         return 2
     except FastcontactError as error:
         say(f"error: {error}", error=True)
-        forget(error)  # a stopped study raises such an error
+        forget(error)  # an interrupted study raises this error
         return CODES[raised[0]] if raised and raised[0] != signal.SIGINT else 1
     except BrokenPipeError:
         return 1
@@ -132,7 +133,7 @@ def _run(words: list[str]) -> int:
     handler = _Printable()
     log.handlers[:] = [handler]
     log.setLevel(logging.INFO if arguments.verbose else logging.WARNING)
-    notify = somebody_watches() and not (arguments.quiet or arguments.verbose)  # with -v it is in the log
+    notify = somebody_watches() and not (arguments.quiet or arguments.verbose)  # -v writes this message to the log
     compiling.listeners[:] = [_say_compiling] if notify else []
     with warnings_shown():
         return int(arguments.run(arguments) or 0)
@@ -145,12 +146,12 @@ def _say_compiling() -> None:
 
 
 def _notes(error: BaseException) -> list[str]:
-    """Return the notes that a command added to an error, as lines."""
+    """Return the notes of an error as indented lines."""
     return [f"  {note}" for note in getattr(error, "__notes__", ())]
 
 
 def history_lines(history: Sequence[Mapping[str, Any]], shown: int = 10) -> list[str]:
-    """Return the last iterations of a failed step as lines: change of the displacement, residual, active set."""
+    """Return lines with displacement change, active constraints and residual in the last iterations of a failed step."""
     if not history:
         return []
     first = max(len(history) - shown, 0)

@@ -1,4 +1,4 @@
-"""Output files of commands, including pictures: checks before the work, and writing after it."""
+"""Output files of commands, including pictures: checks before a computation, and writing after it."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ def check_outputs(
     files: Iterable[str | os.PathLike[str] | None],
     pictures: Iterable[str | os.PathLike[str] | None] = (),
 ) -> None:
-    """Refuse files that could not be written, or would replace a file to `read` or another output; None means no file.
+    """Check that output files can be written and replace neither an input file nor another output.
 
-    Every command that writes files calls this before it opens any. Files are identified by device and number, not by name: a
-    link to a file is the same file.
+    Each command that writes files calls this function before it opens any file. `read` are the input files, and None stands
+    for no file. Files are identified by device and inode, so that links to a file are recognised as the same file.
 
-    Raises FileError if a folder is missing or write-protected, a path is a folder, a file to read or another output, or the
-    format of a picture is unknown; FastcontactError if matplotlib is missing.
+    Raises FileError if a folder is missing or write-protected, if a path is a folder, an input file or another output, or
+    if the format of a picture is unknown; FastcontactError if Matplotlib is missing.
     """
     from fastcontact._tools.paths import checked_target, is_stream
 
@@ -49,7 +49,7 @@ def check_outputs(
 
 
 def _identity(path: Path) -> object:
-    """Return device and number of a file, equal for all its names; for a new file those of its folder, and its name."""
+    """Return device and inode of a file; for a new file, the identity of its folder and its name."""
     try:
         status = path.stat()
     except OSError:
@@ -71,7 +71,7 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text file, completely or not at all, or to a stream; raises FileError if it cannot be written."""
+    """Write a text to a stream, or to a file completely or not at all; FileError if it cannot be written."""
     from fastcontact._tools.paths import replacing
 
     with replacing(path) as target:
@@ -79,7 +79,7 @@ def write_text(path: str, content: str) -> None:
 
 
 def say_written(options: Any, *paths: object) -> None:
-    """Print which files were written, unless the option ``--quiet`` is set; None means no file."""
+    """Print the names of the files written, unless ``--quiet`` is set; None stands for no file."""
     if not options.quiet:
         say(f"wrote {', '.join(str(path) for path in paths if path)}")
 
@@ -90,9 +90,9 @@ def write_json(path: str, numbers: Any, indent: int = 2) -> None:
 
 
 def save(axes: Any, path: str) -> None:
-    """Write the figure of `axes` to `path`; raises FileError if it cannot be written or its format is unknown.
+    """Write the figure of `axes` to `path`; FileError if it cannot be written or its format is unknown.
 
-    Warnings of Matplotlib, such as characters missing in its font, are shown in one line each.
+    Warnings of Matplotlib, for example about characters missing in a font, are printed in one line each.
     """
     from fastcontact._tools.paths import replacing
 
@@ -107,7 +107,7 @@ def save(axes: Any, path: str) -> None:
 
 
 def profile_picture(case: Any, step: StepResult, path: str) -> None:
-    """Plot the pressure of the first contact pair and the theories of its case."""
+    """Plot the pressure of the first contact pair and its theories; FastcontactError if there is no contact pair."""
     if not step.contact:
         raise FastcontactError("there is no contact pair whose pressure could be plotted")
     name, contact = next(iter(step.contact.items()))
@@ -117,7 +117,7 @@ def profile_picture(case: Any, step: StepResult, path: str) -> None:
 
 
 def draw_profile(contact: ContactResult, step: StepResult, theories: dict[str, Any], path: str, title: str) -> None:
-    """Plot the pressure of a contact pair and theories, given by legend text."""
+    """Plot the pressure of a contact pair and theories, which are given by label of the legend."""
     from fastcontact.results import plot
     from fastcontact.results.tables import normal_stress
 

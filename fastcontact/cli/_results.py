@@ -1,4 +1,4 @@
-"""What the commands that read result files share: choice of step and contact pair, the case stored in the file."""
+"""Functions for commands that read result files: choice of step and contact pair, and the case stored in the file."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARGUMENTS: Arguments = {
 
 
 def chosen_step(results: Any, number: int) -> Any:
-    """Return the step with a number counted from 1, or the last one for -1; raises CaseError if there is no such step."""
+    """Return the step with a number counted from 1, or the last step for -1; CaseError if it does not exist."""
     if not len(results):
         raise CaseError(f"'{results.path}' holds no finished step yet")
     if number == -1:
@@ -34,9 +34,10 @@ def chosen_step(results: Any, number: int) -> Any:
 
 
 def chosen_contact(options: argparse.Namespace, step: Any) -> str:
-    """Return the name of the contact pair in the options, by default the first one; then print the names of the others.
+    """Return the name of the contact pair in the options, by default the first pair.
 
-    Raises CaseError if there is no contact pair, or none of this name.
+    If the first of several pairs is chosen by default, the names of the others are printed. Raises CaseError if there is no
+    contact pair, or none with the name.
     """
     if not step.contact:
         raise CaseError("this result holds no contact pair")
@@ -54,7 +55,7 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
 
 
 def case_data(results: Any) -> dict[str, Any]:
-    """Return title, theories, approaches and ramp of the case text in the file; empty without a text."""
+    """Return title, theories, approaches and ramp of the case stored in the file; defaults if there is no case."""
     from fastcontact.cases.case import described
 
     try:
@@ -72,22 +73,23 @@ def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:
 def pressure_curves(
     theories: Mapping[str, Any], contact: Any, *, approach: float | None = None, load: float = 1.0
 ) -> dict[str, Any]:
-    """Return theories to compare with the pressure of a contact, by label of the legend: at equal approach and equal force.
+    """Return theories at equal approach and at equal force, for comparison with the pressure of a contact.
 
     Parameters
     ----------
     theories : mapping
         Theories of the pair in the form of `Case.theories`.
     contact : ContactResult
+        Contact to compare with.
     approach : float, optional
-        Approach in the case, at load multiplier 1 [length]; None if the theory has a force or no load.
+        Approach of the case at load multiplier 1 [length]; None if the theory is given by a force or has no load.
     load : float
-        Multiplier of the loads at this step [-].
+        Load multiplier of the step [-].
 
     Returns
     -------
     dict
-        Empty without a theory whose pressure can be drawn; that of a flat punch is infinite. For finite half-spheres it
+        Theories by label of the legend; empty if the pressure of the theory cannot be drawn. For finite half-spheres it
         contains Hertz's theory.
     """
     theory: Any = theories.get("theory")
@@ -110,10 +112,10 @@ def drawn(theory: Any) -> PressureCurve:
 def compared(
     name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
 ) -> dict[str, Any]:
-    """Return a theory at the approach and at the force of a contact, as far as these are known, by label of the legend.
+    """Return a theory at the approach and at the force of a contact, where these are known, by label of the legend.
 
-    The model represents a `share` of the contact [-]; `approach` is reached at load multiplier 1, and `load` is that of
-    the step.
+    `share` is the fraction of the contact that the model represents [-]. The `approach` [length] is reached at load
+    multiplier 1, and `load` is the multiplier of the step [-].
     """
     curves, force = {}, float(np.linalg.norm(contact.force)) / share
     if approach is not None and load == 1.0:
@@ -126,7 +128,7 @@ def compared(
 
 
 def law(theories: Mapping[str, Any]) -> Any:
-    """Return the theory if it gives force and radius as functions of the approach; otherwise None."""
+    """Return the theory if it provides force and radius as functions of the approach; otherwise None."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     return theory if hasattr(theory, "at_approach") else None

@@ -1,4 +1,4 @@
-"""Common parts of the commands of studies: arguments, executors, interruption, output files."""
+"""Common parts of the commands for studies: arguments, executors, interruption and output files."""
 
 from __future__ import annotations
 
@@ -29,19 +29,22 @@ ARGUMENTS: Arguments = {
 
 
 def check_targets(options: argparse.Namespace, *also: str | None) -> None:
-    """Refuse files that cannot be written, before anything runs; errors as for `check_outputs`."""
+    """Check before the study that its output files can be written; errors as for `check_outputs`."""
     from fastcontact.cases.case import files_of_case
 
     check_outputs(files_of_case(options.case), [options.json, options.csv, options.html, *also], [options.png])
 
 
 def names(text: str | None) -> list[str] | None:
-    """Return the names in a comma-separated text."""
+    """Return the names in a comma-separated text, or None for None and an empty text."""
     return [name.strip() for name in text.split(",") if name.strip()] if text else None
 
 
 def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
-    """Return the result of a study, run on the executor of the options; an interruption is reported with how to resume."""
+    """Run a study on the executor of the options and return its result.
+
+    After an interruption, FastcontactError is raised with a message on how to resume.
+    """
     from fastcontact.studies.progress import Runs
 
     progress = Runs(show=somebody_watches() and not options.quiet)
@@ -64,9 +67,10 @@ def stopped(options: argparse.Namespace) -> str:
 def report(
     options: argparse.Namespace, result: Any, hint: str, failures: Sequence[str] = (), also: Sequence[str] = ()
 ) -> int:
-    """Write the files of the options; print the reasons of failed runs, the lines of the result, and the files written.
+    """Write the files of the options and return the exit code.
 
-    `also` are files written before; without any file, the `hint` is printed. Returns the exit code.
+    The messages of failed runs, the lines of the result and the names of the files are printed. `also` are the names of files
+    written earlier. The `hint` is printed if no file was written.
     """
     if options.json:
         write_json(options.json, result.as_dict())

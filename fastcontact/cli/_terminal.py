@@ -1,7 +1,8 @@
-"""Printing on terminals: control characters, which names and titles from files may contain, are escaped.
+"""Printing on terminals, with control characters escaped.
 
-Escape sequences could change the display or the behaviour of a terminal; characters that change the direction of writing
-could hide a part of a line (Boucher and Anderson, 2023). Characters missing in the terminal's encoding are escaped, too.
+Names and titles from files may contain escape sequences, which could change the display or the behaviour of a terminal, and
+characters that change the direction of writing, which could hide part of a line (Boucher and Anderson, 2023). Characters that
+the encoding of the terminal lacks are escaped as well.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from fastcontact.errors import FileError, printable
 
 
 def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
-    """Add the verbosity options of every command, with `default` as their default value."""
+    """Add the verbosity options, which all commands have, with the default value `default`."""
     table = {
         "-v --verbose": "say what is being done and why",
         "-q --quiet": "print nothing but errors and warnings",
@@ -25,12 +26,15 @@ def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
 
 
 def somebody_watches() -> bool:
-    """Return whether standard error is a terminal; it may be missing."""
+    """Return whether standard error exists and is a terminal."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 def say(text: object, *, error: bool = False) -> None:
-    """Print a text on standard output, or on standard error, whose write errors are ignored."""
+    """Print a text on standard output, or on standard error without reporting write errors.
+
+    Raises FileError if standard output cannot be written, and BrokenPipeError if its reader has ended.
+    """
     stream: TextIO | None = sys.stderr if error else sys.stdout
     if stream is None:  # closed before the process was started
         return
@@ -44,7 +48,7 @@ def say(text: object, *, error: bool = False) -> None:
 
 
 def flushed(code: int) -> int:
-    """Flush the output and return the exit code; if writing fails, report it in one line and return 1."""
+    """Flush standard output and return the exit code; if this fails, report the error and return 1 instead of 0."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -58,11 +62,11 @@ def flushed(code: int) -> int:
 
 
 def _unwritten(error: OSError) -> str:
-    """Return the message for a failed write to standard output, e.g. on a full disk."""
+    """Return the message for a failed write to standard output, for example on a full disk."""
     return f"cannot write to standard output ({error.strerror}): send it elsewhere"
 
 
 def encodable(text: str, stream: TextIO) -> str:
-    """Return a text in which characters that a stream cannot encode are replaced by escapes."""
+    """Return a text in which escapes replace the characters that a stream cannot encode."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)

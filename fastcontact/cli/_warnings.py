@@ -1,4 +1,4 @@
-"""Warnings of the library as output lines of a command."""
+"""Warnings of the library as lines in the output of a command."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ log = logging.getLogger("fastcontact")
 
 @contextlib.contextmanager
 def warnings_shown() -> Iterator[list[str]]:
-    """Show each warning of the library once, in one line, as soon as it is issued; collect their texts."""
+    """Log each distinct warning of the library once, in one line, when it is issued; yield a list of their texts."""
     texts: list[str] = []
     with warnings.catch_warnings():
         warnings.simplefilter("always", FastcontactWarning)

@@ -1,4 +1,4 @@
-"""``fastcontact bench``: the benchmark suite of the checkout, ``bench/suite``."""
+"""``fastcontact bench``: the benchmark suite in ``bench/suite`` of the source checkout."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ARGUMENTS: Arguments = {
 
 
 def suite(name: str) -> Any:
-    """Import a module of ``bench/suite``; raises FastcontactError if the package is installed without its checkout."""
+    """Import a module of ``bench/suite``; FastcontactError if there is no source checkout."""
     folder = Path(__file__).resolve().parents[2] / "bench"
     if not (folder / "suite").is_dir():
         raise FastcontactError(
@@ -39,5 +39,5 @@ def suite(name: str) -> Any:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the benchmarks, print the table, write the files of the options."""
+    """Run the benchmarks, print the table, and write the files of the options."""
     return int(suite("command").run(options))

@@ -1,4 +1,4 @@
-"""``fastcontact cases``: the ready-made cases, listed, printed or copied."""
+"""``fastcontact cases``: list, print or copy the ready-made cases."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ ARGUMENTS: Arguments = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """List, print or copy."""
+    """List the ready-made cases, or print or copy one of them."""
     from fastcontact.cases.shipped import shipped_case, shipped_cases
 
     if options.copy and options.name:
@@ -55,7 +55,7 @@ def _lines(path: Path) -> list[str]:
 
 
 def copied(case: Path, target: Path) -> list[Path]:
-    """Copy a case file, and beside it the mesh file it reads, if any; refuse to overwrite."""
+    """Copy a case file and its mesh file, if it has one, and return the new paths; FileError if a path exists."""
     from fastcontact._tools.paths import replacing
 
     text = case.read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""``fastcontact converge``: mesh-convergence study of a case, and its difference from theory."""
+"""``fastcontact converge``: mesh-convergence study of a case, with its deviation from theory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ARGUMENTS: Arguments = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the study, write the files of the options, print tables and sentences; 2 if a run failed."""
+    """Run the study, write the files of the options and print the results; return 2 if a run failed."""
     from fastcontact.studies.convergence import convergence_study
 
     _study.check_targets(options, options.output)
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _adaptive(options: argparse.Namespace) -> int:
-    """Refine until the quantity is accurate, write the files of the options, print the table; 2 if it is not reached."""
+    """Run an adaptive study, write the files of the options and print the table; return 2 if the tolerance is not met."""
     from fastcontact.studies.adaptive import adaptive_study
 
     with warnings_shown():

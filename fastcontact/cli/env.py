@@ -1,4 +1,4 @@
-"""``fastcontact env``: versions, threads, cache folder; compiles all kernels on request."""
+"""``fastcontact env``: show versions, threads and the cache folder, and compile all kernels on request."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ARGUMENTS: Arguments = {"--warmup": "compile the kernels now, so that later runs
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the environment."""
+    """Print the environment and, if requested, compile the kernels."""
     from fastcontact._jit import cache, decorators
     from fastcontact._tools.versions import versions
     from fastcontact.elasticity import element_2d_kernels
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _warm_up(show: bool) -> int:
-    """Compile all kernels of the table in parallel, with one process per processor; return their number."""
+    """Compile all registered kernels, with one process per thread, and return their number."""
     from fastcontact._jit import ahead, decorators
     from fastcontact.analysis.progress import StatusLine
 

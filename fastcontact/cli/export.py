@@ -1,4 +1,4 @@
-"""``fastcontact export``: results for other programs."""
+"""``fastcontact export``: write results in the formats of other programs."""
 
 from __future__ import annotations
 

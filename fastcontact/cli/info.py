@@ -1,4 +1,4 @@
-"""``fastcontact info``: content of a mesh, case, deck or result file."""
+"""``fastcontact info``: show the content of a mesh, case, deck or result file."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _contacts(options: argparse.Namespace) -> int:
-    """Print the contact pairs found in a mesh, and draw them."""
+    """Print the contact pairs detected in a mesh, and draw them if requested."""
     from fastcontact.cases.case import files_of_case, read_case
     from fastcontact.contact.found_contacts import find_contacts
     from fastcontact.results import plot
@@ -69,7 +69,7 @@ def _contacts(options: argparse.Namespace) -> int:
 
 
 def _is_case(path: Path) -> bool:
-    """Whether a file is a case file, or a deck with more than a mesh."""
+    """Return whether a file is a case file, or a deck with more than a mesh."""
     return path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
 
 
@@ -86,7 +86,7 @@ def _mesh_of(file: str) -> Any:
 
 
 def _is_deck(path: Path) -> bool:
-    """Whether an Abaqus file holds more than a mesh: steps, parts, or included files."""
+    """Return whether an Abaqus file contains steps, parts or included files in addition to a mesh."""
     from fastcontact._tools.paths import existing_file
 
     words = ("*STEP", "*PART", "*INCLUDE")

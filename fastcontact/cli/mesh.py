@@ -16,7 +16,7 @@ HELP = "make a mesh with named groups and report its quality"
 
 
 def add_generators(parser: argparse.ArgumentParser) -> None:
-    """Add one sub-command per generator, with options from the signature of the generator."""
+    """Add a subcommand for each generator, with options from the signature of the generator."""
     from fastcontact.mesh.generate import GENERATORS
 
     kinds = parser.add_subparsers(dest="generator", metavar="GENERATOR", required=True)
@@ -28,15 +28,15 @@ def add_generators(parser: argparse.ArgumentParser) -> None:
             {"-o --output OUTPUT": ({"required": True}, "mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")},
         )
         declare(sub, dict(_option(make, parameter) for parameter in inspect.signature(make).parameters.values()))
-        add_loudness(sub, default=argparse.SUPPRESS)  # keeps the options before the name of the generator
+        add_loudness(sub, default=argparse.SUPPRESS)  # does not override options before the name of the generator
 
 
 class _Raw(argparse.RawDescriptionHelpFormatter):
-    """Keeps the line breaks of docstrings."""
+    """Help formatter that keeps the line breaks of docstrings."""
 
 
 def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> tuple[str, Any]:
-    """Return the entry of a table of `Arguments` for one argument of a generator."""
+    """Return the entry of an `Arguments` table for a parameter of a generator."""
     hint = typing.get_type_hints(make).get(parameter.name, str)
     options = [kind for kind in (hint, *typing.get_args(hint)) if kind is not type(None)]
     kind: dict[str, Any] = {"type": next((kind for kind in (float, int) if kind in options), str)}
@@ -49,7 +49,7 @@ def _option(make: Callable[..., Any], parameter: inspect.Parameter) -> tuple[str
 
 
 def run(options: argparse.Namespace) -> int:
-    """Make the mesh, write it, print its quality."""
+    """Generate the mesh, write it and print its quality."""
     from fastcontact.mesh.files.mesh_files import write_mesh
     from fastcontact.mesh.generate import GENERATORS
     from fastcontact.mesh.quality import quality

@@ -1,4 +1,4 @@
-"""``fastcontact plot``: the deformed mesh coloured by a field, sections, the contact, and its history over the load steps."""
+"""``fastcontact plot``: plots of the deformed mesh with a field, of sections, of the contact and of its history."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
-# Kinds of pictures of one contact pair.
+# Options that draw a contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
 ARGUMENTS: Arguments = {
     **_results.ARGUMENTS,
@@ -37,7 +37,7 @@ ARGUMENTS: Arguments = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the picture, or show the window."""
+    """Write the picture or the animation, or show the interactive window."""
     from fastcontact.results import plot
     from fastcontact.results.reader import open_results
 
@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _plane(text: str) -> tuple[int, float]:
-    """Return the axis and the coordinate [length] of a plane such as ``y=0``; raises CaseError for another text."""
+    """Return the axis and the coordinate [length] of a plane such as ``y=0``; CaseError for other texts."""
     name, _, value = text.partition("=")
     try:
         return "xyz".index(name.strip()), float(value)
@@ -102,7 +102,7 @@ def _of_bodies(
 
 
 def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> Any:
-    """Draw a contact pair: its map, its zones or history over the load steps, or the stresses under it."""
+    """Draw the map, the zones or the history of a contact pair, or the stresses on the axis below it."""
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
@@ -122,7 +122,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
 
 
 def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str, Any]) -> dict[str, Any]:
-    """Return theories of the stresses on the axis, by label, at equal approach and at equal force."""
+    """Return theories of the stresses on the axis, at equal approach and at equal force, by label of the legend."""
     theory = theories.get("theory")
     theory = getattr(theory, "hertz", theory)
     if theory is None or not hasattr(theory, "stress_on_axis"):

@@ -1,4 +1,4 @@
-"""``fastcontact profile``: pressure along the contact line compared with theory, as table, XMGRACE file and picture."""
+"""``fastcontact profile``: pressure along the contact line and its theory, as a table, an XMGRACE file or a picture."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARGUMENTS: Arguments = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the files of the options, or print the table if there are none."""
+    """Write the files of the options, or print the table if none is requested."""
     from fastcontact.results.reader import open_results
     from fastcontact.results.tables import contact_table, with_column, write_csv
 

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from fastcontact.results.writer import ResultWriter
 
 HELP = "solve a case file or an input deck (.inp) and write the results of all steps"
-# Name of the cell field of the estimated error.
+# Name of the cell field with the estimated error.
 ERROR_FIELD = "error"
-# Number of mesh points from which a step is written in the background while the next one is solved.
+# Smallest number of mesh points for which steps are written in the background while the next step is solved.
 LARGE = 30_000
 ARGUMENTS: Arguments = {
     "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
@@ -44,7 +44,7 @@ ARGUMENTS: Arguments = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Solve, write, print the summary."""
+    """Solve the case, write the files of the options and print the summary."""
     from fastcontact.cases import summary
     from fastcontact.cases.case import files_of_case, read_case
     from fastcontact.cases.shipped import case_path
@@ -86,7 +86,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _checked_study(case: Case) -> list[str]:
-    """Return the warnings of a check of the study of a case, if it has one."""
+    """Return the warnings from a check of the study of a case; an empty list if it has none."""
     if case.deck is not None or "study" not in case.text:
         return []
     from fastcontact.studies.checks import check_study
@@ -97,7 +97,7 @@ def _checked_study(case: Case) -> list[str]:
 
 
 def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
-    """Return the modes requested by the case or the command, after writing them to their file; None for none."""
+    """Compute the modes that the case or the command requests, write them to their file and return them, or None."""
     arguments = {**(case.modes or {}), **_diameters(options.nodal_diameters)}
     if case.modes is None and not options.modes and not arguments:
         return None
@@ -114,7 +114,7 @@ def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
 
 
 def _diameters(text: str | None) -> dict[str, Any]:
-    """Return the argument of `fastcontact.modes` for numbers such as ``0,1,2``, or ``all``; empty for None."""
+    """Return the argument of `fastcontact.modes` for a text such as ``0,1,2`` or ``all``; CaseError for other texts."""
     if text is None:
         return {}
     try:
@@ -124,7 +124,10 @@ def _diameters(text: str | None) -> dict[str, Any]:
 
 
 def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int, list[str], Any, list[dict[str, Any]]]:
-    """Write all steps; return the number of earlier steps, their warnings, the last step, and all summaries."""
+    """Solve and write all steps.
+
+    Returns the number of earlier steps in a resumed file, their warnings, the last step, and the summaries of all steps.
+    """
     from fastcontact.analysis.progress import Progress
     from fastcontact.analysis.restart import remaining
     from fastcontact.analysis.run import solve_steps
@@ -139,7 +142,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
         last = writer.done[-1] if writer.done else None
         done = [
             (of_step(step), step.warnings) for step in writer.done
-        ]  # each is read only once: there may be many large ones
+        ]  # each step, which may be large, is read only once
         steps = [summary for summary, _ in done]
         _warn_of_other_steps(case, [summary["load_factor"] for summary in steps], output)
         total = len(steps) + len(remaining(case.ramp, last))
@@ -150,7 +153,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
                 last = case.finished(last)
                 writer.write(_estimated(case.model, last) if fields else last)
                 steps.append(of_step(last))
-                progress.step(last, writer.n_steps)  # steps still being written do not count
+                progress.step(last, writer.n_steps)  # steps in the background thread are not counted
             writer.wait()
         except (ConvergenceError, KeyboardInterrupt) as error:
             _stopped(error, writer, output, options.json)
@@ -161,7 +164,7 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
 
 
 def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: str | None) -> None:
-    """Add the number of complete steps to an error and to the summary file."""
+    """Add the number of complete steps to an error, and write it to the summary file."""
     try:
         writer.wait()
     except FileError as failure:
@@ -172,7 +175,7 @@ def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: 
 
 
 def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
-    """Refuse to resume with the steps of another case."""
+    """Raise ModelError if the steps to resume from belong to another case."""
     from fastcontact.analysis import restart
 
     if done:
@@ -183,7 +186,7 @@ def _check_same(case: Any, done: Sequence[Any], output: Path) -> None:
 
 
 def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> None:
-    """Warn if load factors of existing steps are not in the current case."""
+    """Warn if an existing step has a load factor that is not in the case."""
     known = case.ramp.instants
     others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
     if others:
@@ -194,7 +197,7 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
 
 
 def _kept_steps(output: Path, steps: int) -> str:
-    """Return a message on the complete steps in the result file of a stopped run."""
+    """Return a message on the complete steps in the result file of a run that was stopped."""
     if not steps:
         return f"'{output}' holds no complete step"
     many = "one complete step" if steps == 1 else f"all {steps} complete steps"

@@ -1,4 +1,4 @@
-"""``fastcontact sweep``: a case for many values of its parameters, compared with theory."""
+"""``fastcontact sweep``: solve a case for many values of its parameters, and compare with theory."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ ARGUMENTS: Arguments = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the sweep, write the files of the options, print the table; 2 if a run failed."""
+    """Run the sweep, write the files of the options and print the table; return 2 if a run failed."""
     from fastcontact.studies.sweep import parameter_sweep
 
     _study.check_targets(options)
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """Return a parameter and its values from ``NAME=VALUES``; raises CaseError if the text has another form."""
+    """Return the parameter and the values of a text ``NAME=VALUES``; CaseError for other texts."""
     name, equals, listed = text.partition("=")
     if not (name and equals and listed):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")
