@@ -1,4 +1,4 @@
-"""A background thread for one task at a time; its errors are raised in the waiting thread."""
+"""A background thread for one task at a time, whose errors are raised in the thread that waits for it."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from fastcontact.results.committed_file import uninterrupted
 
 
 class Background:
-    """Runner of one task at a time in a thread; signals, such as Ctrl-C, are deferred during `wait`."""
+    """A thread that runs one task at a time; signals, such as Ctrl-C, are deferred during `wait`."""
 
     def __init__(self) -> None:
         self._thread: threading.Thread | None = None
         self._failure: BaseException | None = None
 
     def start(self, task: Callable[[], None]) -> None:
-        """Run `task` once the previous one has ended; if that failed, raise its error instead."""
+        """Run `task` after the previous task has ended; if the previous task failed, raise its error instead."""
         self.wait()
         self._thread = threading.Thread(target=self._run, args=(task,), name="fastcontact-writer")
         self._thread.start()
 
     def wait(self) -> None:
-        """Wait until no task is running; raise the error of the last task, once."""
+        """Wait for the task to end, and raise its error unless it has been raised before."""
         if self._thread is None:
             return
         with uninterrupted():
@@ -35,5 +35,5 @@ class Background:
     def _run(self, task: Callable[[], None]) -> None:
         try:
             task()
-        except BaseException as error:  # including those that threads would swallow
+        except BaseException as error:  # a thread would discard any error
             self._failure = error

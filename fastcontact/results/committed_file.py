@@ -1,17 +1,17 @@
-"""An HDF5 file that can be opened after every single write.
+"""An HDF5 file that can be opened after each of its writes.
 
-HDF5 writes the records of its indices in no particular order. A process that is killed between two writes may leave an index
-that points beyond the end of the file or has lost entries, and with them completed steps. Here writes are buffered in memory
-until HDF5 flushes, and then executed in an order in which each is harmless: first new blocks, to which nothing refers
-yet; the superblock with the end of the file; nodes of indices from the root down, so that entries are in their new node
-before they leave the old one; everything else; name tables last (HDF5 File Format Specification 3.0, sections II.A and
-III.A).
+HDF5 writes the records of its indices in no particular order. If a process is killed between two writes, an index may refer
+to addresses beyond the end of the file, or entries, and with them completed steps, may be lost. This file buffers writes in
+memory until HDF5 flushes, and then executes them in an order in which the file is valid after each write: new blocks, to
+which nothing refers yet; the superblock with the end of the file; nodes of indices from the root down, so that entries are in
+their new node before they leave the old one; all other writes; and name tables (HDF5 File Format Specification 3.0, sections
+II.A and III.A).
 
-HDF5 writes whole nodes of indices and parts of tables, of which a step changes a few bytes: only the range from the first to
+HDF5 writes whole nodes of indices and parts of tables, of which a step changes a few bytes. Only the range from the first to
 the last changed byte is written.
 
-This protects against the end of a process, not against a power loss: disks reorder writes. `synchronised` writes are
-therefore kept in a journal until they are executed.
+The order protects against the end of a process but not against a power loss, since disks reorder writes. `synchronised`
+writes are therefore kept in a journal until they are executed.
 """
 
 from __future__ import annotations
@@ -30,25 +30,33 @@ import numpy as np
 from fastcontact._tools.hdf5_driver import DriverFile
 from fastcontact.results import journal
 
-# Signatures of the superblock, the nodes of indices and the name tables of HDF5.
+# Signatures of the superblock, of nodes of indices and of name tables in HDF5.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
-# Longest write that is compared with the file [bytes]: longer ones are data of which everything changes.
+# Longest write that is compared with the file [bytes]. In longer writes, which are data, all bytes change.
 COMPARED = 1 << 16
 
 
 class CommittedFile(DriverFile):
-    """An existing HDF5 file, with the methods that `h5py.File` calls; writes wait for `flush`.
+    """An existing HDF5 file whose writes are deferred to `flush`, with the methods that `h5py.File` calls.
 
-    After an error nothing is written: the file stays as after the last successful write. Nothing is written either once
-    `ours` is False, because another program has written to the file. `end` is the end of the contents; the file may be
-    longer. While `synchronised` is True, flushes are atomic on the disk; beyond `journal.LARGEST` bytes of changes they
-    are divided into several atomic turns.
+    Nothing is written after an error, which leaves the file as after the last successful write, or after another program has
+    written to the file.
+
+    Attributes
+    ----------
+    synchronised : bool
+        Whether flushes are atomic on the disk. A flush with more than `journal.LARGEST` bytes of changes is divided into
+        several atomic parts.
+    ours : bool
+        False after another program has written to the file.
+    end : int
+        End of the contents [bytes]; the file may be longer.
     """
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.synchronised = False
-        repeated = journal.found(self._file)  # left by a writer stopped by a power loss or a kill
+        repeated = journal.found(self._file)  # left by a writer that was killed or stopped by a power loss
         for offset, data in repeated:
             self._put(offset, data)
         self._pending: dict[int, bytes] = {}
@@ -58,10 +66,10 @@ class CommittedFile(DriverFile):
         if repeated:
             os.fsync(self.fileno())
             self._cut(self.end)
-        self._starts, self._ends = [0], [self.end]  # disjoint written ranges, ascending
+        self._starts, self._ends = [0], [self.end]  # disjoint written ranges in ascending order
 
     def _contents(self) -> int:
-        """Return the end of the contents of the file."""
+        """Return the end of the contents of the file [bytes]."""
         head, size = self._head, self._file.seek(0, os.SEEK_END)
         known = head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8  # version 0, addresses of eight bytes
         return min(int.from_bytes(head[40:48], "little"), size) if known else size
@@ -71,14 +79,14 @@ class CommittedFile(DriverFile):
         return self._file.read(48)
 
     def intact(self) -> bool:
-        """Return whether the superblock, which changes with every flush, is unchanged, and the file is not truncated."""
+        """Return whether no other program has changed the superblock, which each flush changes, or truncated the file."""
         cut = os.fstat(self.fileno()).st_size < self._ends[-1]
         self.ours = self.ours and not cut and self._read_head() == self._head
         return self.ours
 
     @property
     def writable(self) -> bool:
-        """Whether there was no error, and no other program has written to the file."""
+        """Whether no error has occurred and no other program has written to the file."""
         return self.ours and self.failure is None
 
     def _size(self) -> int:
@@ -90,7 +98,7 @@ class CommittedFile(DriverFile):
         journal.overlay(self._pending.items(), start, data)
 
     def write(self, data: bytes) -> int:
-        """Buffer data for the current position; later data replace earlier ones."""
+        """Buffer data for the current position; they replace earlier data at the same position."""
         data, start = bytes(data), self._position
         end = start + len(data)
         for offset in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
@@ -109,14 +117,14 @@ class CommittedFile(DriverFile):
         return size
 
     def flush(self) -> None:
-        """Write all pending data, in an order in which every write may be the last one."""
+        """Write all pending data, in an order in which the file is valid after each write."""
         try:
             if self.writable:
                 self._commit()
         except BaseException as error:
             self._fail(error)
             with contextlib.suppress(OSError):
-                self._head = self._read_head()  # may have been written
+                self._head = self._read_head()  # the superblock may have been written
 
     def _commit(self) -> None:
         waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
@@ -138,7 +146,7 @@ class CommittedFile(DriverFile):
         self._pending.clear()
 
     def _changed(self, offset: int, data: bytes) -> journal.Write:
-        """Return the part of a write that changes the file, from its first byte to its last."""
+        """Return the part of a write from the first to the last byte that differs from the file."""
         if len(data) > COMPARED:
             return offset, data
         stored = bytearray(len(data))
@@ -149,7 +157,7 @@ class CommittedFile(DriverFile):
         return offset + int(differs[0]), data[differs[0] : differs[-1] + 1]
 
     def _synchronise(self, new: list[journal.Write], changes: list[journal.Write]) -> None:
-        """Synchronise new blocks, and a journal of the changes to old ones."""
+        """Synchronise the new blocks and a journal of the changes to old blocks."""
         end = max([self.end, self._ends[-1], *(offset + len(data) for offset, data in new)])
         log = journal.packed(new, changes)
         self._put(end, log)
@@ -160,7 +168,7 @@ class CommittedFile(DriverFile):
         self._file.truncate(size)
 
     def _turn(self, offset: int, data: bytes) -> tuple[int, int, int]:
-        """Return the sort key of writes: new blocks, superblock, nodes from the root down, everything else, names."""
+        """Return the sort key of a write: new blocks, superblock, nodes from the root down, other writes, name tables."""
         if not self._overlaps(offset, offset + len(data)):
             return 0, 0, offset
         if offset == 0:
@@ -181,11 +189,11 @@ class CommittedFile(DriverFile):
         self._starts[first:last], self._ends[first:last] = [start], [end]
 
     def close(self) -> None:
-        """Truncate the file after its contents and wait until it is on the disk; a second call does nothing."""
+        """Truncate the file to its contents and wait until it is on the disk; further calls have no effect."""
         if self._file.closed:
             return
         try:
-            if self.failure is not None:  # the last end set by HDF5 may not be in the file
+            if self.failure is not None:  # the end that HDF5 has set may not be in the file
                 self._head = self._read_head()
                 self.end = self._contents()
             if self.ours:
@@ -197,9 +205,9 @@ class CommittedFile(DriverFile):
 
 @contextlib.contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Defer signals, such as Ctrl-C, to the end of the block: an exception in a callback from HDF5 may crash it.
+    """Defer signals, such as Ctrl-C, to the end of the block, since an exception in a callback may crash HDF5.
 
-    Python handles signals in its main thread only: in other threads this has no effect.
+    Python handles signals in its main thread only; in other threads this function has no effect.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -1,4 +1,4 @@
-"""Conversion of results for other libraries: PyVista, pandas, xarray, each imported at first use."""
+"""Conversion of results to objects of PyVista, pandas and xarray, which are imported at first use."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from fastcontact.results.units import column_units
 if TYPE_CHECKING:
     import pandas
 
-# Additional leading columns of contact tables.
+# Columns that precede those of contact tables.
 LEADING = ("step", "load_factor", "contact")
 
 
 def library(name: str, title: str, install: str) -> Any:
-    """Return a library; FileError, with the installation command, if it is missing."""
+    """Import a library; FileError with the installation command if it is missing."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -35,10 +35,10 @@ def _pyvista() -> Any:
 
 
 def grid(mesh: Mesh, step: StepResult) -> Any:
-    """Return a step as a ``pyvista.UnstructuredGrid`` of the solid cells with fields and groups."""
+    """Return a ``pyvista.UnstructuredGrid`` of the solid cells with the fields of a step and the groups."""
     pyvista = _pyvista()
     cells = layout.solid_cells(mesh)
-    # VTK's older flat layout, which every version of PyVista supports: each cell's size before its nodes.
+    # The older layout of VTK, with the size of each cell before its nodes, is supported by all versions of PyVista.
     flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
     made = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
     for name, values in (layout.point_fields(mesh, step) | layout.point_flags(mesh)).items():
@@ -53,7 +53,7 @@ def grid(mesh: Mesh, step: StepResult) -> Any:
 
 
 def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
-    """Return steps as a ``pyvista.MultiBlock`` with a block for each, named ``"step 1"`` and so on."""
+    """Return a ``pyvista.MultiBlock`` with a block for each step, named ``"step 1"`` and so on."""
     blocks = _pyvista().MultiBlock()
     for step in steps:
         blocks.append(grid(mesh, step), f"step {step.index}")
@@ -61,7 +61,7 @@ def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
 
 
 def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | None = None) -> pandas.DataFrame:
-    """Return a table as a ``pandas.DataFrame``, whose ``attrs["units"]`` are the known units by column."""
+    """Return a table as a ``pandas.DataFrame``; its ``attrs["units"]`` contains the known units by column."""
     frame = library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
     if named := {name: text for name, text in units.items() if text}:
         frame.attrs["units"] = named
@@ -69,7 +69,7 @@ def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | No
 
 
 def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pandas.DataFrame:
-    """Return the contact tables of steps as one ``pandas.DataFrame``; columns as in `contact_table`, preceded by the step."""
+    """Return the contact tables of all steps as one ``pandas.DataFrame``, with the columns `LEADING` before the others."""
     concat = library("pandas", "pandas", "'fastcontact[table]'").concat
     frames = []
     for step in steps:
@@ -83,7 +83,7 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
 
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
-    """Return steps as an ``xarray.Dataset`` with the dimensions step, point, axis, stress_component and contact."""
+    """Return an ``xarray.Dataset`` of steps with the dimensions step, point, axis, stress_component and contact."""
     xarray, read, dim = library("xarray", "xarray", "xarray"), list(steps), mesh.dim
     pairs = list(dict.fromkeys(name for step in read for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])

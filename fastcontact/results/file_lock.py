@@ -17,7 +17,7 @@ from fastcontact.results.committed_file import uninterrupted
 
 
 def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-    """Reserve `size` bytes from `start` on for an open file, or raise OSError before anything is written."""
+    """Reserve `size` bytes of an open file from the offset `start`; OSError if the disk has too little space."""
     if hasattr(os, "posix_fallocate"):
         try:
             os.posix_fallocate(descriptor, start, size)
@@ -30,7 +30,7 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
 
 
 def left_at(path: Path) -> tuple[int, ...] | None:
-    """Return device, inode, size and modification time, which identify the file at a path; None without a file."""
+    """Return device, inode, size and modification time of the file at a path, or None if there is no file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -39,20 +39,20 @@ def left_at(path: Path) -> tuple[int, ...] | None:
 
 
 class PathLock:
-    """Exclusive right to write one path, through a locked file next to it; viewers may lock the result file itself.
+    """Exclusive right to write to a path, represented by a locked file beside it.
 
-    The operating system releases the lock at the end of its process, so that no lock is left over, and its file is
-    removed with the last reference at the latest.
+    The result file itself is not locked, since viewers may lock it. The operating system releases the lock at the end of the
+    process. The lock file is removed by `release`, or with the last reference to the lock.
 
     Attributes
     ----------
     release : callable
-        Releases the lock; a second call does nothing.
+        Releases the lock; further calls have no effect.
 
     Raises
     ------
     FileError
-        If another writer, in this or another process, holds the path.
+        If another writer, in this or another process, holds the lock, or the lock file is not a plain file of the user.
     """
 
     def __init__(self, target: Path) -> None:
@@ -70,11 +70,11 @@ class PathLock:
                 raise FileError(f"'{target}' is being written by process {holder}: let it end or name another file")
             if self._is_current(file):
                 break
-            file.close()  # its holder removed it between our open and our lock
-        with contextlib.suppress(OSError):  # information for others, if the disk has room for it
+            file.close()  # the previous holder removed the file between `open` and `lock`
+        with contextlib.suppress(OSError):  # information for other processes, if the disk has space for it
             file.truncate(0)
             file.write(str(os.getpid()).encode("ascii"))
-        # An interrupt may come before the caller can release it.
+        # The finalizer releases the lock if an interrupt prevents the caller from doing so.
         self.release = weakref.finalize(self, _release, file, self.path, os.getpid())
 
     def _is_current(self, file: IO[Any]) -> bool:
@@ -85,17 +85,15 @@ class PathLock:
 
 
 def _release(file: IO[Any], path: Path, holder: int) -> None:
-    """Remove the file of a lock, and release the lock; a process forked from `holder` leaves the file alone."""
+    """Remove the lock file and release the lock; a process forked from `holder` does not remove the file."""
     if os.getpid() == holder:
-        with contextlib.suppress(
-            OSError
-        ):  # Windows does not remove open files: an empty lock file remains, which is harmless
+        with contextlib.suppress(OSError):  # on Windows open files are not removed, and a harmless lock file remains
             path.unlink()
     file.close()
 
 
 def is_being_written(target: Path) -> bool:
-    """Return whether a writer holds the path."""
+    """Return whether a writer holds the lock of a path."""
     try:
         file = open(target.with_name(f".{target.name}.lock"), "r+b", buffering=0)  # noqa: SIM115
     except OSError:
@@ -105,7 +103,7 @@ def is_being_written(target: Path) -> bool:
 
 
 def _own_file(path: Path) -> IO[Any]:
-    """Open or create a file; FileError for a link or another user's file, which writing would modify."""
+    """Open or create a lock file; FileError for a link or a file of another user, which would be modified."""
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     except OSError as error:
@@ -124,7 +122,7 @@ def _own_file(path: Path) -> IO[Any]:
 
 
 def _lock(file: IO[Any]) -> bool:
-    """Lock an open file without waiting; also True if the file system does not support locks."""
+    """Lock an open file without waiting; return False if it is locked, and True if locks are not supported."""
     if sys.platform == "win32":
         import msvcrt
 

@@ -1,10 +1,10 @@
-"""Write-ahead journal: writes with a checksum at the end of the file, replayed after a power loss.
+"""Write-ahead journal: writes with a checksum at the end of a file, which are executed again after a power loss.
 
-A disk may execute the writes since the last synchronisation in any order, in part, or not at all. New data are harmless,
-since nothing refers to them yet; records of HDF5 that are changed in place are not. They are therefore first written
-after the contents of the file, where no reader of HDF5 looks, with a checksum of the new data. Once both are on the disk
-the changes are executed, and are repeated when the file is opened after a power loss (write-ahead logging: Mohan et al.,
-1992).
+At a power loss, the writes since the last synchronisation of a disk may have been executed in any order, in part, or not at
+all. New data are harmless, since nothing refers to them yet, but records of HDF5 that are changed in place are not. These
+changes are therefore first written after the contents of the file, which no reader of HDF5 reads, with checksums of the new
+data. Once both are on the disk, the changes are executed; they are executed again when the file is opened after a power loss
+(write-ahead logging: Mohan et al., 1992).
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-HEADER = struct.Struct("<QQ?")  # position and length of a write; whether it is represented by its checksum
+HEADER = struct.Struct("<QQ?")  # offset and length of a write, and whether its checksum replaces its data
 DIGEST = hashlib.sha256().digest_size
-# Largest size of the changes in a journal [bytes]: more are divided into turns, so that a journal fits in memory.
+# Largest size of the changes in a journal [bytes]. Larger changes are divided, so that a journal fits in memory.
 LARGEST = 1 << 28
 PIECE = 1 << 20
 
 
 def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
-    """Return the journal, the last bytes of a file: the changes, and the checksums of the new data they refer to."""
+    """Return a journal, which is appended to the file, with the changes and the checksums of the new data."""
     body = b"".join(
         [
             *(HEADER.pack(offset, len(data), True) + hashlib.sha256(data).digest() for offset, data in new),
@@ -39,7 +39,7 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
 
 
 def turns(changes: Iterable[Write]) -> Iterator[list[Write]]:
-    """Yield changes in order, at most LARGEST bytes in a turn, longer ones in pieces; the last turn may be empty."""
+    """Divide changes in order into lists of at most LARGEST bytes; longer changes are split, and the last may be empty."""
     turn, size = [], 0  # type: tuple[list[Write], int]
     for offset, data in changes:
         for start in range(0, len(data), LARGEST):
@@ -53,9 +53,10 @@ def turns(changes: Iterable[Write]) -> Iterator[list[Write]]:
 
 
 def found(file: IO[bytes]) -> list[Write]:
-    """Return the changes in the journal of a file; none without a journal, or if it or its data are incomplete.
+    """Return the changes in the journal of a file.
 
-    Raises FileError for an invalid journal, whose bounds are checked before anything is read.
+    The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for an
+    invalid journal; its bounds are checked before data are read.
     """
     size = file.seek(0, io.SEEK_END)
     if size < FOOTER.size:
@@ -65,7 +66,7 @@ def found(file: IO[bytes]) -> list[Write]:
     if magic != MAGIC or length > size - FOOTER.size:
         return []
     end = size - FOOTER.size - length  # end of the contents before the journal
-    if length > 2 * LARGEST:  # changes, their positions, and checksums of new data
+    if length > 2 * LARGEST:  # a bound of the changes with their headers and the checksums of new data
         raise _forged(file, f"declares {length:.3g} bytes")
     file.seek(end)
     body = file.read(length)
@@ -83,7 +84,7 @@ def found(file: IO[bytes]) -> list[Write]:
 
 
 def _records(file: IO[bytes], body: bytes) -> Iterator[tuple[int, int, bool, bytes]]:
-    """Yield position, length and kind of each write of a journal, and its data or its checksum."""
+    """Yield the offset, the length, whether it is new, and the data or the checksum of each write in a journal."""
     at = 0
     while at < len(body):
         if at + HEADER.size > len(body):
@@ -96,7 +97,7 @@ def _records(file: IO[bytes], body: bytes) -> Iterator[tuple[int, int, bool, byt
 
 
 def _digest(file: IO[bytes], offset: int, count: int) -> bytes:
-    """Return the SHA-256 of a part of a file, read piece by piece."""
+    """Return the SHA-256 hash of `count` bytes of a file from `offset`, which are read in pieces."""
     hashed = hashlib.sha256()
     file.seek(offset)
     while count > 0 and (piece := file.read(min(count, PIECE))):
@@ -133,7 +134,7 @@ class Repeated(io.RawIOBase):
         return self._file.tell()
 
     def readinto(self, buffer: Any) -> int:
-        """Fill a buffer from the position on; return the number of bytes."""
+        """Read from the current position into a buffer and return the number of bytes."""
         start, view = self._file.tell(), memoryview(buffer).cast("B")
         data = self._file.read(len(view))
         view[: len(data)] = data
@@ -141,13 +142,13 @@ class Repeated(io.RawIOBase):
         return len(data)
 
     def close(self) -> None:
-        """Close the file; a second call does nothing."""
+        """Close the file; further calls have no effect."""
         self._file.close()
         super().close()
 
 
 def overlay(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:
-    """Apply writes to `view`, which contains a file from `start` on."""
+    """Apply writes to `view`, which contains a part of a file that begins at `start`."""
     end = start + len(view)
     for offset, data in writes:
         first, last = max(offset, start), min(offset + len(data), end)

@@ -1,26 +1,26 @@
 """Layout of result files.
 
-A result file is an HDF5 file with two groups. Viewers read the first, whose layout is that of VTK:
+A result file is an HDF5 file with two groups. Viewers read the first group, which has the layout of VTKHDF files:
 
     VTKHDF/Points, Connectivity, Offsets, Types     the mesh: solid cells only, three coordinates
-    VTKHDF/PointData, CellData                      fields; those of all steps follow one another in one data set
-    VTKHDF/Steps                                    load factors, where the fields of each step begin; NSteps, their number
+    VTKHDF/PointData, CellData                      fields; a data set contains a field of all steps in sequence
+    VTKHDF/Steps                                    NSteps, load factors, and offsets of the fields of each step
 
-The second contains everything that VTK does not support:
+The second group contains the data that VTKHDF does not support:
 
     fastcontact/mesh                                points, cells of all dimensions, groups
-    fastcontact/kinematics, case, versions, units   texts as JSON; units where the model names them
+    fastcontact/kinematics, case, versions, units   JSON texts; units if the model defines them
     fastcontact/steps                               a row for each step (STEP_ROW), with the position of its notes
-    fastcontact/contact/0, 1, ...                   for each pair its name, a row for each node and step, a row for each step;
-                                                    forces on the primary side, a row for each of its nodes and step
+    fastcontact/contact/0, 1, ...                   for each pair: its name, a row for each secondary node and step, a row for
+                                                    each primary node and step, and a row for each step
     fastcontact/materials                           at interfaces: material of cells, stress by material, a row for each step
-    fastcontact/notes                               JSON, one text after the other: iterations, warnings, how runs ended
+    fastcontact/notes                               JSON texts in sequence: iterations, warnings, ends of runs
     fastcontact/runs                                a row for each run (RUN_ROW), with the position of its notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
-A new array at the nodes: an attribute of `step.StepResult`, filled in `analysis.step_result`, named in POINT_FIELDS, checked
-in `check_step`, read in `reader`. A new one of contact pairs:
-`step.ContactResult`, `analysis.contact_result`, and the row here.
+A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.step_result`, its name in POINT_FIELDS, a
+check in `check_step`, and code in `reader`. A new array of contact pairs needs an attribute of `step.ContactResult`, its
+value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`.
 """
 
 from __future__ import annotations
@@ -42,13 +42,13 @@ from fastcontact.results.step import ContactResult, StepResult
 
 Flags = NDArray[np.int8]
 
-# 1: until the restart state came in. 2: restart state of the last step, any number of run records. 3: the middle of a
-# contact, and places measured from it. 4: slip.
+# Version of the layout. Version 2 introduced the restart state and records of runs, version 3 the centre of a contact, and
+# version 4 the slip.
 SCHEMA = 4
-# Files from this schema on can be resumed.
+# Oldest version that can be resumed.
 RESUMABLE = 2
 
-# Point data by name, with the number of components that viewers expect; stress is a symmetric tensor.
+# Point data by name, with the number of components that viewers expect. Stress is a symmetric tensor.
 POINT_FIELDS = {
     "displacement": 3,
     "stress": 6,
@@ -59,17 +59,17 @@ POINT_FIELDS = {
     "contact_slip": 3,
     "contact_slip_total": 3,
 }
-# Further ones of models that conduct heat.
+# Additional point data of models with heat conduction.
 HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
 # Optional columns of contact tables.
 OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure")
 
-# Cell data of models with material interfaces: the nodal stress on each cell's own side, averaged over its nodes.
+# Cell data of models with material interfaces: the mean over the nodes of a cell of the nodal stress of its material.
 CELL_STRESS = "stress_in_cell"
 CELL_VON_MISES = "von_mises_in_cell"
 MATERIAL_FIELDS = {CELL_STRESS: 6, CELL_VON_MISES: 1}
 
-# Element codes of the XDMF format by VTK cell type. XDMF readers use VTK's node order for all of them.
+# Element codes of the XDMF format by VTK cell type. XDMF readers use the node order of VTK for these elements.
 XDMF_TYPES = {
     **{5: 0x4, 9: 0x5, 22: 0x24, 23: 0x25, 28: 0x23},  # triangles and quadrangles
     **{10: 0x6, 14: 0x7, 13: 0x8, 12: 0x9},  # tet4, pyramid5, wedge6, hex8
@@ -78,17 +78,17 @@ XDMF_TYPES = {
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
-# Position of the rows of a contact pair for a step.
+# Columns with the position of the rows of a contact pair for a step.
 PLACES = ("first", "count", "primary_first", "primary_count")
 
-# Position of the rows of nodal stress by material of a step.
+# Row of a step with the position of its nodal stress by material.
 SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 
-# End of a run: number of completed steps, and the position of its record among the notes.
+# Row of a run: number of completed steps, and the position of its record in the notes.
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
 
 
-# Required objects of a file, in addition to its steps, for resuming.
+# Objects, in addition to steps, that a file needs to be resumed.
 CONTINUED = (
     "fastcontact/runs", "fastcontact/notes", "fastcontact/contact", "VTKHDF/CellData", "VTKHDF/Types", "VTKHDF/Steps/Values",
     "VTKHDF/Steps/PointDataOffsets", "VTKHDF/Steps/CellDataOffsets",
@@ -96,17 +96,20 @@ CONTINUED = (
 
 
 def restart_table(number: int) -> str:
-    """Return the name of the table for the restart state of a step: two alternate, so that the last one stays complete."""
+    """Return the name of the table for the restart state of a step.
+
+    Two tables alternate, so that the table of the last step is complete while the other is written.
+    """
     return f"restart{number % 2}"
 
 
 def further_columns(contact: ContactResult) -> tuple[str, ...]:
-    """Return the `OPTIONAL_COLUMNS` of a pair."""
+    """Return the `OPTIONAL_COLUMNS` that a pair has."""
     return tuple(name for name in OPTIONAL_COLUMNS if getattr(contact, name) is not None)
 
 
 def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
-    """Return the type of a row of a contact table: one secondary node in one step; with the pair's `further_columns`."""
+    """Return the type of a row for a secondary node of a pair in a step; `further` are its `further_columns`."""
     names = ("abscissa", "place", "gap", "pressure", "multiplier", *further)
     scalars = [(name, "<f8") for name in names]
     vectors = [
@@ -116,36 +119,36 @@ def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
 
 
 def primary_row(dim: int) -> np.dtype[Any]:
-    """Return the type of one row of the table of forces on the primary side: one node in one step."""
+    """Return the type of a row for the force on a primary node of a pair in a step."""
     return np.dtype([("points", "<i4"), ("force_vectors", "<f8", (dim,))])
 
 
 def contact_step(dim: int) -> np.dtype[Any]:
-    """Return the type of the row of a contact pair for each step: position of its rows, resultant, radius, work, obstacle.
+    """Return the type of the row of a contact pair for a step.
 
-    All except the `PLACES` are attributes of a `step.ContactResult`, NaN for None. Older files of schema 2 have neither the
-    table of `primary_row` nor its position.
+    The row contains the position of the rows of nodes in `PLACES`, and attributes of `step.ContactResult`, with NaN for None.
+    Some files of schema 2 have neither the table of `primary_row` nor its position.
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
-    sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN between bodies
+    sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN for contact between bodies
     sums += [("obstacle_angle", "<f8"), ("torque", "<f8")]  # NaN without a rotation
     sums += [("middle", "<f8", (dim,)), ("tangent", "<f8", (dim,))]  # NaN without a tangent
     return np.dtype([*((name, "<i8") for name in PLACES), *sums])
 
 
 def material_row(dim: int) -> np.dtype[Any]:
-    """Return the type of a row of nodal stress on one side of a material interface, for one step."""
+    """Return the type of a row for the nodal stress of one material at an interface in a step."""
     return np.dtype([("points", "<i4"), ("material", "<i4"), ("stress", "<f8", (4 if dim == 2 else 6,))])
 
 
 def material_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
-    """Return the cell data of `MATERIAL_FIELDS`: stress (n_solids, 6), von Mises stress (n_solids,) [pressure]."""
+    """Return the `MATERIAL_FIELDS`: stress (n_solids, 6) and von Mises stress (n_solids,) of cells [pressure]."""
     stress = mean_in_cells(mesh, step)
     return {CELL_STRESS: padded(stress, 6), CELL_VON_MISES: von_mises(stress)}
 
 
 class SolidCells(NamedTuple):
-    """The solid cells in the layout of VTK: all their nodes in sequence, offsets, and VTK's types."""
+    """Solid cells in the layout of VTK: the nodes of all cells in sequence, the offsets of cells, and the VTK cell types."""
 
     connectivity: NDArray[np.int64]
     offsets: NDArray[np.int64]
@@ -153,7 +156,7 @@ class SolidCells(NamedTuple):
 
 
 def solid_cells(mesh: Mesh) -> SolidCells:
-    """Return the solid cells of a mesh in the order of its elements."""
+    """Return the solid cells of a mesh, ordered by element type."""
     blocks = mesh.solids
     counts = [len(block) for block in blocks.values()]
     sizes = np.repeat([block.shape[1] for block in blocks.values()], counts)
@@ -166,7 +169,7 @@ def solid_cells(mesh: Mesh) -> SolidCells:
 
 
 def xdmf_topology(mesh: Mesh) -> Numbers | None:
-    """Return each solid cell's XDMF code and nodes in one sequence; None if XDMF lacks an element."""
+    """Return the XDMF code and the nodes of all solid cells in sequence, or None if XDMF does not support an element."""
     codes = [XDMF_TYPES.get(elements.get(name).vtk) for name in mesh.solids]
     known = [code for code in codes if code is not None]
     if not codes or len(known) < len(codes):
@@ -184,7 +187,7 @@ def padded(values: Array, width: int) -> Array:
 
 
 def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
-    """Return the contact pressure at every point (n_points,), 0 outside the contact [pressure]."""
+    """Return the contact pressure (n_points,) [pressure], which is zero outside the contact."""
     pressure = np.zeros(mesh.n_points)
     for contact in step.contact.values():
         np.maximum.at(pressure, contact.points, contact.pressure)
@@ -192,7 +195,7 @@ def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
 
 
 def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
-    """Return ``"slip"`` or ``"slip_total"`` at every point (n_points, dim), the larger one of several pairs [length]."""
+    """Return ``"slip"`` or ``"slip_total"`` (n_points, dim) [length]; the largest value if a point has several pairs."""
     slip = np.zeros((mesh.n_points, mesh.dim))
     for contact in step.contact.values():
         values = getattr(contact, name)
@@ -213,7 +216,7 @@ def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:
-    """Return 1 inside and 0 outside for each group of points or facets, as ``group_<name>``."""
+    """Return, as ``group_<name>``, 1 inside and 0 outside for each group of points or facets."""
     members = {}
     for name in mesh.group_names:
         if name in mesh.point_groups:
@@ -224,7 +227,7 @@ def point_flags(mesh: Mesh) -> dict[str, Flags]:
 
 
 def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
-    """Return the body of each solid cell, and 1 inside and 0 outside for each group of solids."""
+    """Return the body of each solid cell and, as ``group_<name>``, 1 inside and 0 outside for each group of solids."""
     first = np.concatenate([np.empty(0, np.int32), *(block[:, 0] for block in mesh.solids.values())])
     starts = starts_of(mesh.solids)
     members = {}
@@ -236,7 +239,7 @@ def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
 
 
 def _plain(name: str) -> str:
-    """Return an ASCII name, as old viewers require, without slashes, which separate groups in HDF5."""
+    """Return a name in ASCII, which old viewers require, without slashes, which separate groups in HDF5."""
     letters = unicodedata.normalize("NFKD", name.replace("/", "_"))
     return "".join(c if c.isascii() else "_" for c in letters if not unicodedata.combining(c))
 
@@ -253,7 +256,7 @@ def _flags(members: dict[str, AnyArray], count: int) -> dict[str, Flags]:
 
 
 def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None:
-    """Refuse a step whose arrays do not fit the mesh, or that lacks one of the announced `cell_fields`."""
+    """Raise FileError if an array of a step does not match the mesh, or a declared cell field is missing."""
     n, dim = mesh.n_points, mesh.dim
     expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
     for name, shape in {**expected, **dict.fromkeys(("von_mises", "von_mises_signed", *HEAT_FIELDS), (n,))}.items():
@@ -278,7 +281,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 
 def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
-    """Refuse the state of a pair whose arrays are inconsistent or contain points that are not in the mesh."""
+    """Raise FileError if the arrays of a pair are inconsistent or contain points that are not in the mesh."""
     row = contact_row(mesh.dim, further_columns(contact))
     for name in row.names or ():
         shape_given, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)

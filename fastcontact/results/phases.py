@@ -10,7 +10,10 @@ from fastcontact.results.step import StepResult
 
 
 def phases(shape: StepResult, count: int) -> list[StepResult]:
-    """Return `count` phases of the vibration with a shape; their load factors are the phases, from 0 to 1."""
+    """Return a vibration with a given shape at `count` equidistant phases, as steps.
+
+    The load factor of a step is its phase in periods, in [0, 1). Raises ModelError if `count` is less than two.
+    """
     if count < 2:
         raise ModelError(f"count = {count}: a period needs two phases or more")
     return [_times(shape, k + 1, k / count, math.cos(2.0 * math.pi * k / count)) for k in range(count)]

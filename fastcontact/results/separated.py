@@ -1,4 +1,4 @@
-"""The mesh of a step cut along material interfaces, so that nodal stress has one value at every point."""
+"""The mesh of a step cut along material interfaces, where nodal stress has a single value at each point."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from fastcontact.results.step import StepResult
 
 
 def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
-    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress (m, ...) there.
+    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress (m, ...) [pressure].
 
-    The points of `mesh` come first. Stress [pressure] has the components of `StepResult.stress`. The mesh has only solid
-    cells and no groups; without interfaces it is `mesh` itself.
+    The points of `mesh` are the first points of the new mesh, which has only solid cells and no groups. Stress has the
+    components of `StepResult.stress`. Without interfaces `mesh` is returned.
     """
     material_stress = step.material_stress
     if material_stress is None:
@@ -26,12 +26,12 @@ def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
 
 
 def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
-    """Return values of all solid cells (n_solids,) by element type."""
+    """Return the values (n_solids,) of solid cells by element type."""
     ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
     return dict(zip(mesh.solids, np.split(values, ends), strict=True))
 
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
-    """Return the mean (n_solids, n_components) of each solid cell's nodal stress on its own side [pressure]."""
+    """Return the mean (n_solids, n_components) [pressure] over the nodes of each cell of the stress of its material."""
     separate_mesh, _, stress = separated(mesh, step)
     return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])

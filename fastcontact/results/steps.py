@@ -1,4 +1,4 @@
-"""Steps as a sequence, and those of an analysis as a list with a concise representation."""
+"""Sequences of steps, and the list of the steps of an analysis with a concise representation."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import SupportsIndex, overload
 from fastcontact._tools.html_table import html_table
 from fastcontact.results.step import StepResult
 
-# Length of the longest list whose steps are all shown.
+# Largest number of steps in the representation of a list.
 SHOWN = 30
 
 
 class StepSequence(Sequence[StepResult]):
-    """A sequence of steps, each of which is read or made when it is asked for."""
+    """A sequence of steps, each of which is read or computed on access."""
 
     @abstractmethod
     def _step(self, position: int) -> StepResult: ...
@@ -24,17 +24,17 @@ class StepSequence(Sequence[StepResult]):
     @overload
     def __getitem__(self, number: slice) -> list[StepResult]: ...
     def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
-        """Return a step by its position, from 0, or from the end if negative; a slice gives a list of steps."""
+        """Return a step by its index, or a list of steps for a slice."""
         chosen = self._chosen(number)
         return self._step(chosen) if isinstance(chosen, int) else [self._step(position) for position in chosen]
 
     def _chosen(self, number: int | slice) -> int | range:
-        """Return the position of a step, or those of a slice."""
+        """Return the position of a step, or the positions of a slice."""
         return range(len(self))[number]
 
 
 class Steps(list[StepResult]):
-    """A list of `StepResult`; in a notebook it shows a table."""
+    """A list of `StepResult` that notebooks display as a table."""
 
     @overload
     def __getitem__(self, index: SupportsIndex) -> StepResult: ...
@@ -51,7 +51,7 @@ class Steps(list[StepResult]):
         return "\n".join([f"{len(self)} steps", *lines, *(["  ..."] if len(self) > SHOWN else [])])
 
     def _repr_html_(self) -> str:
-        """Return a table, a row for each contact pair of each step, for notebooks."""
+        """Return an HTML table with a row for each contact pair of each step."""
         rows = [row for step in _shown(self) for row in rows_of(step)]
         left_out = f", {len(self) - SHOWN} of them not shown" if len(self) > SHOWN else ""
         return html_table(rows, HEAD, f"{len(self)} steps{left_out}")
@@ -61,12 +61,12 @@ HEAD = ("step", "load factor", "pairings", "contact", "force", "largest pressure
 
 
 def _shown(steps: Steps) -> Iterable[StepResult]:
-    """Return the steps to show: the last ones of a long list."""
+    """Return the steps in the representation, which are the last steps of a long list."""
     return list(steps)[-SHOWN:]
 
 
 def rows_of(step: StepResult) -> list[tuple[str, ...]]:
-    """Return a row of texts for each contact pair of a step, under `HEAD`; one row without pairs."""
+    """Return a row of texts with the columns `HEAD` for each contact pair of a step, or one row if there are no pairs."""
     begin = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
     pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]
     return [(*begin, *pair) for pair in pairs] or [(*begin, *[""] * (len(HEAD) - len(begin)))]

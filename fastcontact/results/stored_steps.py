@@ -1,4 +1,4 @@
-"""The steps of a resumed result file, read one by one, so that resuming a long run takes little memory."""
+"""The steps of a resumed result file, which are read on access, so that resuming a long run needs little memory."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from fastcontact.results.steps import StepSequence
 
 
 class StoredSteps(StepSequence):
-    """The steps of a file at the time of opening, each read when used; the last one, with its `restart`, is kept.
+    """The steps that a file contains when it is opened, which are read on access.
 
-    `release` must be called before the file is changed, because HDF5 does not update its view of an open file. The file is
-    reopened when a step is used.
+    The last step, with its `restart`, is kept in memory. `release` must be called before the file is changed, because HDF5
+    does not update its view of an open file. Access to another step opens the file again.
     """
 
     def __init__(self, results: Results) -> None:
@@ -23,7 +23,7 @@ class StoredSteps(StepSequence):
         self._last = results[-1]
 
     def release(self) -> None:
-        """Close the file; a second call does nothing."""
+        """Close the file; further calls have no effect."""
         if self._results is not None:
             self._results.close()
             self._results = None

@@ -1,7 +1,8 @@
-"""Texts of variable length in a result file, read without HDF5, which does not return from some damaged files.
+"""Texts of variable length in a result file, read without HDF5, which does not terminate for some damaged files.
 
-Such a text is stored in a "global heap collection": a header of 16 bytes with the size of the collection, then objects one
-after the other, each with a header of 16 bytes, its number and its size (HDF5 File Format Specification 3.0, section III.E).
+Such a text is stored in a global heap collection, which consists of a header of 16 bytes with the size of the collection and
+a sequence of objects. Each object has a header of 16 bytes with its number and its size (HDF5 File Format Specification 3.0,
+section III.E).
 """
 
 from __future__ import annotations
@@ -13,13 +14,13 @@ from typing import Any
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
 HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
 OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
-REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the text, position of the collection, object number
+REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the text, address of the collection, object number
 
 
 def read_text(dataset: Any, raw: Any) -> str:
-    """Return the text in a data set of one text; `raw` is its open file, with addresses of eight bytes.
+    """Return the text in a data set that contains a single text; `raw` is the open file, with addresses of eight bytes.
 
-    Raises ValueError if it is another kind of data set, or damaged.
+    Raises ValueError if the data set is of another kind or damaged.
     """
     import h5py
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-# Quantity of the columns of tables, by the beginning of their names.
+# Kind of unit of the columns of tables, by prefixes of their names.
 COLUMNS = {
     **dict.fromkeys(("abscissa", "radius", "place", "gap", "displacement_", "slip_", "wear"), "length"),
     **dict.fromkeys(("pressure", "stress_", "normal_stress", "von_mises", "shear_", "fluid_pressure"), "pressure"),
@@ -13,7 +13,7 @@ COLUMNS = {
 
 
 def known_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of the units of length, force and pressure; empty for unknown ones, or those given as a dash.
+    """Return the names of the units of length, force and pressure; empty if a unit is unknown or given as a dash.
 
     Examples
     --------
@@ -25,10 +25,10 @@ def known_units(units: Mapping[str, str]) -> dict[str, str]:
 
 
 def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str]:
-    """Return the names of units for the results of a model, with those of moments, stiffnesses and penalties.
+    """Return the names of units for the results of a model, including those of moments, stiffnesses and penalties.
 
-    Forces of plane models are those per unit of thickness; a unit of force that is one per length already stays. Units
-    that nobody named stay empty.
+    Forces of plane models are per unit thickness; a unit of force that contains a slash is taken to be per unit thickness and
+    is unchanged. The names of unknown units are empty.
 
     Examples
     --------
@@ -49,7 +49,7 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
 
 
 def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units of columns of tables, where they are known.
+    """Return the names of the known units of columns of tables.
 
     Examples
     --------
@@ -64,13 +64,13 @@ def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, 
 
 
 def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return the label of an axis or a column, with the unit of its quantity if known."""
+    """Return the label of an axis or a column with its unit, if the unit is known."""
     unit = units.get(quantity, "")
     return f"{text} [{unit}]" if unit and unit != "-" else text
 
 
 def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
-    """Return a value as text with its unit, where that is known; up to a million as a number without a power of ten.
+    """Return a value as text with its unit, if the unit is known; values below a million have no power of ten.
 
     Examples
     --------
@@ -82,5 +82,5 @@ def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 
 
 
 def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return one or several values, given as a text, with their unit if known."""
+    """Return a text with one or several values, followed by their unit if it is known."""
     return f"{text} {units.get(quantity, '')}".removesuffix(" -").rstrip()

@@ -1,6 +1,6 @@
-"""Writing the arrays of a result file: its groups and empty tables at the beginning, then the data of each step.
+"""Functions that write the arrays of a result file: groups and empty tables when it is created, and the data of each step.
 
-The data of a step only become valid when the number of steps is raised, which the writer does last.
+The data of a step become valid when the writer increments the number of steps, which it does last.
 """
 
 from __future__ import annotations
@@ -19,19 +19,20 @@ from fastcontact.results import layout
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 
-# Numbers of rows of a growing table, and of bytes of a growing text, that are allocated together.
+# Chunk sizes: number of rows of a growing table, and of bytes of a growing text.
 ROWS, BYTES = 64, 4096
-# Small fields of several steps are allocated together, up to this size [bytes].
+# Largest size of a chunk with the fields of several steps [bytes].
 SHARED = 4096
 
 
 def write_geometry(
     file: Any, mesh: Mesh, growing: Sequence[str] = (), material: AnyArray | None = None, heat: bool = False
 ) -> None:
-    """Write /VTKHDF with the solid cells, the static arrays, and empty tables for the steps and their `growing` cell fields.
+    """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    With `heat`, steps have `layout.HEAT_FIELDS`. With material interfaces, `material` (n_solids,) are the materials of the
-    cells, and each step gets their stress.
+    `growing` are the names of cell fields of steps. With `heat`, steps have the `layout.HEAT_FIELDS`. `material` (n_solids,)
+    contains the material number of each cell of a model with material interfaces, whose steps have the stress of each
+    material.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
@@ -67,7 +68,7 @@ def write_geometry(
 def _write_steps_group(
     root: Any, point: Iterable[str], static_point: Iterable[str], static_cell: Iterable[str], growing: Iterable[str]
 ) -> None:
-    """Write the empty step tables; equal ones are one data set under several names."""
+    """Write the empty tables of steps; tables with equal contents are one data set with several names."""
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = np.int64(0)
     growing_table(steps, "Values", np.float64)
@@ -89,7 +90,7 @@ def _write_steps_group(
 
 
 def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
-    """Write /fastcontact: the mesh with all its cells and groups, the case, and empty tables for the steps."""
+    """Write the group /fastcontact with the mesh, all its cells and groups, the case, and empty tables for the steps."""
     import h5py
 
     group = file.create_group("fastcontact")
@@ -122,7 +123,7 @@ def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Map
 
 
 def _write_groups(parent: Any, name: str, groups: Any) -> None:
-    """Write named groups as their names, their sizes and all their members, one group after the other."""
+    """Write groups as their names, their sizes and the members of all groups in sequence."""
     group = parent.create_group(name)
     group["names"] = as_json(list(groups))
     group["sizes"] = np.array([len(members) for members in groups.values()], np.int64)
@@ -130,7 +131,7 @@ def _write_groups(parent: Any, name: str, groups: Any) -> None:
 
 
 def _packed(parent: Any, name: str, values: AnyArray) -> None:
-    """Write a fixed array, compressed with the only filter that all readers support."""
+    """Write a constant array, compressed with gzip, the only filter that all readers support."""
     if values.size:
         parent.create_dataset(name, data=values, compression="gzip", compression_opts=1, chunks=values.shape)
     else:
@@ -138,9 +139,10 @@ def _packed(parent: Any, name: str, values: AnyArray) -> None:
 
 
 def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
-    """Create an empty field; small fields of several steps share a chunk, so that the chunk index does not outweigh them.
+    """Create an empty field.
 
-    Only chunks of a single step are compressed: a compressed chunk moves when more is written to it.
+    Small fields of several steps share a chunk, because the chunk index would otherwise be larger than the fields. Only
+    chunks of a single step are compressed, because a compressed chunk moves in the file when data are added.
     """
     tail, rows = () if width == 1 else (width,), max(length, 1)
     steps = SHARED // (8 * rows * width)
@@ -151,13 +153,13 @@ def _growing_field(parent: Any, name: str, length: int, width: int) -> None:
 
 
 def growing_table(parent: Any, name: str, dtype: Any, width: int = 0, rows: int = ROWS) -> Any:
-    """Create an empty table; uncompressed, so that existing rows never move as it grows."""
+    """Create an empty table, which is not compressed, so that existing rows do not move in the file when it grows."""
     tail = (width,) if width else ()
     return parent.create_dataset(name, shape=(0, *tail), maxshape=(None, *tail), chunks=(rows, *tail), dtype=dtype)
 
 
 def as_json(value: Any) -> str:
-    """Return `value` as ASCII JSON; arrays become lists, NaN stays NaN."""
+    """Return `value` as JSON in ASCII; arrays become lists, and NaN is written as NaN."""
     return json.dumps(value, default=_plain)
 
 
@@ -168,7 +170,7 @@ def _plain(value: Any) -> Any:
 
 
 class OpenObjects(dict[str, Any]):
-    """Groups and data sets of a file by path, each opened once; None for one that earlier versions did not create."""
+    """Groups and data sets of a file by path, each opened once; None for an object that the file does not contain."""
 
     def __init__(self, file: Any) -> None:
         self.file = file
@@ -179,7 +181,7 @@ class OpenObjects(dict[str, Any]):
 
 
 def append_fields(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
-    """Write the point and cell fields of step `number`, overwriting remains of a writer that was stopped."""
+    """Write the point and cell fields of step `number`, which replace those of a step that was not completed."""
     by_cell = {name: step.cell_fields[name] for name in cell_fields}
     by_cell |= layout.material_fields(mesh, step) if _has_material_stress(file) else {}
     for group, fields in (("PointData", layout.point_fields(mesh, step)), ("CellData", by_cell)):
@@ -196,7 +198,7 @@ def _has_material_stress(file: OpenObjects) -> bool:
 def append_tables(
     file: OpenObjects, mesh: Mesh, number: int, step: StepResult, pairs: dict[str, Any], notes: Mapping[str, Any]
 ) -> None:
-    """Write contact tables, iterations, warnings and further `notes`; new pairs are added to `pairs`, by name."""
+    """Write contact tables, iterations, warnings and other `notes` of step `number`; new pairs are added to `pairs`."""
     for name in step.contact:
         if name not in pairs:
             pairs[name] = _new_pair(
@@ -215,7 +217,7 @@ def append_tables(
 
 
 def append_rows(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
-    """Write the positions of the fields of step `number` for viewers."""
+    """Write the rows of step `number` in which viewers find the positions of fields."""
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
         _set_row(file[f"VTKHDF/Steps/{name}"], number, value)
@@ -225,7 +227,7 @@ def append_rows(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, ce
 
 
 def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], None]) -> None:
-    """Write the record of a run that ended after `n_steps` steps, as JSON; `flush` flushes the file."""
+    """Write the record of a run that ended after `n_steps` steps as JSON; `flush` is called after its text and its row."""
     notes, runs, text = file["fastcontact/notes"], file["fastcontact/runs"], as_json(run)
     row = np.array((n_steps, len(notes), len(text)), layout.RUN_ROW)
     _extend(notes, np.frombuffer(text.encode("ascii"), np.uint8))
@@ -235,7 +237,7 @@ def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], No
 
 
 def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> None:
-    """Write the packed restart state of step `number`; the table never shrinks, because HDF5 would reuse the space."""
+    """Write the packed restart state of step `number`; the table is never reduced, since HDF5 would reuse the space."""
     table = file[f"fastcontact/{layout.restart_table(number)}"]
     if len(table) < len(state):
         table.resize(len(state), axis=0)
@@ -243,14 +245,14 @@ def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> Non
 
 
 def header_size(mesh: Mesh) -> int:
-    """Return an upper bound of the size of a file without steps [bytes]."""
+    """Return an upper bound on the size of a file without steps [bytes]."""
     n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
     arrays = [mesh.points, *mesh.cells.values(), *mesh.cell_groups.values(), *mesh.point_groups.values()]
     return 6 * sum(array.nbytes for array in arrays) + n_groups * (mesh.n_cells + mesh.n_points + BYTES)
 
 
 def step_size(mesh: Mesh, step: StepResult) -> int:
-    """Return an upper bound of the size of a step in the file, without its restart state [bytes]."""
+    """Return an upper bound on the size of a step in the file, without its restart state [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
     faced = layout.primary_row(mesh.dim).itemsize
     contact = sum(
@@ -267,7 +269,7 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
 
 
 def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> dict[str, Any]:
-    pair = parent.create_group(None)  # unnamed until complete, in case of an interrupt
+    pair = parent.create_group(None)  # the group has no name until it is complete, because of interrupts
     pair["name"] = as_json(name)
     growing_table(pair, "rows", layout.contact_row(dim, further))
     growing_table(pair, "primary", layout.primary_row(dim))
@@ -277,7 +279,7 @@ def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> dict[
 
 
 def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | None) -> None:
-    """Append a pair's state; a step without it gets a row of zeros."""
+    """Append the state of a pair, or a row of zeros for a step without the pair."""
     rows, steps = pair["rows"], pair["steps"]
     row = np.zeros((), steps.dtype)
     if contact is not None:
@@ -291,9 +293,9 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
 
 
 def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
-    """Append the stress of each side of material interfaces; the tables are created with the first one."""
+    """Append the stress of each material at interfaces; the first call creates the tables."""
     if "materials" not in parent:
-        group = parent.create_group(None)  # unnamed until complete, in case of an interrupt
+        group = parent.create_group(None)  # the group has no name until it is complete, because of interrupts
         _packed(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.SIDES_STEP)
@@ -304,7 +306,7 @@ def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -
 
 
 def _append_rows(table: Any, source: ContactResult | MaterialStress, prefix: str = "") -> tuple[int, int]:
-    """Append a row for each point of the arrays of `source` named by the columns; return the first row and their number."""
+    """Append a row for each point, with the arrays of `source` as columns; return the first row and the number of rows."""
     rows = np.zeros(len(getattr(source, f"{prefix}points")), table.dtype)
     for name in table.dtype.names:
         rows[name] = getattr(source, prefix + name)
@@ -314,7 +316,7 @@ def _append_rows(table: Any, source: ContactResult | MaterialStress, prefix: str
 
 
 def _extend(table: Any, values: AnyArray, first: int | None = None) -> None:
-    """Write values from a row on, by default after all rows."""
+    """Write values from row `first`, by default after the last row."""
     first = len(table) if first is None else first
     table.resize(first + len(values), axis=0)
     table[first:] = values

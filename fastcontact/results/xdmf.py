@@ -20,23 +20,23 @@ TAIL = "</Grid></Domain></Xdmf>\n"
 
 
 def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
-    """Write an XDMF file that refers to the steps of a result file, for ParaView before 5.12.
+    """Write an XDMF file that refers to the steps of a result file, for ParaView before version 5.12.
 
-    The XDMF file only refers to the data in the result file: keep the two together. It shows the steps that were
-    complete when it was written.
+    The XDMF file contains no data; the result file must remain at its relative path. It refers to the steps that are complete
+    when it is written.
 
     Parameters
     ----------
     result_path : path-like
-        File of ``ResultWriter``.
+        Result file of ``ResultWriter``.
     xdmf_path : path-like
-        File to write, suffix ``.xdmf``; replaced atomically if it exists.
+        File to write, with suffix ``.xdmf``; an existing file is replaced atomically.
 
     Raises
     ------
     FileError
-        If the results cannot be read or hold no step, XDMF lacks an element, the result file has a name that XDMF cannot
-        refer to, or the XDMF file cannot be written.
+        If the results cannot be read or contain no step, if XDMF does not support an element or the name of the result file,
+        or if the XDMF file cannot be written.
     """
     target = checked_target(xdmf_path)
     with open_results(result_path) as results:
@@ -75,7 +75,7 @@ def _words(numbers: Iterable[int]) -> str:
 
 
 def _data(address: str, shape: Iterable[int], kind: str = "Float", precision: int = 8) -> str:
-    """Return an item that refers to a data set."""
+    """Return an XDMF item that refers to a data set."""
     form = f'Dimensions="{_words(shape)}" NumberType="{kind}" Precision="{precision}"'
     return f'<DataItem Format="HDF" {form}>{escape(address)}</DataItem>'
 
@@ -85,18 +85,18 @@ def _attribute(name: str, kind: str, center: str, item: str) -> str:
 
 
 def _static(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
-    """Yield the arrays that are constant over the steps."""
+    """Yield the attributes that are constant over the steps."""
     for name, values in arrays.items():
         address, kind = f"{reference}:/VTKHDF/{group}/{name}", "Char" if values.itemsize == 1 else "Int"
         yield _attribute(name, "Scalar", center, _data(address, values.shape, kind, values.itemsize))
 
 
 def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
-    """Yield a field at the points in one step, as a part of the data set of all steps."""
+    """Yield the attributes of a point field in one step, which is part of the data set of all steps."""
     name = address.rpartition("/")[2]
     width = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name]
-    columns = [(name, 0, width)]  # label, first column and number of columns of each
-    if name == "stress":  # XDMF and VTK order the components of a symmetric tensor differently: each is a field
+    columns = [(name, 0, width)]  # label, first column and number of columns of each attribute
+    if name == "stress":  # XDMF orders tensor components differently from VTK
         columns = [(f"stress_{component}", column, 1) for column, component in enumerate(STRESS_COMPONENTS)]
     dims = 1 if width == 1 else 2
     for label, column, count in columns:

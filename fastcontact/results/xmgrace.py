@@ -17,10 +17,10 @@ from fastcontact.errors import CaseError, FileError, check_known
 
 STYLES = ("line", "symbols", "line+symbols")
 
-# Colours and symbols of Grace after white and no symbol, line styles after none.
+# Numbers of colours without white, of symbols and of line styles in Grace.
 N_COLOURS, N_SYMBOLS, N_LINE_STYLES = 14, 6, 5
 
-# Grace writes Latin-1; Greek comes from the Symbol font, letter for letter.
+# Grace uses Latin-1. Each Greek letter has a counterpart in the Symbol font.
 _GREEK = dict(zip("αβγδεζηθικλμνξοπρςστυφχψωΓΔΘΛΞΠΣΦΨΩ", "abgdezhqiklmnxoprVstufcywGDQLXPSFYW"))
 _MARKUP = {letter: f"\\f{{Symbol}}{symbol}\\f{{}}" for letter, symbol in _GREEK.items()} | {"\\": "\\\\", '"': '\\"'}
 _PLAIN = str.maketrans("\u2212\u2013\u2014\u2018\u2019\u201c\u201d", "---''\"\"")
@@ -29,21 +29,21 @@ _PLAIN = str.maketrans("\u2212\u2013\u2014\u2018\u2019\u201c\u201d", "---''\"\""
 @typed(CaseError)
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One curve of a picture.
+    """A curve of a plot.
 
     Parameters
     ----------
     x, y : array_like (n,)
-        Coordinates, in the units of the axes; points that are not finite are omitted.
+        Coordinates [units of the axes]; points that are not finite are omitted.
     legend : str
-        Text in the legend; empty for none.
+        Text in the legend; the curve has no entry if it is empty.
     style : {"line", "symbols", "line+symbols"}
-        A line for theory, symbols for nodal values.
+        Style of the curve, for example a line for theory and symbols for nodal values.
 
     Raises
     ------
     CaseError
-        If `x` and `y` are not two vectors of one length, or there is no such style.
+        If `x` and `y` are not vectors of the same length, or if the style is unknown.
     """
 
     x: Array
@@ -70,11 +70,13 @@ def write_agr(
     Parameters
     ----------
     path : path-like
-        File to write, suffix ``.agr``; replaced if it exists.
+        File to write, with suffix ``.agr``; an existing file is replaced.
     curves : sequence of Curve
-        Curves in drawing order, the last on top.
-    title, subtitle, xlabel, ylabel : str
-        Plain text; markup of Grace in it is escaped, and Greek letters are supported.
+        Curves in drawing order; later curves cover earlier ones.
+    title, subtitle : str
+        Title and subtitle of the plot. In all texts, Greek letters are supported and markup of Grace is escaped.
+    xlabel, ylabel : str
+        Labels of the axes.
 
     Raises
     ------
@@ -116,9 +118,9 @@ def write_agr(
 
 
 def round_axis(values: ArrayLike) -> tuple[float, float, float]:
-    """Return first tick, last tick and tick distance of an axis for all finite `values` (n,), with round limits.
+    """Return the first tick, the last tick and the tick spacing of an axis with round limits for finite `values` (n,).
 
-    The distance is 1, 2 or 5 times a power of ten; there are 4 to 10 intervals.
+    The spacing is 1, 2 or 5 times a power of ten, with about 4 to 10 intervals.
 
     Examples
     --------
@@ -128,25 +130,25 @@ def round_axis(values: ArrayLike) -> tuple[float, float, float]:
     numbers = np.asarray(values, np.float64)
     low, high = float(numbers.min()), float(numbers.max())
     size = max(abs(low), abs(high))
-    if high - low <= 1e-9 * size or size < 1e-300:  # one value only: show it in the middle of an interval
+    if high - low <= 1e-9 * size or size < 1e-300:  # a single value is shown in the middle of the axis
         half = 0.5 * size if size >= 1e-300 else 1.0
         low, high = low - half, high + half
     raw = (high - low) / 8.0
     power = 10.0 ** math.floor(math.log10(raw))
     distance = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1 - 1e-9))
-    # A small tolerance, so that 0.3 = 3 x 0.1 needs no further tick.
+    # With the tolerance, round-off in quotients such as 0.3 / 0.1 does not add a tick.
     first, last = math.floor(low / distance + 1e-9), math.ceil(high / distance - 1e-9)
     return first * distance, last * distance, distance
 
 
 def escaped(text: str) -> str:
-    """Return text as a Grace string that shows it literally, in Latin-1 with Greek from the Symbol font."""
+    """Return a Grace string that shows `text` literally, in Latin-1 with Greek letters from the Symbol font."""
     plain = " ".join(text.translate(_PLAIN).split())
     return "".join(_MARKUP.get(letter, letter) for known in map(_known, plain) for letter in known)
 
 
 def _known(letter: str) -> str:
-    """Return the letter if Grace has it, or a similar one."""
+    """Return a letter if Grace supports it, or a similar letter in ASCII."""
     if letter in _GREEK or (letter.isprintable() and ord(letter) < 256):
         return letter
     near = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode("ascii")

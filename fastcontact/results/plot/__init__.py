@@ -1,6 +1,6 @@
-"""Pictures: pressure profiles with theory, contact maps, deformed shapes, sections and histories over the load steps.
+"""Plots: pressure profiles with theory, contact maps, deformed shapes, sections and histories over the load steps.
 
-Every function takes an optional ``ax`` and returns the axes it drew on; save with ``ax.figure.savefig``.
+Most functions have an optional argument ``ax`` and return the axes of the plot, which ``ax.figure.savefig`` saves.
 """
 
 from __future__ import annotations

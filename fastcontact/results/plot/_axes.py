@@ -1,4 +1,4 @@
-"""Axes to draw on."""
+"""Axes of plots."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.results.step import ContactResult, StepResult
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-else:  # matplotlib is imported only when a picture is drawn
+else:  # Matplotlib is imported only when a plot is drawn
     Axes = Any
 
 Units = Mapping[str, str]
@@ -25,13 +25,13 @@ UNKNOWN: Units = {}
 
 
 def placed(points: Array, size: float) -> str:
-    """Return a position (dim,) as text; coordinates below a millionth of the `size` of the body are zero [length]."""
+    """Return a position (dim,) [length] as text; coordinates up to a millionth of the `size` of the body become zero."""
     kept = np.where(np.abs(points) <= 1e-6 * size, 0.0, points)
     return f"({', '.join(f'{x:.4g}' for x in kept)})"
 
 
 def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
-    """Return a contact pair of each step; raises FastcontactError if there are no steps, or none has such a pair."""
+    """Return a contact pair at each step; FastcontactError if there are no steps or a step lacks the pair."""
     if not len(steps):
         raise FastcontactError("there are no steps to draw")
     for step in steps:
@@ -40,25 +40,25 @@ def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
 
 
 def mark(axes: Any, at: Array, label: str) -> None:
-    """Mark a position (dim,) in a picture."""
+    """Mark a position (dim,) in a plot."""
     axes.plot(*([x] for x in at), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
 
 
 def png(figure: Any) -> bytes:
-    """Return a picture as the bytes of a PNG file."""
+    """Return a figure as the bytes of a PNG file."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png")
     return buffer.getvalue()
 
 
 def displayed(figure: Any) -> None:
-    """Give a figure and its axes a representation for notebooks."""
+    """Add a representation for notebooks to a figure and its axes."""
     for artist in (figure, *figure.axes):
         artist._repr_png_ = partial(png, figure)
 
 
 class Panels(tuple[Any, ...]):
-    """The axes of a figure with several; in a notebook they show the picture."""
+    """The axes of a figure with several panels, which are displayed as the figure in notebooks."""
 
     __slots__ = ()
 
@@ -67,7 +67,7 @@ class Panels(tuple[Any, ...]):
 
 
 def drawable(ax: Any) -> Any:
-    """Return the given axes; FastcontactError if they are not axes."""
+    """Return `ax`; FastcontactError unless it is an axes object of Matplotlib."""
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
             f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
@@ -76,12 +76,12 @@ def drawable(ax: Any) -> Any:
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax`, or new axes in a figure of their own, ``projection="3d"`` for solids."""
+    """Return `ax` or, if it is None, the axes of a new figure; ``projection="3d"`` gives axes in space."""
     return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0] if ax is None else drawable(ax)
 
 
 def without_matplotlib(error: Exception) -> FastcontactError:
-    """Return the error for a failed import of matplotlib: it is missing, or does not know the backend."""
+    """Return the error for a failed import of Matplotlib, which is missing or does not know the backend."""
     if isinstance(error, ImportError):
         return FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'")
     backend = os.environ.get("MPLBACKEND")
@@ -91,7 +91,7 @@ def without_matplotlib(error: Exception) -> FastcontactError:
 
 
 def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 150, **options: Any) -> Any:
-    """Return the axes (rows, columns) of a new figure of a `size` [inches]; `options` are those of ``Figure.subplots``."""
+    """Return the axes (rows, columns) of a new figure of `size` [inch]; `options` are passed to ``Figure.subplots``."""
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.figure import Figure
@@ -105,11 +105,11 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
 
 
 def outer_legend(ax: Any, columns: int) -> None:
-    """Add a legend below the label of the abscissa, where it cannot hide data."""
+    """Add a legend below the label of the abscissa, where it does not hide data."""
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize=8)
 
 
 def settled(axes: Any) -> Any:
-    """Return axes in space with space for their labels, whose size is known only after drawing."""
+    """Draw axes in space, so that the size of their labels is known to the layout, and return them."""
     axes.figure.draw_without_rendering()
     return axes

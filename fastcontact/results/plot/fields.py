@@ -1,4 +1,4 @@
-"""Fields at the points of a mesh that can be drawn, by name."""
+"""Fields for plots, by name, with their values at the points of a mesh."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from fastcontact.results.units import valued
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A field at the points of a mesh, which is cut along material interfaces for stresses.
+    """A scalar field at the points of a mesh, which is cut along material interfaces for stresses.
 
     Attributes
     ----------
     mesh : Mesh
         Mesh with the points of the values.
     node : ndarray of int (m,)
-        Node of the whole mesh at each of these points.
+        Node of the original mesh at each of these points.
     values : ndarray (m,)
-        Values in the unit of `quantity`.
+        Values [unit of `quantity`].
     caption : str
         Name for labels.
     quantity : str
-        Quantity of the unit, ``"pressure"`` or ``"length"``.
+        Kind of unit, ``"pressure"`` or ``"length"``; empty for other fields.
     """
 
     mesh: Mesh
@@ -47,12 +47,12 @@ class Field:
 
     @property
     def extreme(self) -> int:
-        """Number of the point with the largest value, or with the smallest if that has the larger magnitude."""
+        """Number of the point with the value of largest magnitude."""
         return int(np.argmax(np.abs(self.values)))
 
     @property
     def range(self) -> tuple[float, float]:
-        """Limits of the colours: symmetric about zero if the values have both signs."""
+        """Limits of the colours, which are symmetric about zero if the field is `signed`."""
         low, high = float(self.values.min()), float(self.values.max())
         if self.signed:
             return -max(-low, high), max(-low, high)
@@ -60,23 +60,23 @@ class Field:
 
     @property
     def signed(self) -> bool:
-        """Whether the values have both signs, each with at least a tenth of the magnitude of the other."""
+        """Whether the values have both signs and the smaller extreme is more than a tenth of the larger in magnitude."""
         low, high = float(self.values.min()), float(self.values.max())
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
     def described(self, value: float, units: Mapping[str, str], where: str = "") -> str:
-        """Return an extreme value as text."""
+        """Return a text for an extreme value of the field."""
         kind = "maximum" if value >= 0.0 else "minimum"
         return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"
 
     @property
     def colours(self) -> str:
-        """Name of the colour map: diverging from blue over white to red for both signs."""
+        """Name of the colour map, which diverges from blue through white to red if the field is `signed`."""
         return "RdBu_r" if self.signed else "viridis"
 
 
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
-    """Return a field of a step by one of `names`; FastcontactError if there is no such field."""
+    """Return a field of a step by its name; FastcontactError if there is no field with this name."""
     known = [*names(mesh), *step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
     if name not in known:
         raise FastcontactError(unknown("field", name, known))
@@ -101,13 +101,13 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
 
 
 def names(mesh: Mesh) -> list[str]:
-    """Return the names of all possible fields of a mesh."""
+    """Return the names of the fields that each step on a mesh has."""
     in_space = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
     return [name for name in (*OF_STRESS, *DISPLACEMENTS, *SLIPS) if name not in in_space]
 
 
 def _of_cells(mesh: Mesh, values: Array) -> Array:
-    """Return values of solid cells (n_solids,) at the points (n_points,): the mean of the cells around each."""
+    """Return the mean (n_points,) of the values (n_solids,) of the solid cells around each point."""
     total, count, by_element = np.zeros(mesh.n_points), np.zeros(mesh.n_points), cells_by_element(mesh, values)
     for name, block in mesh.solids.items():
         np.add.at(total, block, by_element[name][:, None])
@@ -116,13 +116,13 @@ def _of_cells(mesh: Mesh, values: Array) -> Array:
 
 
 def principal_stress(stress: Array, number: int) -> Array:
-    """Return a principal stress (n,) of stresses (n, 4) or (n, 6), counted from the smallest [pressure]."""
+    """Return principal stress `number` (n,) [pressure], 0 for the smallest, of stresses (n, 4) or (n, 6) [pressure]."""
     full = np.zeros((len(stress), 6))
     full[:, : stress.shape[1]] = stress
     return np.asarray(np.linalg.eigvalsh(full[:, PAIRS[3]])[:, number])
 
 
-# Caption, and values (n,) of stresses (n, 4) or (n, 6) [pressure].
+# Captions of fields, and functions from stresses (n, 4) or (n, 6) to values (n,) [pressure].
 OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
     "von_mises": ("von Mises stress", von_mises),
     "von_mises_signed": ("von Mises stress with the sign of the trace", von_mises_signed),

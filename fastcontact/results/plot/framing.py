@@ -1,4 +1,4 @@
-"""Frames of pictures of bodies: size, part shown, titles, labels, colour bar and legend."""
+"""Layout of plots of bodies: size, visible part, title, labels, colour bar and legend."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from fastcontact.results.units import labelled
 
 
 def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
-    """Return width and height of a picture filled by the body, including colours, labels and title [inches]."""
+    """Return width and height [inch] of a figure for a body, with space for colour bar, labels and title."""
     width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
 
 
 def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
-    """Return the corners of a square around its middle (2,), of a half width, clipped to the bounds of `points` (n, 2)."""
+    """Return the lower and upper corners of a square with a centre (2,) and a half width, clipped to points (n, 2)."""
     low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
     return np.maximum(middle - half, low), np.minimum(middle + half, high)
 
@@ -29,9 +29,10 @@ def framed(
     axes: Any, drawn: Any, shown: Field, heading: str, units: Units, labels: Sequence[str], points: Array | None = None,
     *, alone: bool = True,
 ) -> Any:  # fmt: skip
-    """Add a colour bar, a title, a label for each direction and a legend to axes; return them.
+    """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 
-    `points` (n, 2) [length] are those around which axes in the plane are shown; they are `alone` in their figure or not.
+    `points` (n, 2) [length] are the points of a body in the plane, and None for axes in space. `alone` is whether the figure
+    has no other axes.
     """
     caption, flat = labelled(shown.caption, units, shown.quantity), points is not None
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if points is None else _bar_length(points))
@@ -45,12 +46,12 @@ def framed(
 
 
 def _legend_height(points: Array) -> float:
-    """Return the position of the legend, in heights of such axes: half an inch below for the label of the axis."""
+    """Return the position of the legend in units of the height of the axes, half an inch below them."""
     width, height = np.ptp(points, axis=0)
     return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
 
 
 def _bar_length(points: Array) -> float:
-    """Return the length of the colour bar over the available length: the height of slender bodies, except for its label."""
+    """Return the length of the colour bar relative to the axes; it is shorter for flat bodies."""
     width, height = np.ptp(points, axis=0)
     return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))

@@ -1,4 +1,4 @@
-"""Hidden-surface removal for triangles in parallel projection."""
+"""Removal of hidden surfaces of triangles in parallel projection."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import numpy as np
 
 from fastcontact.arrays import Array, Indices, Mask
 
-# A point less than this fraction of the total size behind a triangle lies on it.
+# Distance behind a triangle, relative to the total size, up to which a point is taken to lie on the triangle.
 ON_IT = 1e-4
 
 
 class Screen:
-    """Triangles sorted by position on the screen.
+    """Triangles sorted by their position on the screen.
 
     Parameters
     ----------
     triangles : ndarray (n, 3, 3)
-        Corners [length].
+        Corners of the triangles [length].
     eye : ndarray (3,)
-        Unit vector towards the eye [-].
+        Unit vector towards the viewer [-].
     """
 
     def __init__(self, triangles: Array, eye: Array) -> None:
@@ -33,7 +33,7 @@ class Screen:
         self._sort()
 
     def _sort(self) -> None:
-        """List the triangles of every square of the screen, square by square."""
+        """List the triangles of each square of the screen, in the order of the squares."""
         low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
         across, up = (high - low + 1).T
         count = across * up
@@ -48,7 +48,7 @@ class Screen:
         return np.clip(((points - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
 
     def hidden(self, places: Array) -> Mask:
-        """Return which positions (..., 3) [length] are hidden behind a triangle."""
+        """Return whether each position (..., 3) [length] is hidden behind a triangle."""
         flat = places.reshape(-1, 3) @ self.axes.T
         column, row = self._square(flat[:, :2]).T
         square = column * self.n_bins + row
@@ -59,7 +59,7 @@ class Screen:
         return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
 
     def _behind(self, flat: Array, triangle: Indices) -> Mask:
-        """Return which places (n, 3) on the screen lie within and behind their triangle (n,)."""
+        """Return whether each point (n, 3) in screen coordinates [length] lies behind its triangle (n,)."""
         a, b, c = np.moveaxis(self.corners[triangle], 1, 0)
         area = _cross(b - a, c - a)
         area = np.where(area == 0.0, np.inf, area)
@@ -70,12 +70,12 @@ class Screen:
 
 
 def _counted(count: Indices) -> tuple[Indices, Indices]:
-    """Return for each of `count` (n,) members of each entry the number of the entry, and that of the member in it."""
+    """Return, for entries with `count` (n,) members each, the entry of each member and its number within the entry."""
     return np.repeat(np.arange(len(count)), count), np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
 
 
 def across(eye: Array) -> Array:
-    """Return unit vectors (3, 3): two perpendicular to the line of sight, and the one to the eye [-]."""
+    """Return three orthonormal vectors (3, 3) [-]: two normal to the line of sight, and the vector to the viewer."""
     helper = np.eye(3)[int(np.argmin(np.abs(eye)))]
     first = np.cross(helper, eye)
     first /= np.linalg.norm(first)
@@ -83,9 +83,10 @@ def across(eye: Array) -> Array:
 
 
 def seen_along(direction: Array, aligned: float) -> tuple[Array, tuple[str, str] | None]:
-    """Return axes (2, 3) perpendicular to a unit vector (3,), with their names if they are coordinate axes.
+    """Return two axes (2, 3) [-] for a view along a unit vector (3,) [-].
 
-    These are chosen if a component of the vector is at least `aligned`.
+    If the magnitude of a component of the vector is at least `aligned`, they are the other coordinate axes and their names
+    are returned; otherwise they are normal to the vector and the names are None.
     """
     along = int(np.argmax(np.abs(direction)))
     if abs(direction[along]) < aligned:

@@ -1,4 +1,4 @@
-"""Cells in the plane, filled by a field and outlined; sides and fields of quadratic ones are curved."""
+"""Cells in the plane, filled with the colours of a field and outlined, with the curved sides of quadratic cells."""
 
 from __future__ import annotations
 
@@ -11,30 +11,36 @@ from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 
-# Number of subdivisions of each side of a cell, to show curved sides and nonlinear fields.
+# Number of subdivisions of each side of a cell, which show curved sides and nonlinear fields.
 CUTS = 4
-# Number of cells above which this would be invisible.
+# Largest number of cells that are subdivided. With more cells, subdivisions would not be visible.
 FEW = 5000
 
 
 def fill(
     ax: Any, blocks: Mapping[str, AnyArray], points: Array, values: Array, colours: str, ends: tuple[float, float]
 ) -> Any:
-    """Fill cells by their shape functions; return the artist with the colours.
+    """Fill cells with the colours of a field that their shape functions interpolate.
 
     Parameters
     ----------
-    ax : matplotlib Axes
+    ax : matplotlib.axes.Axes
+        Axes of the plot.
     blocks : mapping of str to ndarray of int (n_cells, n_nodes)
         Cells by element type.
     points : ndarray (n_points, 2)
-        [length]
+        Positions of the points [length].
     values : ndarray (n_points,)
-        Values in any unit.
+        Values of the field [any unit].
     colours : str
-        Name of the colours.
+        Name of the colour map.
     ends : (float, float)
-        Values of the first and the last colour, in the unit of `values`.
+        Values of the first and the last colour [unit of `values`].
+
+    Returns
+    -------
+    matplotlib artist
+        Artist for a colour bar.
     """
     few = sum(map(len, blocks.values())) <= FEW
     places, heights, triangles, start = [], [], [], 0
@@ -52,7 +58,7 @@ def fill(
 
 
 def shaded(ax: Any, points: Array, triangles: AnyArray, values: Array, colours: str, ends: tuple[float, float]) -> Any:
-    """Fill triangles (m, 3) of int between `points` (n, 2) by linear interpolation of `values` (n,); others as in `fill`."""
+    """Fill triangles (m, 3) between `points` (n, 2) with linearly interpolated `values` (n,); see `fill`."""
     from matplotlib.tri import Triangulation
 
     mesh = Triangulation(points[:, 0], points[:, 1], triangles)
@@ -60,7 +66,7 @@ def shaded(ax: Any, points: Array, triangles: AnyArray, values: Array, colours: 
 
 
 def outlines(name: str, corners: Array) -> Array:
-    """Return cells (n, n_nodes, 2) of an element as polygons (n, m, 2) along their sides, curved ones subdivided."""
+    """Return the outlines (n, m, 2) of cells (n, n_nodes, 2) as polygons, in which curved sides are subdivided [length]."""
     kind = elements.get(name)
     if kind.order == 1:
         return corners[:, : kind.n_corners]
@@ -69,7 +75,10 @@ def outlines(name: str, corners: Array) -> Array:
 
 
 def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:
-    """Return points (k, 2) [-] and triangles (m, 3) between them, `n` a side, that divide the unit triangle or square."""
+    """Divide the unit triangle or square into triangles, with `n` intervals on each side.
+
+    Returns the points (k, 2) [-] and the points of the triangles (m, 3).
+    """
     points = [(i, j) for i in range(n + 1) for j in range(n + 1) if not triangle or i + j <= n]
     number = {point: k for k, point in enumerate(points)}
     squares = [((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)) for i in range(n) for j in range(n)]
@@ -79,5 +88,5 @@ def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:
 
 
 def triangles_of(points: Array, facets: AnyArray) -> Array:
-    """Return the flat triangles (n, 3, dim) [length] of facets between `points` (n_points, dim) [length]."""
+    """Return flat triangles (n, 3, dim) [length] that represent facets with `points` (n_points, dim) [length]."""
     return points[facets][:, flat_triangles(facets.shape[1])].reshape(-1, 3, points.shape[1])

@@ -1,4 +1,4 @@
-"""The outer surface of a solid in three dimensions, coloured by a field at the points."""
+"""The outer surface of a three-dimensional solid with the colours of a field."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.hiding import Screen
 from fastcontact.results.plot.patches import lattice
 
-# Number of cells or facets above which edges would only blacken the picture.
+# Largest number of cells or facets whose edges are drawn by default. More edges would blacken the plot.
 MOST_EDGES = 5000
-# Number of subdivisions of the sides of each flat triangle between the nodes, to show nonlinear fields.
+# Number of subdivisions of the sides of each flat triangle between the nodes, which show nonlinear fields.
 CUTS = 2
-# Number of recursive subdivisions, into four, of partly hidden pieces.
+# Number of recursive subdivisions of partly hidden triangles into four.
 FINEST = 4
-# Size of solids relative to their frame, which with its labels takes the rest.
+# Size of solids relative to the axes, which leaves space for labels.
 ROOM = 0.9
-# Largest ratio of the longer visible side of a box to its diagonal; slender boxes are drawn smaller.
+# Largest ratio of the longer visible extent of a box to its diagonal. Slender boxes are drawn smaller.
 WIDEST = 0.8
-# Heights and directions of the eye [degrees]: from above and from below, around the four corners.
+# Elevations and azimuths of the viewer [degree], from above and from below at each of the four corners.
 VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
-# Number of ticks on an axis as long as the diagonal of the box in the picture; distance from an end of y, relative to its
-# length, within which its numbers would overlap those of other axes.
+# Number of ticks on an axis that is as long as the diagonal of the box in the plot, and distance from the ends of the y axis,
+# relative to its length, within which its tick labels would overlap those of other axes.
 TICKS, NEAR_END = 14, 0.1
 
 
 def draw_solid(
     ax: Any, shown: Field, points: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
 ) -> Any:
-    """Draw the visible part of the outer surface; return the mappable for a colour bar.
+    """Draw the visible part of the outer surface and return the mappable for a colour bar.
 
-    `points` (n_points, 3) are the positions [length]; `colours` are the values of the first and the last colour. Outlines of
-    facets are drawn with `edges`, by default up to MOST_EDGES facets. `view` is height and direction of the eye [degrees].
+    `points` (n_points, 3) are the positions of the points [length], and `colours` are the values of the first and the last
+    colour. `edges` is whether the outlines of facets are drawn; by default they are drawn for up to MOST_EDGES facets. `view`
+    contains the elevation and the azimuth of the viewer [degree].
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -58,9 +59,9 @@ def draw_solid(
     norm = Normalize(*colours)
     faces = colormaps[shown.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
-    lines = faces.copy()  # lines in the colour of the face close the hairline gaps between neighbours
+    lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
-        # Nearer objects are drawn later: strokes are moved towards the eye, which does not change their parallel projection.
+        # Nearer objects are drawn later. Moving strokes towards the viewer does not change their parallel projection.
         drawn = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * towards(view)
         polygons += list(drawn)
         faces = np.vstack([faces, np.zeros((len(drawn), 4))])
@@ -71,9 +72,9 @@ def draw_solid(
 
 
 def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> None:
-    """Show the box between two corners (3,) [length] in its own proportions in 3D axes, seen from `view` [degrees].
+    """Show the box between two corners (3,) [length] in true proportions in 3D axes, seen from `view` [degree].
 
-    All changes of the limits must use this function: with other proportions strokes would not lie on their faces.
+    All changes of limits must use this function, because with other proportions strokes would not lie on their faces.
     """
     from matplotlib.ticker import MaxNLocator
 
@@ -95,24 +96,27 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
 
 
 def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
-    """Return whether the extreme value of a field is visible, with points at `points` (n_points, 3) [length]."""
+    """Return whether the extreme value of a field is visible from `view` if the points are at `points` (n_points, 3)."""
     _, screen = _facing(shown, points, towards(view))
     return not bool(screen.hidden(points[[shown.extreme]])[0])
 
 
 def view_of_extreme(shown: Field, position: Array) -> tuple[float, float]:
-    """Return the first of VIEWS from which the extreme value of a field is visible."""
+    """Return the first of VIEWS from which the extreme value of a field is visible, or the first one if there is none."""
     return next((view for view in VIEWS if is_seen(shown, position, view)), VIEWS[0])
 
 
 def towards(view: tuple[float, float]) -> Array:
-    """Return the unit vector (3,) towards the eye [-] from its height and direction [degrees]."""
+    """Return the unit vector (3,) [-] towards the viewer from its elevation and azimuth [degree]."""
     height, direction = np.radians(view)
     return np.array([np.cos(height) * np.cos(direction), np.cos(height) * np.sin(direction), np.sin(height)])
 
 
 def _facing(shown: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
-    """Return name, corners, values and flat triangles of the facets that face the eye, by kind, and what they hide."""
+    """Return the facets that face the viewer and the screen with their triangles.
+
+    The facets are given as the name, the corners, the values and the flat triangles of each facet type.
+    """
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
     facing = []
     for name, facets in (_without_cuts(shown.mesh, shown.node) if cut else outer_facets(shown.mesh)).items():
@@ -125,9 +129,9 @@ def _facing(shown: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Ar
 
 
 def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
-    """Return the visible parts of triangles (n, 3, 3), and the values (n, 3) at their corners.
+    """Return the visible parts of triangles (n, 3, 3) and the values (n, 3) at their corners.
 
-    Partly hidden triangles are recursively divided into four; of the smallest ones those with a visible middle are kept.
+    Partly hidden triangles are divided recursively into four. The smallest triangles are kept if their centre is visible.
     """
     visible: list[tuple[Array, Array]] = []
     for left in range(FINEST, -1, -1):
@@ -146,7 +150,7 @@ def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array
 
 
 def _seen_strokes(strokes: Array, screen: Screen) -> Array:
-    """Return the visible parts of strokes (n, 2, 3): sixteenths of partly hidden ones."""
+    """Return the visible parts of strokes (n, 2, 3); partly hidden strokes are divided into sixteen pieces."""
     ends = np.linspace(0.0, 1.0, 17)[:, None]
     points = strokes[:, None, 0] + ends * (strokes[:, None, 1] - strokes[:, None, 0])
     segments = np.stack([points[:, :-1], points[:, 1:]], axis=2)
@@ -157,7 +161,7 @@ def _seen_strokes(strokes: Array, screen: Screen) -> Array:
 
 
 def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
-    """Return the outer facets without those along internal cuts, where two facets have the same nodes."""
+    """Return the outer facets except those along internal cuts, where two facets have the same nodes."""
     blocks = {}
     for name, facets in outer_facets(mesh).items():
         _, back, count = np.unique(np.sort(node[facets], axis=1), axis=0, return_inverse=True, return_counts=True)
@@ -166,13 +170,13 @@ def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
 
 
 def _cut(n: int) -> Array:
-    """Return the weights (n * n, 3, 3) of the corners of the n * n equal pieces of a triangle."""
+    """Return barycentric weights (n * n, 3, 3) [-] of the corners of n * n equal pieces of a triangle."""
     points, pieces = lattice(True, n)
     return np.column_stack([1.0 - points.sum(axis=1), points])[pieces]
 
 
 def _outline(name: str, corners: Array) -> Array:
-    """Return the sides of facets as strokes (n, 2, 3) between neighbouring nodes."""
+    """Return the sides of facets as strokes (n, 2, 3) [length] between neighbouring nodes."""
     element = elements.get(name)
     ends = [(a, b) for a, b in element.edges]
     if element.order == 2:
