@@ -1,4 +1,4 @@
-"""A finished adaptive study and its report: lines, table, dictionary, figure, page."""
+"""The result of an adaptive study and its report as lines, table, dictionary, figure and page."""
 
 from __future__ import annotations
 
@@ -24,19 +24,26 @@ from fastcontact.studies.report import Report
 
 @dataclass(frozen=True, eq=False)
 class Round:
-    """One mesh of an adaptive study.
+    """Results on one mesh of an adaptive study.
 
     Attributes
     ----------
-    n_dofs, n_cells : int
-    values, theory, reference : dict of str to float
-        Value, theory at equal approach and mesh-converged solution of each quantity, in the units of the case.
+    n_dofs : int
+        Number of degrees of freedom.
+    n_cells : int
+        Number of cells.
+    values : dict of str to float
+        Value of each quantity [units of the case].
+    theory : dict of str to float
+        Value of each quantity in the theory at equal approach [units of the case].
+    reference : dict of str to float
+        Value of each quantity in the mesh-converged solution of the case [units of the case].
     energy_error : float
-        Estimated error of the whole solution in the energy norm, relative [-].
+        Estimated relative error of the solution in the energy norm [-].
     estimate : float
         Estimated relative error of the quantity of interest [-]; NaN on the first two meshes.
     seconds : float
-        Time of solution and estimate [s].
+        Wall time of the solution and the estimate [s].
     """
 
     n_dofs: int
@@ -49,31 +56,44 @@ class Round:
     seconds: float
 
     def true_error(self, quantity: str) -> float:
-        """Return the relative difference from the mesh-converged solution of the case [-]; NaN without one."""
+        """Return the relative difference between a quantity and the mesh-converged solution of the case.
+
+        Parameters
+        ----------
+        quantity : str
+            Name of the quantity.
+
+        Returns
+        -------
+        float
+            Magnitude of the relative difference [-]; NaN if the case has no mesh-converged solution.
+        """
         exact = self.reference.get(quantity)
         return abs(self.values[quantity] / exact - 1.0) if exact else math.nan
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AdaptiveStudy(Report):
-    """A finished adaptive study; its case and units as in `Report`.
+    """The result of an adaptive study, with the attributes of `Report` and the following.
 
     Attributes
     ----------
     combination : str
-        Element and formulation.
+        Element and contact formulation.
     quantity : str
+        Quantity of interest.
     tolerance : float
-        Target relative error [-].
+        Requested relative error [-].
     reached : bool
-        Whether the estimate has reached the tolerance.
+        Whether the estimated error is at most the tolerance.
     rounds : list of Round
+        Results on each mesh.
     case : Case
-        The case on the last mesh.
+        Case on the last mesh.
     last : StepResult
-        Solution on the last mesh.
+        Last load step on the last mesh.
     error : ErrorEstimate
-        Error of each cell of the last mesh.
+        Estimated error of each cell of the last mesh.
     """
 
     kind = "Adaptive meshes"
@@ -89,13 +109,24 @@ class AdaptiveStudy(Report):
     error: ErrorEstimate
 
     def effectivity(self, number: int = -1) -> float:
-        """Return the effectivity index of a round, estimated over true error [-]; NaN without a reference."""
+        """Return the effectivity index, the ratio of the estimated to the true error.
+
+        Parameters
+        ----------
+        number : int
+            Index of the mesh, by default the last one.
+
+        Returns
+        -------
+        float
+            Effectivity index [-]; NaN if the true error is unknown or zero.
+        """
         round_ = self.rounds[number]
         true = round_.true_error(self.quantity)
         return round_.estimate / true if true > 0 else math.nan
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them; errors are relative."""
+        """Return the study as numbers, texts, lists and dictionaries, as ``--json`` writes it; errors are relative [-]."""
         numbers = {
             "combination": self.combination,
             "quantity": self.quantity,
@@ -112,10 +143,10 @@ class AdaptiveStudy(Report):
         return {**counts, **round_.values, **errors, "seconds": round_.seconds}
 
     def table(self) -> AnyArray:
-        """Return a structured array (n_rounds,), one row a mesh, as ``--csv`` writes it.
+        """Return a structured array (n_rounds,) with a row for each mesh, as ``--csv`` writes it.
 
-        Fields are ``n_dofs``, ``n_cells``, the quantity in its unit, and ``energy_error``, ``estimate``,
-        ``true_error`` (relative to the mesh-converged solution of the case) and ``effectivity`` [-].
+        The fields are ``n_dofs``, ``n_cells``, the quantity of interest [unit of the quantity], ``energy_error``,
+        ``estimate``, ``true_error``, which is relative to the mesh-converged solution of the case, and ``effectivity`` [-].
         """
         counts = {name: [getattr(round_, name) for round_ in self.rounds] for name in ("n_dofs", "n_cells")}
         values = [round_.values[self.quantity] for round_ in self.rounds]
@@ -126,17 +157,17 @@ class AdaptiveStudy(Report):
         return [(self.combination, self._rows())]
 
     def figure(self) -> Any:
-        """Return a matplotlib figure: errors over degrees of freedom, and the last mesh coloured by its error."""
+        """Return a Matplotlib figure with the errors over degrees of freedom and the error of each cell of the last mesh."""
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
         width, height = np.ptp(self.case.mesh.points, axis=0)
-        height_of_axes = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # [inch], the scale of colours included
+        height_of_axes = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # with colour bar [inch]
         errors, mesh = panels(1, 2, (6.2 + height_of_axes, 5.2), heading, widths=(6.2, height_of_axes))[0]
         self._draw_errors(errors)
         self._draw_mesh(mesh)
         return mesh.figure
 
     def _errors(self) -> dict[str, list[float]]:
-        """Return the errors of all rounds by name, each (n_rounds,)."""
+        """Return the errors (n_rounds,) [-] of all meshes by name."""
         return {
             "energy_error": [round_.energy_error for round_ in self.rounds],
             "estimate": [round_.estimate for round_ in self.rounds],
@@ -145,7 +176,7 @@ class AdaptiveStudy(Report):
         }
 
     def _rows(self) -> Rows:
-        """Return header and one row a mesh."""
+        """Return a header and a row for each mesh."""
         q, errors = self.quantity, self._errors()
         shown = {"estimated error": "estimate", "energy error": "energy_error"}
         if math.isfinite(errors["true_error"][-1]):
@@ -163,7 +194,7 @@ class AdaptiveStudy(Report):
         last, q = self.rounds[-1], self.quantity
         value = f"{title(q)} {last.values[q]:.8g} {unit(q, self.units)}".rstrip()
         verdict = "within" if self.reached else "NOT within"
-        text = f"{self.combination}: {value}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} asked for"
+        text = f"{self.combination}: {value}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} requested"
         if not self.reached:
             text += ": the limit of meshes or degrees of freedom was reached; allow more (--max-dofs)"
         true = last.true_error(q)
@@ -180,7 +211,7 @@ class AdaptiveStudy(Report):
         ):
             if np.isfinite(errors[name]).any():
                 ax.plot(n_dofs, errors[name], style, ms=4, lw=1.0, label=label)
-        ax.axhline(self.tolerance, color="black", ls="--", lw=1.0, label="asked for")
+        ax.axhline(self.tolerance, color="black", ls="--", lw=1.0, label="requested")
         labels = ("degrees of freedom", "relative error [-]")
         frame(ax, f"Error of the {title(self.quantity)}", labels, scales=("plain log", "log"))
 

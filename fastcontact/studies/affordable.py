@@ -1,4 +1,4 @@
-"""Refusal of studies too large to finish, before their first run."""
+"""Checks, before the first run of a study, that its runs are not too many or too large."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from fastcontact.studies.settings import Combination, Settings
 
 log = logging.getLogger("fastcontact")
 MOST_RUNS = 100_000
-# Peak memory per unknown of a multigrid analysis of linear hexahedra, the cheapest case [bytes]: `fastcontact bench contact`.
+# Peak memory per unknown of a multigrid analysis with linear hexahedra, which needs the least memory [bytes]. It was measured
+# with `fastcontact bench contact`.
 BYTES_PER_UNKNOWN = 2500
 
 
 def check_runs(count: int) -> None:
-    """Raise CaseError for a study with an excessive number of runs."""
+    """Raise CaseError if a study has more than `MOST_RUNS` runs."""
     if count > MOST_RUNS:
         raise CaseError(f"a study of {count} runs would not end: give at most {MOST_RUNS}, or fewer values")
     log.info("%d runs", count)
@@ -41,7 +42,7 @@ def check_levels(case: Case, chosen: Settings, members: Sequence[Combination], l
 
 
 def _memory() -> float:
-    """Return the memory of this machine [bytes]; infinity if it is unknown."""
+    """Return the physical memory of this machine [bytes], or infinity if it is unknown."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):

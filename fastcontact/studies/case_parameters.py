@@ -16,10 +16,11 @@ _LAW = re.compile(rf"\s*(?:({_NUMBER})\s*\*\s*)?value(?:\s*\^\s*({_NUMBER}))?\s*
 
 
 def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a copy of a parsed case file with a new value of a parameter: a path, or a name in `linked`.
+    """Return a copy of a parsed case file with a new value of a parameter.
 
-    `linked` is ``[study.parameters]``: each name sets several paths, each by a law ``"a*value^p"`` of the value.
-    Raises CaseError if there is no such path or name, or a law is wrong.
+    The parameter is a path or a name in `linked`, which is the table ``[study.parameters]``. Each name in this table sets
+    several paths, each by a law ``"a*value^p"``. Raises CaseError if the path or the name does not exist, or a law is
+    invalid.
     """
     case: dict[str, Any] = copy.deepcopy(dict(data))
     if parameter not in linked:
@@ -31,7 +32,7 @@ def substituted(data: Mapping[str, Any], parameter: str, value: Any, linked: Map
 
 
 def by_law(law: Any, value: Any, where: str) -> Any:
-    """Return ``a value^p`` for a law ``"a*value^p"``."""
+    """Return ``a value^p`` for a law ``"a*value^p"``; CaseError if the law is invalid or cannot be applied to the value."""
     match = _LAW.match(law) if isinstance(law, str) else None
     if match is None:
         raise CaseError(f"{where} = {law!r} must be 'value', 'a*value' or 'a*value^p' with numbers a and p")

@@ -1,4 +1,4 @@
-"""The table ``[study]`` of a case file, checked without solving anything."""
+"""Checks of the table ``[study]`` of a case file before a study."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from fastcontact.studies.settings import settings, shape_of
 def check_study(case: Case) -> None:
     """Raise FastcontactError if a study of a case could not start.
 
-    Quadrangle meshes are made if ``[study]`` gives the arguments of level 0; free triangle meshes are not, since they take as
-    long as a short run.
+    Quadrangle meshes are generated if ``[study]`` gives the arguments of level 0. Free triangle meshes are not generated,
+    since this takes as long as a short run.
     """
     chosen = settings(case)
     study = chosen.data.get("study", {})

@@ -1,4 +1,4 @@
-"""Figures of a mesh-convergence study: errors over mesh size, pressures of all levels, differences from theory."""
+"""Figures of a mesh-convergence study: errors over mesh size, pressures of all levels and differences from theory."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from fastcontact.studies.render.figure import frame, marker, message
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 
-# Largest number of curves drawn with error bars, which would hide more of them.
+# Largest number of curves that are drawn with error bars, which would hide more curves.
 MOST_CURVES_WITH_BARS = 3
 
 
 def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Mapping[str, str]) -> None:
-    """Draw the mesh error of a quantity over h in log-log scale, with error bars of the limit, fits and slopes."""
+    """Draw the mesh error of a quantity over h in double logarithmic scale, with error bars, fits and slope triangles."""
     known = [(k, series) for k, series in enumerate(all_series) if quantity in series.limits]
     if not known:
         return message(ax, f"no limit of the {title(quantity)}:\nit needs three levels")
@@ -39,7 +39,7 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
             low, high = np.maximum(error - bar, 0.3 * error), error + bar
             ax.vlines(h[shown], low[shown], high[shown], colors=color, lw=0.7)
         if math.isfinite(limit.order) and shown.sum() >= 2:
-            # The fitted power law, through the middle of the errors.
+            # The fitted power law with the geometric mean of the errors.
             factor = np.exp(np.mean(np.log(error[shown] / h[shown] ** limit.order)))
             ax.plot(h, factor * h**limit.order, ":", lw=1.0, color=color)
     explained = {":": "fit $C\\,h^{order}$"} | ({"|": f"error bar of the limit, {CONFIDENCE:.0%}"} if few else {})
@@ -50,13 +50,13 @@ def draw_errors(ax: Any, all_series: Sequence[Series], quantity: str, units: Map
     labels, size = (along, "|value - limit| / limit"), 8 if few else 6.5
     frame(ax, f"Mesh error of the {title(quantity)}", labels, scales=("plain log", "log"), legend_size=size)
     ax.grid(which="minor", alpha=0.12)
-    if few:  # matplotlib ignores error bars when it places the legend
+    if few:  # Matplotlib ignores error bars when it places the legend
         low, high = ax.get_ylim()
         ax.set_ylim(low, high * (high / low) ** (0.02 * size * (len(known) + len(explained)) / 2.2))
 
 
 def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> None:
-    """Draw slope triangles for the least and the greatest fitted order, rounded to halves."""
+    """Draw slope triangles for the smallest and the largest fitted order, rounded to multiples of one half."""
     orders = [series.limits[quantity].order for series in all_series]
     orders = [order for order in orders if math.isfinite(order)]
     if not orders:
@@ -75,7 +75,7 @@ def _slope_triangles(ax: Any, quantity: str, all_series: Sequence[Series]) -> No
 
 
 def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]) -> None:
-    """Draw the contact pressure of all levels over the distance from the axis, with that of the theory."""
+    """Draw the contact pressure of all levels and of the theory over the distance from the axis or the contact centre."""
     if not series.finest.profile:
         return message(ax, "this case has no contact pair,\nso there is no contact pressure")
     from matplotlib import colormaps
@@ -101,7 +101,7 @@ def draw_pressure(ax: Any, series: Series, theory: Any, units: Mapping[str, str]
 
 
 def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
-    """Draw the pressure of a theory, if it has one, at equal approach and at equal force."""
+    """Draw the pressure of a theory at equal approach and at equal force, where it is defined."""
     curve_given = pressure_curve(theory)
     if curve_given is None:
         return
@@ -117,7 +117,7 @@ def _draw_theory(ax: Any, theory: Any, series: Series, x: Array) -> None:
 def draw_differences(
     ax: Any, all_series: Sequence[Series], best: Series, quantity: str, units: Mapping[str, str]
 ) -> None:
-    """Draw the difference from theory over h; it tends to the model error, and the remainder is mesh error."""
+    """Draw the difference from theory over h, which tends to the model error as the mesh error vanishes."""
     known = [(k, series) for k, series in enumerate(all_series) if series.split(quantity)]
     if not known:
         return message(ax, f"no theory of the {title(quantity)}, or no limit")

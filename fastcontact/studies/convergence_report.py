@@ -1,4 +1,4 @@
-"""A finished mesh-convergence study and its report: lines, table, dictionary, figure, page."""
+"""The result of a mesh-convergence study and its report as lines, table, dictionary, figure and page."""
 
 from __future__ import annotations
 
@@ -25,28 +25,28 @@ COMPARED = ("force", "pressure_max")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Study(Report):
-    """A finished mesh-convergence study; its case and units as in `Report`.
+    """The result of a mesh-convergence study, with the attributes of `Report` and the following.
 
     Attributes
     ----------
     series : list of Series
-        One for each combination of element and formulation that could be solved.
+        Results of each combination of element and contact formulation that was solved.
     failed : dict of str to str
-        Reason why a whole combination failed, by its name.
+        Reason of the failure of each combination that could not be solved, by its name.
     theory : object or None
-        The theory at equal approach, of `fastcontact.analytic`.
+        Theory at equal approach, an object of `fastcontact.analytic`; None if the case has none.
     """
 
     kind = "Mesh convergence"
     picture = "mesh errors over the mesh size, the pressure of all levels over theory, the difference from theory"
     explanations = (
-        "The limit is what the values tend to on ever finer meshes, from a fit of value = limit + C h^order; it lies within "
-        f"the error bar with a probability of {CONFIDENCE:.0%}. Orders from one level to the next are erratic, because the "
-        "edge of the contact cuts another facet each time: judge by the fitted order.",
-        "The mesh error is the finest mesh's difference from the limit; a finer mesh makes it smaller. The model error is "
-        "the limit's difference from theory; it stays on every mesh, because theory and model are about different bodies. "
-        "Both are relative to the theory and sum up to the whole difference.",
-        "Equal approach compares at the same displacement, equal force at the same contact force.",
+        "The limit is the value to which the results tend with mesh refinement, from a fit of value = limit + C h^order. It "
+        f"lies within the error bar with a probability of {CONFIDENCE:.0%}. Orders between two levels are erratic, because "
+        "the edge of the contact lies at another position within a facet on each mesh; the fitted order is more reliable.",
+        "The mesh error is the difference between the finest mesh and the limit and decreases with mesh refinement. The "
+        "model error is the difference between the limit and the theory; it does not depend on the mesh, because theory and "
+        "model describe different bodies. Both are relative to the theory, and their sum is the difference from theory.",
+        "A comparison at equal approach has the same displacement, and one at equal force the same contact force.",
     )
 
     series: list[Series]
@@ -55,18 +55,18 @@ class Study(Report):
 
     @property
     def best(self) -> Series:
-        """The combination that is usually the most accurate: quadratic quadrangles with a pressure field."""
+        """Results of the most accurate combination that was solved on all levels, by the rank of `Combination`."""
         complete = max(len(series.levels) for series in self.series)
         candidates = [series for series in self.series if len(series.levels) == complete]
         return max(candidates, key=lambda series: series.combination.rank)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them.
+        """Return the study as numbers, texts, lists and dictionaries, as ``--json`` writes it.
 
-        The top level contains the best combination (`best`), ``combinations`` contains all. Errors are relative to the
-        theory, or without one to the limit; ``mesh_error`` is that of the finest mesh, and ``model_error +
-        mesh_error`` its difference from theory. ``uncertainty`` is the half-width of the 95 % interval, in the unit of
-        the quantity.
+        The top level contains the results of the combination `best`, and ``combinations`` contains all combinations. Errors
+        are relative to the theory, or to the limit if there is no theory [-]. ``mesh_error`` is the error of the finest mesh,
+        and ``model_error + mesh_error`` is its difference from theory. ``uncertainty`` is the half-width of the 95 % interval
+        of the limit [unit of the quantity].
         """
         numbers = {
             "confidence": CONFIDENCE,
@@ -77,16 +77,16 @@ class Study(Report):
         return self.framed(numbers)
 
     def table(self) -> AnyArray:
-        """Return a structured array (n_rows,), one row a level of a combination, as ``--csv`` writes it.
+        """Return a structured array (n_rows,) with a row for each level of each combination, as ``--csv`` writes it.
 
-        Fields ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s], and for every
-        quantity its value in its unit, ``..._error`` [-] (relative to its limit), ``..._order`` [-] (from the previous
-        level) and, if there is a theory, ``..._from_theory`` [-] (relative to the theory).
+        The fields are ``element``, ``formulation``, ``level``, ``h`` [length], ``n_dofs``, ``seconds`` [s] and, for each
+        quantity, its value [unit of the quantity], ``..._error``, which is relative to the limit, ``..._order`` between the
+        previous level and this one, and ``..._from_theory``, the relative difference from a theory, if there is one [-].
         """
         return self.structured_known(tables.csv_columns(self.series))
 
     def tables(self) -> list[tuple[str, Rows]]:
-        """See `Report`: levels and limits of every combination, and a comparison of all combinations."""
+        """See `Report`; the tables contain levels and limits of each combination, and a comparison of all combinations."""
         captioned = []
         for series in self.series:
             captioned.append((str(series.combination), tables.level_rows(series, self.units)))
@@ -116,7 +116,7 @@ class Study(Report):
         return remarks + [f"{name} failed: {text}" for name, text in self.failed.items()]
 
     def figure(self) -> Any:
-        """Return a matplotlib figure: errors, pressure over the radius, differences from theory."""
+        """Return a Matplotlib figure with errors, the pressure over the radius, and differences from theory."""
         of_case = not isinstance(self.best.combination, Named)
         of_all: dict[str, Any] = {"all_series": self.series, "units": self.units}
         drawn: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **of_all) for name in self._drawn()]
@@ -131,6 +131,6 @@ class Study(Report):
         return axes[0, 0].figure
 
     def _drawn(self) -> list[str]:
-        """Return the quantities for which errors are drawn."""
+        """Return the quantities whose errors are drawn."""
         known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
         return known if isinstance(self.best.combination, Named) else list(COMPARED)

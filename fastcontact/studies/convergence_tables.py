@@ -1,4 +1,4 @@
-"""Tables of a mesh-convergence study: rows of text, columns for CSV, dictionaries for JSON."""
+"""Tables of a mesh-convergence study: rows of text, columns for CSV and dictionaries for JSON."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from fastcontact.studies.render.table import Rows, by_columns, number, percent
 from fastcontact.studies.sentences import sentences
 from fastcontact.studies.series import Series, Split
 
-# Quantities with columns in the tables of levels; the limits are given for all quantities.
+# Quantities in the tables of levels. The tables of limits contain all quantities.
 IN_TABLES = ("force", "pressure_max", "contact_radius", "von_mises_max")
 # Columns of limits.
 OF_LIMITS = ("limit", "+-", "order", "theory", "model error", "mesh error", "at equal force")
-# Mark after the error bar of a limit whose values do not settle.
+# Mark after the error bar of a limit to which the values do not converge.
 UNSETTLED = " (unsettled)"
 
 
 def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
-    """Return header and rows: h, DOF, and for each quantity its value, error against the limit and order between levels."""
+    """Return a header and a row for each level with h, DOF and, for each quantity, its value, error and order."""
     columns = [
         ("level", [str(level.number) for level in series.levels]),
         (labelled("h", units, "length"), [number(h, 4) for h in series.h]),
@@ -38,14 +38,14 @@ def level_rows(series: Series, units: Mapping[str, str]) -> Rows:
 
 
 def limit_rows(series: Series, units: Mapping[str, str]) -> Rows:
-    """Return header and rows: limit, order, theory and errors of every quantity with a limit."""
+    """Return a header and a row for each quantity with a limit: limit, order, theory and errors."""
     cells = [[column(title(name), name, units), *_cells(series, name, OF_LIMITS)] for name in series.limits]
     shown = [any(row[index] != "-" for row in cells) for index in range(len(OF_LIMITS) + 1)]
     return [list(itertools.compress(row, shown)) for row in (["quantity", *OF_LIMITS], *cells)]
 
 
 def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], units: Mapping[str, str]) -> Rows:
-    """Return header and a row for each combination: limits of the quantities, and their mesh and model errors."""
+    """Return a header and a row for each combination with the limits, mesh errors and model errors of the quantities."""
     header, shown = ["combination", "levels", "finest DOF"], []
     for name in quantities:
         header += [column(name, name, units), "+-", "order", "mesh error", "model error"]
@@ -60,7 +60,7 @@ def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], uni
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
-    """Return columns on the limit of a quantity as text; dashes if there is no limit."""
+    """Return the texts of some columns of limits for a quantity; dashes if it has no limit."""
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
         return ["-"] * len(columns)
@@ -80,7 +80,7 @@ def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
 
 
 def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
-    """Return the columns (n_rows,) of all levels by name; see `Study.table`."""
+    """Return the columns (n_rows,) of `Study.table` by name."""
     quantities = dict.fromkeys(name for series in all_series for name in series.quantities)
     columns: dict[str, list[Any]] = {}
     for series in all_series:
@@ -106,7 +106,7 @@ def csv_columns(all_series: Sequence[Series]) -> dict[str, list[Any]]:
 
 
 def series_dict(series: Series) -> dict[str, Any]:
-    """Return the data of one combination of element and formulation for JSON."""
+    """Return the results of a combination of element and formulation for JSON."""
     return {
         "element": series.combination.element,
         "formulation": series.combination.formulation,
@@ -123,13 +123,13 @@ def series_dict(series: Series) -> dict[str, Any]:
 
 
 def _fields(values: Limit | Split | None, **names: str) -> dict[str, Any]:
-    """Return fields by key; None for NaN, and for all without values."""
+    """Return fields of `values` by key; a field is None if it is NaN, and all fields are None if `values` is None."""
     fields = {key: getattr(values, name, None) for key, name in names.items()}
     return {key: finite(value) if isinstance(value, float) else value for key, value in fields.items()}
 
 
 def _quantity_dict(series: Series, name: str) -> dict[str, Any]:
-    """Return limit, order, theory and errors of a quantity; None for missing numbers."""
+    """Return limit, order, theory and errors of a quantity, with None for missing numbers."""
     limit, split, reference = series.limits.get(name), series.split(name), series.reference.get(name)
     entry: dict[str, Any] = {
         **_fields(

@@ -1,4 +1,4 @@
-"""Execution of runs in processes or by any executor, with a store of finished runs."""
+"""Execution of runs in local processes or by any executor, with a store of finished runs."""
 
 from __future__ import annotations
 
@@ -27,28 +27,30 @@ from fastcontact.studies.job import Run, run
 from fastcontact.studies.progress import reporting
 
 Result = dict[str, Any]
-# NumPy and Numba read these when they are imported, so they are set before a worker process starts.
+# NumPy and Numba read these variables when they are imported, so they must be set before a worker process starts.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 @dataclass(frozen=True)
 class Progress:
-    """Argument of `on_progress`, which is called after every run.
+    """Argument of `on_progress`, which is called after each run.
 
     Attributes
     ----------
     label : str
-        Label of the run that has just finished.
-    done, total : int
-        Number of finished runs, and of all runs.
+        Label of the run that has finished.
+    done : int
+        Number of finished runs.
+    total : int
+        Number of runs.
     left : tuple of str
         Labels of the remaining runs.
     seconds : float
-        Duration of the run [s]; 0 if its result came from the store.
+        Wall time of the run [s]; 0 if its result is from the store.
     error : str
-        Reason of a failure; empty if there was none.
+        Reason of the failure of the run; empty if it succeeded.
     stored : bool
-        Whether the result came from the store.
+        Whether the result is from the store.
     """
 
     label: str
@@ -70,7 +72,7 @@ def run_all(
 ) -> list[Result]:
     """Run jobs in parallel and return their results in the order of the jobs; options as in `convergence_study`.
 
-    Raises CaseError if the number of workers is wrong, FastcontactError if no worker process can start.
+    Raises CaseError if the number of workers is invalid, and FastcontactError if no worker process can start.
     """
     kept = None if store is None else Store(store)
     results = {i: stored_result for i, job in enumerate(jobs) if kept and (stored_result := kept.get(job)) is not None}
@@ -96,7 +98,10 @@ def run_all(
 def run_study(
     jobs: Sequence[Run], name: str, *, on_progress: Callable[[Progress], None] | None, progress: bool, **options: Any
 ) -> list[Result]:
-    """Return the results of `run_all`, with a status line if `progress`; if all fail, raise the first error after `name`."""
+    """Return the results of `run_all`, with a status line if `progress` is true.
+
+    If all runs fail, the first error is raised again with `name` before its message.
+    """
     with reporting(on_progress, progress) as report:
         results = run_all(jobs, on_progress=report, **options)
     if all("error" in result for result in results):
@@ -106,7 +111,10 @@ def run_study(
 
 
 class Store:
-    """A folder of finished runs, one JSON file each, named by the keys of their jobs; created if missing."""
+    """A folder with a JSON file for each finished run, named by the key of its job.
+
+    The folder is created if it does not exist; FileError if this fails.
+    """
 
     def __init__(self, folder: str | Path) -> None:
         self.folder = Path(folder)
@@ -116,7 +124,7 @@ class Store:
             raise FileError(f"the folder '{folder}' cannot be made: {error.strerror}; name another store") from error
 
     def path(self, job: Run) -> Path:
-        """Return the file for the result of a run."""
+        """Return the path of the file for the result of a run."""
         return self.folder / f"{job.key}.json"
 
     def get(self, job: Run) -> Result | None:
@@ -151,7 +159,10 @@ def _run_rest(
 
 
 def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run in `count` processes of this machine; a run that kills its worker is retried once on its own, then reported."""
+    """Run jobs in `count` local processes; yield the index and the result of each job as it ends.
+
+    After the death of a worker process, each remaining job runs again in a process of its own.
+    """
     if _imports_its_script():
         # The script calls the study outside "if __name__ == '__main__'"; the parent process reports the error.
         raise SystemExit(1)
@@ -167,16 +178,16 @@ def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[t
 
 
 class Worker(SpawnProcess):
-    """A process with an uninterruptible start: a partly started one would print that its input ended."""
+    """A process whose start cannot be interrupted, since a partly started process would print an error."""
 
     def start(self) -> None:
-        """Start the process, with signals blocked meanwhile."""
+        """Start the process, with signals deferred until it is started."""
         with uninterrupted():
             super().start()
 
 
 class Spawning(SpawnContext):
-    """Context that spawns processes and keeps a list of them."""
+    """A context that spawns processes and keeps a list of them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -189,7 +200,7 @@ class Spawning(SpawnContext):
 
 
 class Workers(ProcessPoolExecutor):
-    """A pool of processes that can be ended during their work, and that end with this process."""
+    """A pool of processes that can be terminated during their work and that end with this process."""
 
     def __init__(self, count: int) -> None:
         self.context = Spawning()
@@ -197,16 +208,16 @@ class Workers(ProcessPoolExecutor):
         super().__init__(count, self.context, initializer=end_with_parent, initargs=(heard,))
 
     def end(self) -> None:
-        """End the processes now; otherwise Python would wait for their current work before it exits."""
+        """Terminate the processes; otherwise Python would wait for their current work before it exits."""
         self.line.close()
         for process in self.context.processes:
-            if process.is_alive():  # also while it imports the modules needed to read from the pipe
+            if process.is_alive():  # a process that is still importing does not read from the pipe
                 process.terminate()
 
 
 @contextlib.contextmanager
 def started_pool(count: int) -> Iterator[Workers]:
-    """Yield a pool of processes once one of them has answered; an error in the block ends them during their work.
+    """Yield a pool of processes after one of them has answered; an error in the block terminates the processes.
 
     Raises FastcontactError if no process can start.
     """
@@ -232,9 +243,9 @@ def started_pool(count: int) -> Iterator[Workers]:
 
 
 def _imports_its_script() -> bool:
-    """Return whether this process is a worker that is still importing the script of its parent process."""
+    """Return whether this process is a worker that is importing the script of its parent process."""
     script = sys.modules.get("__mp_main__")
-    return script not in (None, sys.modules["__main__"])  # the script becomes __main__ once it is imported
+    return script not in (None, sys.modules["__main__"])  # after its import, the script is __main__
 
 
 def _alone(job: Run) -> Result:
@@ -254,18 +265,21 @@ def _processors() -> int:
 
 
 def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
-    """Run on any executor; yield index and result of each job as it ends. If one raises, the others are cancelled."""
+    """Run jobs on any executor; yield the index and the result of each job as it ends.
+
+    If a job raises an exception, the other jobs are cancelled.
+    """
     futures: dict[Future[Result], int] = {}
     try:
         # Threads share the environment of this process, which must not change while they compile.
         with contextlib.nullcontext() if isinstance(executor, ThreadPoolExecutor) else _worker_settings():
-            # The largest jobs come first, so that no long one runs alone at the end.
+            # The largest jobs start first, so that no long job runs alone at the end.
             for index in sorted(rest, key=lambda index: -jobs[index].size):
                 futures[executor.submit(run, jobs[index], 1)] = index
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BaseException as error:
-        # A broken or ended pool fails on cancelled futures: it notifies the waiting threads itself.
+        # A broken or ended pool notifies waiting threads itself and fails for cancelled futures.
         if not isinstance(executor, Workers) and not isinstance(error, BrokenExecutor):
             for future in futures:
                 future.cancel()
@@ -273,7 +287,7 @@ def on_executor(executor: Executor, jobs: Sequence[Run], rest: list[int]) -> Ite
 
 
 def end_with_parent(line: Connection) -> None:
-    """Let this process end as soon as its parent has ended, for whatever reason, or closes its end of the pipe `line`."""
+    """Let this process end as soon as its parent process ends or closes its end of the pipe `line`."""
     parent = multiprocessing.parent_process()
 
     def wait() -> None:
@@ -288,7 +302,7 @@ def end_with_parent(line: Connection) -> None:
 def _worker_settings() -> Iterator[None]:
     """Let processes started in the block use one thread each and ignore Ctrl-C, which this process handles.
 
-    A terminal sends Ctrl-C to all of them, and each would print a traceback.
+    A terminal sends Ctrl-C to all processes, and each would print a traceback.
     """
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))

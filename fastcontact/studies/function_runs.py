@@ -1,4 +1,4 @@
-"""Runs of studies of Python models: a function returns the model for a size or parameters, others measure its last step."""
+"""Runs of studies of Python functions, which return a model or its steps, with functions that evaluate quantities."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fastcontact.studies import quantities
 from fastcontact.studies.execute import run_study
 from fastcontact.studies.job import Run
 
-# Functions of the last step, or of the list of all steps if their argument is named `STEPS`.
+# A function of the last step, or of the list of all steps if its argument is named `STEPS`.
 Measure = Callable[..., float]
 # Names of quantities, or functions by the name of their quantity.
 Quantities = Sequence[str] | Mapping[str, Measure]
@@ -32,12 +32,12 @@ Function = Callable[..., Any]
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FunctionRun(Run):
-    """A call of a function that returns a model or solves one."""
+    """A run that calls a function which returns a model or the steps of its solution."""
 
     function: Function
-    positional: tuple[Any, ...]  # arguments
-    named: Mapping[str, Any]
-    measures: Mapping[str, Measure]  # further quantities
+    positional: tuple[Any, ...]  # positional arguments
+    named: Mapping[str, Any]  # keyword arguments
+    measures: Mapping[str, Measure]  # functions of additional quantities, by name
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
@@ -48,7 +48,7 @@ class FunctionRun(Run):
         return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
 
     def _result(self) -> Any:
-        """Return the value of the function; raises CaseError with the line that failed."""
+        """Return the result of the function; CaseError with the line of the error if it fails."""
         try:
             return self.function(*self.positional, **self.named)
         except FastcontactError:
@@ -60,7 +60,10 @@ class FunctionRun(Run):
 
 
 def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
-    """Return the steps that a function has returned, or the case and the steps of the model that it has returned."""
+    """Return the case and the steps of a model that a function has returned, or None and the steps that it has returned.
+
+    Raises CaseError if it has returned something else.
+    """
     if isinstance(made, Model):
         case = Case(name, name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
         return case, solve(made, case.ramp)
@@ -74,7 +77,7 @@ def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
 
 
 def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
-    """Return the value of a quantity defined by the caller."""
+    """Return the value of a quantity that a function of the caller evaluates; CaseError if the function fails."""
     try:
         return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
     except Exception as error:
@@ -91,7 +94,7 @@ def function_name(function: Function) -> str:
 
 
 def first_parameter(function: Function) -> str:
-    """Return the name of the first argument of a function."""
+    """Return the name of the first argument of a function, or ``"value"`` if it is unknown."""
     try:
         return next(iter(inspect.signature(function).parameters), "value")
     except (TypeError, ValueError):  # compiled functions have no signature
@@ -99,9 +102,9 @@ def first_parameter(function: Function) -> str:
 
 
 def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """Return the fields of a `Report` on a function; its text is its source if Python has it.
+    """Return the fields of a `Report` on a function.
 
-    Units are those of the models in the `results`.
+    The text is the source of the function if Python knows it, and the units are those of the models in the `results`.
     """
     try:
         text = inspect.getsource(function)
@@ -113,7 +116,7 @@ def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[s
 
 
 def measures_of(wanted: Quantities) -> dict[str, Measure]:
-    """Return the functions among the quantities; raises CaseError for a name that no run of a function can have."""
+    """Return the quantities that are given as functions; CaseError for the name of a quantity that is not known."""
     if isinstance(wanted, Mapping):
         return dict(wanted)
     for name in wanted:
@@ -126,7 +129,7 @@ def measures_of(wanted: Quantities) -> dict[str, Measure]:
 
 
 def refuse(of_cases: Mapping[str, Any]) -> None:
-    """Raise CaseError if an option is given that only studies of case files have."""
+    """Raise CaseError if an option that only studies of case files have is given."""
     for name, value in of_cases.items():
         if value is not None:
             raise CaseError(
@@ -137,14 +140,14 @@ def refuse(of_cases: Mapping[str, Any]) -> None:
 def run_functions(
     runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
 ) -> list[dict[str, Any]]:
-    """Return the results of `run_study`, by default computed sequentially in this process."""
+    """Return the results of `run_study`; by default the runs are sequential in this process."""
     if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
         _check_sendable(runs[0])
     return run_study(runs, name, executor=executor, workers=workers or 1, **options)
 
 
 def _check_sendable(run: FunctionRun) -> None:
-    """Raise CaseError for a function that cannot be sent to another process, or not be found there."""
+    """Raise CaseError if a function cannot be sent to another process or cannot be imported there."""
     try:
         if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):
             inspect.getfile(sys.modules["__main__"])  # TypeError without a file, as in notebooks

@@ -1,4 +1,4 @@
-"""One run of a study: plain data in, plain data out, so that any process on any machine can execute it."""
+"""A run of a study, whose input and output are plain data, so that a process on any machine can execute it."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ from fastcontact.studies import quantities
 from fastcontact.studies.levels import Recipe, make_mesh, recipe
 from fastcontact.studies.settings import Combination, Settings
 
-# Keys of contact pairs and obstacles that are independent of the formulation.
+# Keys of contact pairs and obstacles that do not depend on the formulation.
 KEYS = {
     *("secondary", "primary", "formulation", "friction", "shape", "motion", "force", "rotation", "ramp"),
     *("file", "group", "flip", "crease"),
 }
-# Version number, raised when the measured numbers or their form in a store change.
+# Version of the results in a store, incremented when the quantities or their form change.
 SCHEMA = 3
 
 
@@ -50,15 +50,15 @@ class Run:
 
     label: str  # for messages
     name: str  # name of the case or of the model function
-    marks: dict[str, Any]  # distinguish this run from the others of its study, e.g. its level
-    size: float = 0.0  # amount of work, in any unit that the runs of a study share
+    marks: dict[str, Any]  # values that distinguish the runs of a study, for example the level
+    size: float = 0.0  # amount of work, in a common unit of the runs of a study
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
-        """Return the case of this run, if known, and its steps, or only the last of them."""
+        """Return the case of this run, if it is known, and all steps or only the last step."""
         raise NotImplementedError
 
     def measured(self) -> dict[str, Any]:
-        """Return the result of `run`; raises where the mesh, the model or the solution fails."""
+        """Return the result of `run`; errors of the mesh, the model and the solution are raised."""
         started = time.perf_counter()
         with recorded() as texts:
             case, steps = self.solved()
@@ -79,16 +79,16 @@ class Run:
         }
 
     def pair_of(self, last: StepResult) -> str | None:
-        """Return the contact pair to measure, by default the first one."""
+        """Return the name of the contact pair to evaluate, by default the first one; None if there is none."""
         return next(iter(last.contact), None)
 
     def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
-        """Return further quantities of the steps."""
+        """Return additional quantities of the steps."""
         return {}
 
     @property
     def key(self) -> str:
-        """Name of the run in a store: a hash of all inputs of its numbers; raises CaseError if these are unknown."""
+        """Name of the run in a store, a hash of all its inputs; CaseError if the inputs are unknown."""
         raise CaseError(
             "a store keeps runs of case files, whose text tells what they do: of a function leave 'store' out"
         )
@@ -96,17 +96,17 @@ class Run:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Job(Run):
-    """Data of the run of a case."""
+    """A run of a case."""
 
-    data: dict[str, Any]  # the parsed case file with all values of this run
-    pair: str | None  # contact pair to measure
+    data: dict[str, Any]  # parsed case file with the values of this run
+    pair: str | None  # contact pair to evaluate
     recipe: Recipe  # recipe of the mesh
-    base: Mesh | None  # the mesh of the case, if read from a file
-    folder: Path = Path()  # folder of the files that the case names
+    base: Mesh | None  # mesh of the case, if it is read from a file
+    folder: Path = Path()  # folder to which file names in the case are relative
 
-    @cached_property  # files are hashed as they are at the start of a study
+    @cached_property  # hash of the files at the begin of a study
     def key(self) -> str:
-        """Hash of all inputs of the numbers: the case, its mesh, the contents of the files it names, the version."""
+        """Hash of all inputs of the run: the case, its mesh, the contents of the files in the case, and the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}
         inputs = {"version": __version__, "schema": SCHEMA, "data": data, "pair": self.pair, "recipe": self.recipe}
         inputs["files"] = digest(files_named({key: data[key] for key in data if key != "mesh"}, self.folder))
@@ -125,7 +125,7 @@ class Job(Run):
 
 @contextlib.contextmanager
 def recorded() -> Iterator[list[str]]:
-    """Yield a list that holds, after the block, the texts of the package's warnings raised in it."""
+    """Yield a list that contains, after the block, the texts of the warnings of the package in the block."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)
@@ -146,9 +146,9 @@ def job_of(
 
 
 def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
-    """Return the case data with another formulation, and with the options and number of load steps of the study.
+    """Return the data of the case with the formulation of a combination and with the options and load steps of the study.
 
-    Options that another formulation does not have are dropped.
+    Options that the formulation does not have are removed.
     """
     data = copy.deepcopy({key: value for key, value in settings.data.items() if key != "study"})
     formulation, pairs = combination.formulation, data.get("contact", {})
@@ -163,7 +163,7 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
 
 
 def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name: str) -> None:
-    """Replace the formulation in the table of a contact pair or obstacle `name`."""
+    """Replace the formulation `name` in the table of a contact pair or an obstacle by another formulation."""
     if formulation != name:
         known = {f.name for f in dataclasses.fields(FORMULATIONS[formulation])} | KEYS | set(SHARED_OPTIONS)
         for key in [key for key in entry if key not in known]:
@@ -173,7 +173,7 @@ def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name:
 
 
 def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
-    """Return a ramp of equal steps with the same end."""
+    """Return a ramp with the same end and `steps` equal steps."""
     if "instants" not in ramp:
         return {**ramp, "steps": steps}
     last = ramp["instants"][-1]
@@ -181,11 +181,12 @@ def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
 
 
 def run(job: Run, threads: int | None = None) -> dict[str, Any]:
-    """Solve a case and measure its quantities; an error is not raised but returned under the key ``"error"``.
+    """Execute a run and return its results; an error is not raised but returned under the key ``"error"``.
 
-    `threads` is the number of threads of the parallel kernels in this process. The result holds ``h`` [length], ``n_dofs``,
-    ``seconds`` [s], ``iterations``, ``warnings``, ``profile``, and by quantity ``values``, ``theory``, ``reference`` and
-    ``equal_force``; or ``error`` and ``kind`` (name of the exception).
+    `threads` is the number of threads of the parallel kernels in this process. The result contains ``h`` [length],
+    ``n_dofs``, ``seconds`` [s], ``iterations``, ``warnings``, ``profile``, ``units`` and, by quantity, ``values``,
+    ``theory``, ``reference`` and ``equal_force``. After an error it contains ``error`` and ``kind``, the name of the
+    exception.
     """
     try:
         if threads is not None:
@@ -194,7 +195,7 @@ def run(job: Run, threads: int | None = None) -> dict[str, Any]:
     except FastcontactError as error:
         return {"error": str(error), "kind": type(error).__name__}
     except Exception as error:
-        # A failed run must not end the whole study.
+        # The failure of a run must not end the study.
         where = traceback.extract_tb(error.__traceback__)[-1]
         return {"error": f"{error} ({where.name}, line {where.lineno})", "kind": type(error).__name__}
 
@@ -206,12 +207,12 @@ def fields_of(kind: type, result: dict[str, Any]) -> dict[str, Any]:
 
 
 def last_step(case: Case) -> StepResult:
-    """Solve a case and return its last step; no earlier one is kept in memory."""
+    """Solve a case and return its last step; earlier steps are not kept in memory."""
     return deque(solve_steps(case.model, case.ramp, **case.solution), maxlen=1).pop()
 
 
 def profile(last: StepResult, pair: str | None) -> dict[str, list[float]]:
-    """Return ``r`` and ``pressure`` along the contact of a plane or axisymmetric model; empty without contact."""
+    """Return ``r`` [length] and ``pressure`` [pressure] along the contact of a 2D model; empty for other models."""
     if pair is None or last.displacement.shape[1] != 2:
         return {}
     contact = last.contact[pair]

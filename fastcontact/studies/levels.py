@@ -1,4 +1,4 @@
-"""Meshes of a study by level: a recipe of plain data, and the mesh made from it."""
+"""Meshes of a study by level: recipes, which are plain data, and the meshes made from them."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ Recipe = dict[str, Any]
 
 @dataclass(frozen=True)
 class Rule:
-    """Rule for the change of generator arguments from one level to the next."""
+    """Rule by which the arguments of a generator change from one level to the next."""
 
-    defaults: Arguments = field(default_factory=dict)  # values of arguments to change that the case does not give
-    halve: tuple[str, ...] = ()
-    double: tuple[str, ...] = ()
-    root: tuple[str, ...] = ()  # ratios of neighbouring edges: their square roots are taken
+    defaults: Arguments = field(default_factory=dict)  # values of arguments that the case does not give
+    halve: tuple[str, ...] = ()  # arguments that are halved
+    double: tuple[str, ...] = ()  # arguments that are doubled
+    root: tuple[str, ...] = ()  # ratios of neighbouring edges, which are replaced by their square roots
 
 
 def _spheres(element: str, arguments: Mapping[str, Any]) -> Rule:
@@ -43,7 +43,7 @@ def _cylinder(element: str, arguments: Mapping[str, Any]) -> Rule:
 def _ball(element: str, arguments: Mapping[str, Any]) -> Rule:
     R = float(arguments.get("R", 50.0))
     coarse = float(arguments.get("size", R / 4))
-    # Along a graded line the edges grow by `growth` times the distance, irrespective of their lengths.
+    # Along a graded line, the length of the edges grows by `growth` times the distance, independently of the smallest edge.
     return Rule({"size": coarse, "contact_size": min(R / 50, coarse)}, ("size", "contact_size", "growth"))
 
 
@@ -75,9 +75,9 @@ RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
 
 
 def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
-    """Return the recipe of the mesh of a level: plain data, equal for equal meshes.
+    """Return the recipe of the mesh of a level; equal recipes give equal meshes.
 
-    Raises CaseError if the element cannot be made from the case's mesh, or the generator's arguments are unknown.
+    Raises CaseError if the element cannot be made from the mesh of the case, or an argument of the generator is unknown.
     """
     if element is not None and not makeable(settings, element):
         raise CaseError(_not_makeable(settings, element))
@@ -86,17 +86,17 @@ def recipe(settings: Settings, element: str | None, level: int) -> Recipe:
         return {"refinements": level, "element": element, "curves": curves}
     element = element or str(_default_element(settings.generator))
     shape = shape_of(element)
-    # If level 0 is given by shape, it is for quadratic cells; linear cells use the same nodes.
+    # Arguments of level 0 by shape are for quadratic cells. Linear cells have half their size and so the same nodes.
     finer = level + int(settings.by_shape and elements.get(element).order == 1)
     level_0 = settings.arguments.get(shape, settings.arguments.get("", {}))
-    # A new free triangulation has another pattern, which changes the largest pressure at random: refine instead.
+    # Triangles are refined, because the pattern of a new free triangulation would change the largest pressure at random.
     halvings, refinements = (0, finer) if shape == "triangles" else (finer, 0)
     arguments = _finer(settings, element, level_0, halvings)
     return {"generator": settings.generator, "arguments": arguments, "refinements": refinements}
 
 
 def _default_element(generator: str) -> Any:
-    """Return the default element of a generator; tri3 for an unknown generator."""
+    """Return the default element of a generator, or tri3 if the generator is unknown."""
     maker = generate.GENERATORS.get(generator)
     return inspect.signature(maker).parameters["element"].default if maker is not None else "tri3"
 
@@ -113,14 +113,17 @@ def _not_makeable(settings: Settings, element: str) -> str:
 
 
 def _finer(settings: Settings, element: str, level_0: Mapping[str, Any], level: int) -> Arguments:
-    """Return generator arguments with sizes halved and counts doubled `level` times."""
+    """Return the arguments of the generator with sizes halved and counts doubled `level` times.
+
+    Raises CaseError if an argument is unknown, or if it is not known which arguments make the mesh finer.
+    """
     name = str(settings.generator)
     check_known("study.generator", name, generate.GENERATORS, CaseError)
     signature = inspect.signature(generate.GENERATORS[name]).parameters
     for key in (*level_0, *settings.halve, *settings.double):
         check_known(f"argument of the generator {name} in [study]", key, signature, CaseError)
     rule = RULES[name](element, level_0) if name in RULES else Rule()
-    own_rule = bool(settings.halve or settings.double)  # then the ratios of the rule may not apply
+    own_rule = bool(settings.halve or settings.double)  # the ratios of the rule may not apply
     halve, double = settings.halve or rule.halve, settings.double or rule.double
     if not (halve or double):
         raise CaseError(
@@ -143,7 +146,7 @@ def _scaled(value: Any, factor: float) -> Any:
 
 
 def make_mesh(recipe: Recipe, base: Mesh | None) -> Mesh:
-    """Return the mesh of a recipe; without a generator, the loaded mesh `base` is refined."""
+    """Return the mesh of a recipe; a recipe without a generator refines the mesh `base`."""
     if "generator" in recipe:
         arguments = {key: tuple(v) if isinstance(v, list) else v for key, v in recipe["arguments"].items()}
         mesh = generate.GENERATORS[recipe["generator"]](**arguments)

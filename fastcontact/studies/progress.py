@@ -1,4 +1,4 @@
-"""Progress of studies on a terminal or in a notebook: one line, redrawn after every run or mesh."""
+"""Progress of studies on a terminal or in a notebook, as a line that is redrawn after each run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fastcontact.analysis.progress import StatusLine
 
 
 class Runs(StatusLine):
-    """Status line of the runs of a study: the last one, the number left, and the time left."""
+    """Status line of a study with the last run, the number of remaining runs, and the remaining time."""
 
     def __init__(self, show: bool) -> None:
         super().__init__(100, show)
@@ -22,7 +22,7 @@ class Runs(StatusLine):
         return super().__enter__()
 
     def __call__(self, progress: Any) -> None:
-        """Redraw after a run; `progress` is a `fastcontact.studies.execute.Progress`."""
+        """Redraw the line after a run; `progress` is a `fastcontact.studies.execute.Progress`."""
         self._stored += progress.stored
         solved = progress.done - self._stored
         outcome = "failed" if progress.error else "found in the store" if progress.stored else "done"
@@ -33,7 +33,7 @@ class Runs(StatusLine):
 
 @contextlib.contextmanager
 def reporting(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
-    """Yield the function to call after every run; it calls that of the user and redraws a line if `show`."""
+    """Yield a function to call after each run, which calls `on_progress` and, if `show` is true, redraws a status line."""
     with Runs(show) as line:
 
         def ended(progress: Any) -> None:

@@ -1,4 +1,4 @@
-"""Quantities of interest: values from the last step of a run and from a theory, titles and units."""
+"""Quantities of interest: their values in the last step of a run and in a theory, their titles and units."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from fastcontact.mesh.topology import bodies
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.units import labelled
 
-# Theories that are exact for the modelled bodies, not for half-spaces or beams in their place.
+# Theories that are exact for the bodies of the model, unlike theories of half-spaces or beams.
 EXACT_THEORIES = (PressFit, HertzBox)
-# Title and kind of unit (empty for ratios) of the standard quantities, which every study shows if they are known.
+# Title and kind of unit, empty for ratios, of the standard quantities, which studies show if they are known.
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),
@@ -39,7 +39,7 @@ LABELS = {
 
 
 def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
-    """Return all quantities of interest of a solved case, in the case's units; without a `pair` none of contact."""
+    """Return the quantities of interest of a solved case [units of the case]; those of contact only if `pair` is given."""
     values_measured = {} if pair is None else _of_contact(case, last.contact[pair], pair)
     values_measured["von_mises_max"], where = peak(case.mesh, last.von_mises, case.model.kinematics == "axisymmetric")
     if pair is not None:
@@ -51,19 +51,22 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
-    """Raise CaseError for a quantity that no run of the case can have, see `measure`."""
+    """Raise CaseError if a name is not one of a quantity of the case that `measure` may return."""
     of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
     for name in names:
         check_known("quantity", name, [*LABELS, *of_probes], CaseError)
 
 
 def _kinds(case: Case) -> list[str]:
-    """Return the quantities available at every probe of a case."""
+    """Return the quantities that probes of a case have."""
     return [kind for kind in OF_PROBES if kind != "shear" and (case.mesh.dim == 3 or kind not in ONLY_IN_SPACE)]
 
 
 def of_contacts(last: StepResult) -> dict[str, float]:
-    """Return the quantities of the first contact pair of a step that need no model; not finite without contact."""
+    """Return the quantities of the first contact pair of a step that do not depend on a model.
+
+    They may be NaN if the pair is open, and the dictionary is empty if there is no pair.
+    """
     contact = next(iter(last.contact.values()), None)
     return {} if contact is None else _of_pressure(contact)
 
@@ -98,12 +101,13 @@ def secondary(case: Case, pair: str) -> Surface:
 
 
 def contact_radius(contact: ContactResult) -> float:
-    """Return the distance from the middle at which the pressure vanishes [length]; NaN without contact.
+    """Return the distance from the contact centre at which the pressure vanishes [length]; NaN if the contact is open.
 
-    Near the edge of a smooth contact the square of the pressure is linear in the square of the distance (Hertz: over
-    the whole contact). A line is fitted through the closed nodes beyond 0.4 of the radius, without the last two, where the
-    edge cuts through a facet; its zero is the radius, limited to the bracket of the outermost closed and the first open
-    node. Where the pressure does not fall towards the edge (a punch), the radius is the end of the bracket.
+    Near the edge of a smooth contact, the square of the pressure is linear in the square of the distance; in Hertzian
+    contact it is linear everywhere. A line is fitted to the closed nodes beyond 0.4 of the radius, except for the last two,
+    where the edge divides a facet. The radius is the zero of this line, limited to the bracket between the outermost closed
+    node and the first open node. If the pressure does not decrease towards the edge, as below a punch, the radius is the
+    upper bound of the bracket. With fewer than three such nodes, it is the midpoint of the bracket.
     """
     inside, outside = contact.radius
     if not np.isfinite(inside):
@@ -122,7 +126,10 @@ def contact_radius(contact: ContactResult) -> float:
 
 
 def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: Any) -> float:
-    """Return the L2 norm of pressure minus theory over the secondary reference surface, relative to the theory's."""
+    """Return the relative error of the pressure in the L2 norm over the undeformed secondary surface [-].
+
+    The error is relative to the L2 norm of the theory; it is NaN if this norm is zero.
+    """
     curve = pressure_curve(theory)
     assert curve is not None
     xi, weights = quadrature.gauss_line(6)
@@ -138,11 +145,12 @@ def pressure_error(case: Case, side: Surface, contact: ContactResult, theory: An
 
 
 def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
-    """Return the largest value of a nodal field (n_points,), and its position (dim,) between the nodes [length].
+    """Return the maximum of a nodal field (n_points,), interpolated between nodes, and its position (dim,) [length].
 
-    On the axis, a polynomial is fitted to the nodes along it that reach 97 % of the largest value, if there are enough of
-    them. Otherwise a quadratic function is fitted to the nodes around the largest one (on the axis: even in the radius); the
-    result is its vertex if that is a maximum within the ring of these nodes, otherwise the node.
+    On the axis, a quartic is fitted to the nodes of the axis with at least 97 % of the largest value, if there are at least
+    eight. Otherwise, in 2D, a quadratic function, which on the axis is even in the radius, is fitted to the nodes around the
+    node with the largest value. The result is the vertex of this function if it is a maximum close to these nodes, and
+    otherwise the node.
     """
     top = int(np.argmax(values))
     on_axis = axisymmetric and abs(mesh.points[top, 0]) <= 1e-9 * np.abs(mesh.points).max()
@@ -159,7 +167,10 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
 
 
 def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | None:
-    """Return the maximum of a quartic fitted to the axis nodes near `top` in its body; None with fewer than eight nodes."""
+    """Return the maximum of a quartic fitted to nodes of the axis near node `top`, in the body of the node.
+
+    The result is None if there are fewer than eight nodes, if they end next to `top`, or if the quartic has no maximum.
+    """
     line = np.flatnonzero(np.abs(mesh.points[:, 0]) <= 1e-9 * np.abs(mesh.points).max())
     _, body = bodies(mesh)
     line = line[body[line] == body[top]]
@@ -197,7 +208,7 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
     c = np.append(c, np.zeros(6 - len(c)))
     hessian = np.array([[2 * c[3], c[5]], [c[5], 2 * c[2]]])
     if on_axis:
-        hessian[0, 0] = -1.0  # for any radial curvature the vertex is on the axis
+        hessian[0, 0] = -1.0  # the vertex is on the axis for any radial curvature
     if not (np.linalg.eigvalsh(hessian) < 0).all():
         return None
     vertex = np.linalg.solve(hessian, -np.array([c[4], c[1]]))
@@ -208,14 +219,14 @@ def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:
 
 
 def _depth(case: Case, pair: str, where: Array) -> float:
-    """Return the distance of a position from the nearer side of a contact pair."""
+    """Return the distance between a position and the nearest node of a contact pair [length]."""
     sides = next((p.secondary, *filter(None, [p.primary])) for p in case.model.contact if p.name == pair)
     nodes = np.concatenate([case.mesh.points[case.mesh.points_of(side)] for side in sides])
     return float(np.linalg.norm(nodes - where, axis=1).min())
 
 
 def mesh_size(case: Case, pair: str | None) -> float:
-    """Return the length of the shortest facet of the secondary surface, without contact that of the shortest edge."""
+    """Return the shortest edge of the facets of the secondary surface, or of the mesh if there is no contact [length]."""
     if pair is None:
         return quality(case.mesh).shortest_edge
     shortest = np.inf
@@ -228,7 +239,7 @@ def mesh_size(case: Case, pair: str | None) -> float:
 
 
 def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
-    """Return the quantities of interest of a theory, in its units; the model carries a `share` of its force."""
+    """Return the quantities of interest of a theory [its units]; `share` is the modelled fraction of its force [-]."""
     names = {"force": "force", "pressure_max": "pressure_max", "contact_radius": "radius"}
     quantities = {key: float(getattr(theory, name)) for key, name in names.items() if hasattr(theory, name)}
     if "force" in quantities:
@@ -243,10 +254,10 @@ def of_theory(theory: Any, share: float = 1.0) -> dict[str, float]:
 
 
 def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, dict[str, float]]:
-    """Return the quantities of a pair from its theory at equal approach and at equal force and its mesh-converged solution.
+    """Return the quantities of a pair in its theory and in its mesh-converged solution.
 
-    The keys are ``theory``, ``reference`` and ``equal_force``; `force` is that of the contact [force]. Without a case the
-    result is empty.
+    The keys are ``theory`` for the theory at equal approach, ``reference`` for the mesh-converged solution and
+    ``equal_force`` for the theory at the contact force `force` [force]. Their values are empty if there is no case.
     """
     theories = {} if case is None else case.theories.get(pair or "", {})
     theory: Any = theories.get("theory")
@@ -260,23 +271,23 @@ def by_theory(case: Case | None, pair: str | None, force: float) -> dict[str, di
 
 
 def title(quantity: str) -> str:
-    """Return a quantity in words; ``"C1.stress.yy"`` and the like stay as they are."""
+    """Return the title of a quantity; names such as ``"C1.stress.yy"`` are returned unchanged."""
     return LABELS[quantity][0] if quantity in LABELS else quantity
 
 
 def unit(quantity: str, units: Mapping[str, str]) -> str:
-    """Return the name of a quantity's unit; empty for ratios and if it is unknown."""
+    """Return the name of the unit of a quantity; empty for ratios and if the unit is unknown."""
     return units.get(_kind(quantity) or "", "")
 
 
 def _kind(quantity: str) -> str | None:
-    """Return the kind of a quantity: length, force, pressure; empty for ratios, None if defined by the caller."""
+    """Return the kind of unit of a quantity: length, force or pressure, empty for ratios, and None if it is unknown."""
     if quantity in LABELS:
         return LABELS[quantity][1]
     return None if "." not in quantity else "length" if ".displacement." in quantity else "pressure"
 
 
 def column(label: str, quantity: str, units: Mapping[str, str]) -> str:
-    """Return the header of a column or axis: a label and, if known, the unit of its quantity, ``[1]`` for ratios."""
+    """Return the header of a column or an axis: a label with the unit of the quantity, if known, and ``[1]`` for ratios."""
     kind = _kind(quantity)
     return f"{label} [1]" if kind == "" else labelled(label, units, kind or "")

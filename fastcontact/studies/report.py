@@ -1,4 +1,4 @@
-"""Base of the reports of all studies: the case, and the layout of tables and sentences for terminals, pages and notebooks."""
+"""Base class of the reports of studies, with their layout for terminals, HTML pages and notebooks."""
 
 from __future__ import annotations
 
@@ -29,19 +29,24 @@ def of_case(case: Case) -> dict[str, Any]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Report:
-    """A finished study of a case or a function.
+    """The result of a study of a case or a function.
 
     Attributes
     ----------
-    kind, picture : str
-        Names of the kind of study and of its figure.
+    kind : str
+        Name of the kind of study.
+    picture : str
+        Description of the figure.
     explanations : tuple of str
         Explanations of the numbers, at the end of the report.
-    name, title, text : str
-        For a case, file name without suffix, title and text of the file; for a function, its name, the first line of
-        its docstring and its source.
+    name : str
+        Name of the case file without suffix, or name of the function.
+    title : str
+        Title of the case, or first line of the docstring of the function.
+    text : str
+        Text of the case file, or source of the function.
     units : dict of str to str
-        Names of the units of length, force and pressure; in plane models with forces per thickness.
+        Names of the units of results; forces of plane models are per unit thickness.
     """
 
     kind: ClassVar[str]
@@ -54,11 +59,11 @@ class Report:
     units: dict[str, str]
 
     def tables(self) -> list[tuple[str, Rows]]:
-        """Return the tables, each with its caption; the first row is a header."""
+        """Return pairs of a caption and the rows of a table, whose first row is the header."""
         raise NotImplementedError
 
     def figure(self) -> Any:
-        """Return a matplotlib figure."""
+        """Return a Matplotlib figure of the results."""
         raise NotImplementedError
 
     def sentences(self) -> list[str]:
@@ -66,11 +71,11 @@ class Report:
         return []
 
     def remarks(self) -> list[str]:
-        """Return warnings and failures."""
+        """Return warnings and the reasons of failures."""
         return []
 
     def lines(self) -> list[str]:
-        """Return tables and sentences as lines of text, as the command line prints them."""
+        """Return the report as lines of text, as the command line prints it."""
         lines = [self.title]
         for caption, rows in self.tables():
             lines += ["", *filter(None, [caption]), *aligned(rows)]
@@ -79,7 +84,7 @@ class Report:
         return [*lines, "", *sentences] if sentences else lines
 
     def html(self) -> str:
-        """Return the study as one self-contained HTML page."""
+        """Return the report as a self-contained HTML page."""
         blocks = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
         blocks += [page.table(rows, caption) for caption, rows in self.tables()]
         blocks += map(page.failure, self.remarks())
@@ -93,27 +98,35 @@ class Report:
 
     @staticmethod
     def structured_known(columns: Mapping[str, Sequence[Any]]) -> AnyArray:
-        """Return columns (n_rows,) as a structured array (n_rows,), without those that contain only NaN."""
+        """Return columns (n_rows,) as a structured array (n_rows,), without columns that contain only NaN."""
         return structured({name: values for name, values in columns.items() if any(v == v for v in values)})
 
     def to_pandas(self) -> pandas.DataFrame:
-        """Return `table` as a ``pandas.DataFrame``; FileError if pandas is not installed.
+        """Return `table` as a ``pandas.DataFrame``.
 
-        ``attrs["units"]`` holds the names of units by column, if they are known.
+        Returns
+        -------
+        pandas.DataFrame
+            Table whose ``attrs["units"]`` contains the names of the known units by column.
+
+        Raises
+        ------
+        FileError
+            If pandas is not installed.
         """
         return data_frame(self.table(), {name: unit(name, self.units) for name in self.table().dtype.names or ()})
 
     def __repr__(self) -> str:
-        lines = self.lines()[self.title == self.name :]  # equal for a function without docstring
+        lines = self.lines()[self.title == self.name :]  # title and name are equal for a function without docstring
         return "\n".join([f"{type(self).__name__} of '{self.name}'", *lines])
 
     def _repr_html_(self) -> str:
-        """Return the tables for notebooks."""
+        """Return the tables as HTML for notebooks."""
         return "".join(
             html_table(rows[1:], rows[0], f"{self.title}: {caption}".strip(": ")) for caption, rows in self.tables()
         )
 
     def framed(self, numbers: dict[str, Any]) -> dict[str, Any]:
-        """Return the numbers of a study with its case and the versions, as ``--json`` writes them."""
+        """Return the numbers of a study with its case and the versions of the software, as ``--json`` writes them."""
         case = {"case": self.name, "title": self.title, "units": dict(self.units)}
         return {**case, **numbers, "versions": versions()}

@@ -1,4 +1,4 @@
-"""Conclusions of a mesh-convergence study: model error, discretisation error, and their limits."""
+"""Conclusions of a mesh-convergence study as sentences: model error, mesh error and their uncertainty."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from fastcontact.studies.quantities import title
 from fastcontact.studies.render.table import number, percent
 from fastcontact.studies.series import Series, Split
 
-# Quantities covered by the sentences, in this order.
+# Quantities of the sentences, in their order.
 MAIN = ("pressure_max", "force")
 
 
 def sentences(series: Series) -> list[str]:
-    """Return sentences about the difference of one element and formulation from theory."""
+    """Return sentences about the difference between a combination of element and formulation and theory."""
     if not series.limits:
         return [
             f"{series.combination}: {len(series.levels)} levels were solved, and an extrapolated limit needs three."
@@ -56,13 +56,13 @@ def _about_settling(series: Series, quantity: str, name: str) -> list[str]:
     if series.limits[quantity].converging:
         return []
     return [
-        f"The {name} does not settle: it changes on the finest mesh as much as before, so that its error bar proves nothing. "
-        "It may have no limit, or finer meshes are needed."
+        f"The {name} does not converge: its changes do not decrease on the finest mesh, and its error bar is meaningless. It "
+        "may have no limit, or finer meshes are needed."
     ]
 
 
 def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> str:
-    """Return the sentence that a formulation does not converge to a theory that is exact for the model."""
+    """Return the sentence for a formulation that does not converge to a theory that is exact for the model."""
     limit = series.limits[quantity]
     tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
     return (
@@ -73,7 +73,7 @@ def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> s
 
 
 def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
-    """Return a warning if the mesh error of a level cancels more than half the model error: it looks too accurate."""
+    """Return a warning if the mesh error of a level cancels more than half of the model error."""
     off = series.from_theory(quantity)
     best = min(range(len(off)), key=lambda k: abs(off[k]))
     if series.exact_theory or not split.resolved or not abs(off[best]) < 0.5 * abs(split.model):
@@ -108,5 +108,5 @@ def _about_equal_force(series: Series) -> list[str]:
     if radius is not None:
         text += f", that of the contact radius {percent(radius.model)} (+- {100 * radius.uncertainty:.2g} %)"
     if abs(same.model) < 0.3 * abs(equal.model) and equal.resolved:
-        text += ": what differs at equal approach is mostly the force that it takes, not how the force is spread"
+        text += ": most of the difference at equal approach is in the force, not in its distribution"
     return [text + "."]

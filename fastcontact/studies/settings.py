@@ -1,4 +1,4 @@
-"""Settings of a study, from the table ``[study]`` of its case file: its meshes, elements, formulations, quantities."""
+"""Settings of a study from the table ``[study]`` of its case file: meshes, elements, formulations and quantities."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, Circle
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
-# Elements included in "all".
+# Elements that "all" stands for.
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 
 @dataclass(frozen=True)
 class Combination:
-    """An element and a contact formulation; `element` is None for the cells of a mesh with several elements."""
+    """An element and a contact formulation; `element` is None for a mesh with several element types."""
 
     element: str | None
     formulation: str | None
@@ -32,14 +32,14 @@ class Combination:
 
     @property
     def rank(self) -> tuple[int, int, int]:
-        """Sort key of the expected accuracy: pressure fields, quadratic cells, quadrangles."""
+        """Sort key of the expected accuracy: formulations with a pressure field, quadratic cells, quadrangles."""
         order = elements.get(self.element).order if self.element else 0
         return int(self.formulation != "node_to_segment"), order, int((self.element or "").startswith("quad"))
 
 
 @dataclass(frozen=True)
 class Named(Combination):
-    """Combination of a model function, identified by its name."""
+    """Combination of a study of a function, identified by the name of the function."""
 
     name: str
 
@@ -49,31 +49,31 @@ class Named(Combination):
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a study, checked."""
+    """Checked settings of a study."""
 
-    data: dict[str, Any]  # the parsed case file
-    own: Combination  # element and formulation of the case itself
-    pair: str | None  # the contact pair that is measured
+    data: dict[str, Any]  # parsed case file
+    own: Combination  # element and formulation of the case
+    pair: str | None  # contact pair to evaluate
     formulations: dict[str, str]  # formulations of the contact pairs and obstacles of the case, by name
-    generator: str | None  # mesh generator; None if a mesh file is refined
-    # Arguments of the generator on level 0, by shape of the cells (a key of `SHAPES`); those of the case under "".
+    generator: str | None  # mesh generator; None if the mesh of the case is read from a file
+    # Arguments of the generator on level 0, by shape of the cells (a key of `SHAPES`); "" for the arguments of the case.
     arguments: dict[str, dict[str, Any]]
-    halve: tuple[str, ...] = ()  # arguments to halve from level to level; without both, those of `levels.RULES`
-    double: tuple[str, ...] = ()  # arguments to double likewise
-    curves: tuple[Circle, ...] | None = None  # true boundaries of a mesh file; None: circles are detected
-    load_steps: int | None = None  # number of load steps of every run; None: those of the case
+    halve: tuple[str, ...] = ()  # arguments to halve on each level; without `halve` and `double`, `levels.RULES` apply
+    double: tuple[str, ...] = ()  # arguments to double on each level
+    curves: tuple[Circle, ...] | None = None  # curved boundaries of a mesh file; None if circles are to be detected
+    load_steps: int | None = None  # number of load steps of each run; None for the steps of the case
     options: dict[str, dict[str, Any]] = field(default_factory=dict)  # options of the contact pair, by formulation
-    quantities: tuple[str, ...] = ()  # fitted and shown besides the standard ones
-    combinations: tuple[Combination, ...] = ()  # compared by default
+    quantities: tuple[str, ...] = ()  # quantities in addition to the standard quantities
+    combinations: tuple[Combination, ...] = ()  # combinations that are compared by default
 
     @property
     def by_shape(self) -> bool:
-        """Whether ``[study]`` gives the generator's arguments of level 0 by the shape of the cells."""
+        """Whether ``[study]`` gives the arguments of the generator on level 0 by the shape of the cells."""
         return self.generator is not None and "" not in self.arguments
 
 
 def data_of(case: Case) -> dict[str, Any]:
-    """Return the data of a case file, which studies modify; raises CaseError if the case is not from a case file."""
+    """Return the data of a case file, which studies modify; CaseError if the case is not from a case file."""
     try:
         data = tomllib.loads(case.text) if case.deck is None else {}
     except ValueError:
@@ -87,7 +87,10 @@ def data_of(case: Case) -> dict[str, Any]:
 
 
 def settings(case: Case, data: dict[str, Any] | None = None) -> Settings:
-    """Return the checked settings of a case's studies; `data` replaces the parsed case file, e.g. with other values."""
+    """Return the checked settings of the studies of a case; `data` replaces the data of its case file.
+
+    Raises CaseError if the table ``[study]`` has an invalid value or the case is not from a case file.
+    """
     data = data_of(case) if data is None else data
     study = data.get("study", {})
     pair = study.get("contact") or next((combination.name for combination in case.model.contact), None)
@@ -161,9 +164,9 @@ def _checked(element: str | None, formulation: str | None) -> Combination:
 def combinations(
     settings: Settings, names: Sequence[str] | None, formulations: Sequence[str] | None
 ) -> tuple[Combination, ...]:
-    """Return the combinations to compare: every element with every formulation, by default those of the case.
+    """Return the combinations of each element with each formulation, or by default the combinations of the case.
 
-    Raises CaseError if an element or a formulation is unknown, or cannot be made from the mesh of the case.
+    Raises CaseError if an element or a formulation is unknown, or if the case has no contact pair.
     """
     if names is None and formulations is None:
         return settings.combinations
@@ -180,7 +183,7 @@ def combinations(
 
 
 def one_combination(settings: Settings, element: str | None, formulation: str | None) -> Combination:
-    """Return the last combination of ``[study]`` with the given element and formulation, or a new one of these."""
+    """Return the last combination of ``[study]`` with an element and a formulation, or a new combination of them."""
     formulation = formulation.replace("-", "_") if formulation else None
     for known in reversed(settings.combinations):
         if element in (None, known.element) and formulation in (None, known.formulation):
@@ -190,7 +193,7 @@ def one_combination(settings: Settings, element: str | None, formulation: str | 
 
 
 def makeable(settings: Settings, element: str) -> bool:
-    """Whether meshes of this element can be made for the case."""
+    """Return whether meshes of an element can be made for the case."""
     if settings.by_shape:
         return shape_of(element) in settings.arguments
     present = settings.own.element
@@ -198,5 +201,5 @@ def makeable(settings: Settings, element: str) -> bool:
 
 
 def shape_of(element: str) -> str:
-    """Return ``"triangles"`` or ``"quadrangles"``; empty for other cells."""
+    """Return ``"triangles"`` or ``"quadrangles"``, or an empty string for other elements."""
     return next((shape for shape, members in SHAPES.items() if element in members), "")

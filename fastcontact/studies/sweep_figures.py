@@ -1,4 +1,4 @@
-"""Figures of a parameter sweep: quantities over the first parameter with theory curves, and ratios to theory."""
+"""Figures of a parameter sweep: quantities over the first parameter with theory, and ratios to theory."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from fastcontact.studies.render.figure import frame, marker, message
 if TYPE_CHECKING:
     from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 
-# Ratio of the largest to the smallest parameter value from which axes are logarithmic.
+# Smallest ratio between the largest and the smallest parameter value for which axes are logarithmic.
 WIDE = 9.0
-# Meaning of the last word of a parameter path, and kind of its unit (empty for ratios).
+# Title and kind of unit, empty for ratios, by the last word of the path of a parameter.
 MEANINGS = {
     "E": ("Young's modulus", "pressure"),
     "nu": ("Poisson's ratio", ""),
@@ -34,7 +34,7 @@ _TABLE = re.compile(r"(?P<table>\w+)(?:\[(?P<number>\d+)\]|\.(?P<name>[\w-]+))\.
 
 
 def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
-    """Return a parameter in words with its unit; unknown paths stay as they are.
+    """Return the label of a parameter with its unit; unknown paths are returned unchanged.
 
     Examples
     --------
@@ -57,16 +57,20 @@ def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
 
 
 class Drawing:
-    """Drawing of a sweep over its first parameter, with one curve for each choice of the other parameters.
+    """Plots of a sweep over its first parameter, with a curve for each choice of the other parameters.
 
     Parameters
     ----------
-    parameters : dict of str to values
+    parameters : dict of str to sequence
+        Values by parameter.
     points : list of Point
+        Points of the sweep.
     theories : list of TheoryCurve
+        Theory over the first parameter.
     units : dict of str to str
+        Names of units.
     compared : str
-        See `Sweep`.
+        Condition of the comparison with theory, as in `Sweep`.
     """
 
     def __init__(
@@ -82,7 +86,7 @@ class Drawing:
         self.scale = "plain log" if wide else "linear"
 
     def draw_values(self, ax: Any, quantity: str) -> None:
-        """Draw values over the parameter, and the theory as a curve; both axes have the same scale."""
+        """Draw a quantity and its theory over the first parameter; both axes are logarithmic if all values are positive."""
         for k, (label, x, points) in enumerate(self._curves()):
             y = [point.values.get(quantity, math.nan) for point in points]
             ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
@@ -94,7 +98,7 @@ class Drawing:
     def _draw_theory(
         self, ax: Any, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int
     ) -> None:
-        """Draw the theory for one choice of the other parameters, also between the points if it is known there."""
+        """Draw the theory for one choice of the other parameters, as a curve or at the points."""
         name = (self.theory + self._unmoved(quantity)) if k == 0 else None
         color = "black" if not self.others else f"C{k}"
         for curve in self.theories:
@@ -106,14 +110,14 @@ class Drawing:
             ax.plot(x, exact, "_", ms=9, label=name, color=color)
 
     def _unmoved(self, quantity: str) -> str:
-        """Return a note if the theory is the same for all values of the first parameter; otherwise empty."""
+        """Return a note if the theory does not depend on the first parameter, and otherwise an empty string."""
         curves = [points for _, _, points in self._curves()]
         values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
         same = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
         return f"\n(the same for every {self.first})" if same else ""
 
     def draw_ratios(self, ax: Any, quantity: str) -> None:
-        """Draw the ratios to theory at equal approach and at equal force over the parameter."""
+        """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the first parameter."""
         styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
         drawn = 0
         for k, (label, x, points) in enumerate(self._curves()):
@@ -134,7 +138,7 @@ class Drawing:
         frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
 
     def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
-        """Return label, values of the first parameter and points, for each choice of the other parameters."""
+        """Return, for each choice of the other parameters, the label, the values of the first parameter and the points."""
         by_label: dict[str, list[Point]] = {}
         for point in self.points:
             by_label.setdefault(label_of(point.parameters, self.others), []).append(point)
@@ -147,6 +151,6 @@ class Drawing:
 
 
 def label_of(parameters: Mapping[str, Value], others: Sequence[str]) -> str:
-    """Return the label of a curve: some of the parameters with their values."""
+    """Return the label of a curve with the values of the parameters `others`."""
     values = ((name, parameters[name]) for name in others)
     return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)

@@ -1,4 +1,4 @@
-"""Results of a sweep at one point, and theory curves between the points."""
+"""Results at a point of a sweep, and theory between the points."""
 
 from __future__ import annotations
 
@@ -13,14 +13,18 @@ Value = float | int | str | bool
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Point(Measured):
-    """Results for one choice of the parameters, see `Measured`.
+    """Results for one choice of the parameters, with the attributes of `Measured` and the following.
 
     Attributes
     ----------
     parameters : dict of str to value
-    theory, reference, equal_force : dict of str to float
-        Theory at equal approach, mesh-converged solution if the case names one, and theory at equal force, by
-        quantity.
+        Value of each parameter.
+    theory : dict of str to float
+        Theory at equal approach, by quantity.
+    reference : dict of str to float
+        Mesh-converged solution of the case, by quantity; empty if the case has none.
+    equal_force : dict of str to float
+        Theory at equal force, by quantity.
     """
 
     parameters: dict[str, Value]
@@ -29,7 +33,20 @@ class Point(Measured):
     equal_force: dict[str, float]
 
     def ratio(self, quantity: str, to: str = "theory") -> float:
-        """Return the ratio of the value to ``"theory"``, ``"reference"`` or ``"equal_force"`` [-]; NaN if one is unknown."""
+        """Return the ratio of a quantity to theory or to the mesh-converged solution.
+
+        Parameters
+        ----------
+        quantity : str
+            Name of the quantity.
+        to : {"theory", "reference", "equal_force"}
+            Attribute with the denominator.
+
+        Returns
+        -------
+        float
+            Ratio [-]; NaN if one of the values is unknown.
+        """
         other = getattr(self, to).get(quantity)
         return self.values.get(quantity, math.nan) / other if other else math.nan
 
@@ -41,11 +58,11 @@ class TheoryCurve:
     Attributes
     ----------
     label : str
-        The values of the other parameters in words.
+        Text with the values of the other parameters.
     x : ndarray (n,)
-        Values of the first parameter, in its unit.
+        Values of the first parameter [unit of the parameter].
     values : dict of str to ndarray (n,)
-        By quantity, in the case's units.
+        Values of the theory by quantity [units of the case].
     """
 
     label: str

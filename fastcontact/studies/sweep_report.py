@@ -1,4 +1,4 @@
-"""A finished parameter sweep and its report: lines, table, dictionary, figure, page."""
+"""The result of a parameter sweep and its report as lines, table, dictionary, figure and page."""
 
 from __future__ import annotations
 
@@ -16,30 +16,31 @@ from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
 
 # Quantities shown in tables and figures.
 MAIN = ("force", "pressure_max", "contact_radius")
-# References of the values, and the names of the differences in JSON and CSV.
+# Attributes of points with values for comparison, and the names of the relative differences in JSON and CSV.
 DIFFERENCES = {"theory": "from_theory", "equal_force": "from_theory_at_equal_force", "reference": "from_reference"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sweep(Report):
-    """A finished sweep; its case and units as in `Report`.
+    """The result of a parameter sweep, with the attributes of `Report` and the following.
 
     Attributes
     ----------
     combination : str
-        Element and formulation.
+        Element and contact formulation.
     parameters : dict of str to tuple
         Values by parameter.
     points : list of Point
-        Points that could be solved; the last parameter varies fastest.
+        Points that were solved; the last parameter varies fastest.
     failed : list of (dict, str)
-        Parameters and reason of the failed points.
+        Parameters of each point that could not be solved, and the reason.
     theories : tuple of TheoryCurve
-        Theory over the first parameter, for each choice of the others; empty if the parameter is not a number.
+        Theory over the first parameter for each choice of the other parameters; empty if the first parameter is not a
+        number.
     compared : str
-        Condition of the comparison with theory: ``"at equal approach"``, or empty if the case gives another load.
+        Condition of the comparison with theory: ``"at equal approach"``, or empty if the case prescribes another load.
     asked : tuple of str
-        Further quantities of ``[study]``, shown in tables and figures.
+        Additional quantities of ``[study]`` in tables and figures.
     """
 
     kind = "Sweep"
@@ -59,7 +60,7 @@ class Sweep(Report):
         return list(dict.fromkeys(name for point in self.points for name in point.values))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return plain numbers, texts, lists and dictionaries, as ``--json`` writes them; differences are relative."""
+        """Return the sweep as numbers, texts, lists and dictionaries, as ``--json`` writes it; differences are relative."""
         numbers = {
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},
@@ -69,10 +70,11 @@ class Sweep(Report):
         return self.framed(numbers)
 
     def table(self) -> AnyArray:
-        """Return a structured array (n_points,), one row a point, as ``--csv`` writes it.
+        """Return a structured array (n_points,) with a row for each point, as ``--csv`` writes it.
 
-        Fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s], and for every quantity its value in
-        its unit and, if known, ``..._from_theory``, ``..._from_theory_at_equal_force`` and ``..._from_reference`` [-].
+        The fields are the parameters, ``h`` [length] if known, ``n_dofs``, ``seconds`` [s] and, for each quantity, its value
+        [unit of the quantity] and, if known, the relative differences ``..._from_theory``, ``..._from_theory_at_equal_force``
+        and ``..._from_reference`` [-].
         """
         columns: dict[str, list[Any]] = {name: [p.parameters[name] for p in self.points] for name in self.parameters}
         for attribute in ("h", "n_dofs", "seconds"):
@@ -94,14 +96,14 @@ class Sweep(Report):
         return [*(f"warning: {text}" for text in warnings), *(f"{choice} failed: {text}" for choice, text in choices)]
 
     def figure(self) -> Any:
-        """Return a matplotlib figure: values over the first parameter, and their ratio to theory.
+        """Return a Matplotlib figure with the values over the first parameter and their ratios to theory.
 
-        There is a curve for each combination of the other parameters.
+        There is a curve for each choice of the other parameters.
         """
         names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
         known = any(name in point.theory for point in self.points for name in names)
         size = (8.8 if known else 5.2, 0.5 + 3.1 * len(names))
-        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # equal for a function
+        heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # title and name are equal for a function
         axes = panels(len(names), 1 + known, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):
             drawing.draw_values(row[0], name)
@@ -114,7 +116,7 @@ class Sweep(Report):
         return [name for name in shown if name in self.quantities] or self.quantities[:3]
 
     def _rows(self) -> Rows:
-        """Return header and a row for each point: parameters, DOF, main quantities, differences from theory."""
+        """Return a header and a row for each point with parameters, DOF, main quantities and differences from theory."""
         columns = [(name, [_shown(point.parameters[name]) for point in self.points]) for name in self.parameters]
         columns.append(("DOF", [str(point.n_dofs) for point in self.points]))
         for name in self._main():

@@ -23,9 +23,9 @@ def panels(
     widths: Sequence[float] | None = None,
     **style: Any,
 ) -> Any:
-    """Return the axes (rows, columns) of a new figure of a `size` [inch]; `style` applies to its title.
+    """Return the axes (rows, columns) of a new figure of `size` [inch]; `style` are options of its title.
 
-    `widths` are the relative widths of the columns, by default equal.
+    `widths` are the relative widths of the columns [-]; by default all columns have the same width.
     """
     made = new_panels(rows, columns, size, 130, width_ratios=widths)
     if title:
@@ -34,7 +34,7 @@ def panels(
 
 
 def message(ax: Any, text: str) -> None:
-    """Show a text in place of axes without data."""
+    """Replace axes without data by a text."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 
@@ -49,19 +49,23 @@ def frame(
     title_size: float | str = "large",
     legend_size: float = 8,
 ) -> None:
-    """Set the scales, title, labels and grid of axes with curves and, if curves have labels, a legend.
+    """Set the scales, the title, the labels, the grid and, if curves have labels, the legend of axes.
 
     Parameters
     ----------
-    ax : matplotlib Axes
+    ax : matplotlib.axes.Axes
+        Axes with curves.
     title : str
-    labels, scales : (str, str)
-        For the axes x and y. Scales are ``"linear"``, ``"log"`` or ``"plain log"``, which has a few plain numbers instead of
-        powers of ten.
+        Title of the axes.
+    labels : (str, str)
+        Labels of the x axis and the y axis.
+    scales : (str, str)
+        Scales of the x axis and the y axis: ``"linear"``, ``"log"`` or ``"plain log"``, a logarithmic scale with decimal
+        numbers instead of powers of ten.
     grid : float
-        Opacity at major ticks [-]; 0 for no grid.
+        Opacity of the grid at major ticks [-]; there is no grid if it is 0.
     title_size, legend_size : float or str
-        Font sizes in the form of matplotlib [point].
+        Font sizes, as defined by Matplotlib [point].
     """
     for axis, scale, setter in zip((ax.xaxis, ax.yaxis), scales, (ax.set_xscale, ax.set_yscale), strict=True):
         if scale != "linear":
@@ -82,7 +86,7 @@ def frame(
 
 
 def _plain(axis: Any) -> None:
-    """Label a logarithmic axis with a few plain numbers instead of powers of ten."""
+    """Label a logarithmic axis with a few decimal numbers instead of powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     low, high = axis.get_data_interval()

@@ -1,4 +1,4 @@
-"""Pages: a self-contained HTML file of paragraphs, tables and pictures that loads nothing else."""
+"""Self-contained HTML pages of paragraphs, tables and figures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pre { background: #f6f6f6; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem
 
 
 def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
-    """Return a page: its heading, its parts (HTML already), the case file, and the versions that made it."""
+    """Return an HTML page with a heading, blocks of HTML, the text of the case, and the versions of the software."""
     blocks = list(blocks)
     if case_text:
         blocks += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
@@ -43,27 +43,27 @@ def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
 
 
 def section(heading: str) -> str:
-    """Return the heading of a section."""
+    """Return the heading of a section as HTML."""
     return f"<h2>{html.escape(heading)}</h2>"
 
 
 def paragraph(text: str) -> str:
-    """Return a text as a paragraph."""
+    """Return a text as an HTML paragraph."""
     return f"<p class='say'>{_signs(html.escape(text))}</p>"
 
 
 def failure(text: str) -> str:
-    """Return the reason of a failure as a paragraph."""
+    """Return the reason of a failure as an HTML paragraph."""
     return f"<p class='failed'>{html.escape(text)}</p>"
 
 
 def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
-    """Return rows of texts as a table, the first row a header."""
+    """Return rows of texts as an HTML table; the first row is the header."""
     return f"<div class='wide'>{_signs(html_table(rows[1:], rows[0], caption, style=''))}</div>"
 
 
 def image(figure: Any, description: str) -> str:
-    """Return a matplotlib figure as an image element with embedded data."""
+    """Return a Matplotlib figure as an HTML image with embedded data."""
     data = base64.b64encode(png(figure)).decode("ascii")
     return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
 

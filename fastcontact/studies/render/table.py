@@ -1,4 +1,4 @@
-"""Tables: rows of texts aligned for a terminal, numbers written as text."""
+"""Tables of text for terminals, and the format of their numbers."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ Rows = list[list[str]]
 
 
 def number(value: float, digits: int = 6) -> str:
-    """Return a number, or a dash for NaN and infinity."""
+    """Return a number as text, or a dash for NaN and infinity."""
     return f"{value:.{digits}g}" if math.isfinite(value) else "-"
 
 
 def percent(value: float | None, uncertainty: float | None = None) -> str:
-    """Return a relative difference in percent with its sign, or a dash for None and NaN.
+    """Return a relative difference as a signed percentage, or a dash for None, NaN and infinity.
 
-    There are three decimals, and four where the `uncertainty`, relative like the value, is below 1e-5.
+    The percentage has three decimals, or four if the relative `uncertainty` is positive and below 1e-5.
 
     Examples
     --------
@@ -29,11 +29,11 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
 
 
 def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
-    """Return columns, each a header and its texts, as rows with the headers as the first."""
+    """Return the rows of a table whose columns are given as headers and texts; the first row contains the headers."""
     return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows of texts as lines, columns right-aligned, the first row a header."""
+    """Return rows of texts as lines with right-aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]

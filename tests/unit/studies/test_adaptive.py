@@ -68,7 +68,7 @@ def test_the_command_writes_what_it_shows(case, tmp_path, capsys):
 def test_not_reached_is_said_and_is_exit_code_two(case, capsys):
     arguments = ["converge", str(case), "--adaptive", "--tolerance", "1e-6", "--max-dofs", "4000"]
     assert main(arguments) == 2
-    assert "NOT within the 1e-06 asked for" in capsys.readouterr().out
+    assert "NOT within the 1e-06 requested" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
