@@ -1,8 +1,8 @@
 """Type checks of the arguments of public calls.
 
-The annotation of an argument determines its allowed types, so that calls need no separate lists. Numbers are real numbers,
-including NumPy's but not booleans; sequences include arrays and iterators but not strings; arrays are everything that NumPy
-converts to one. Whether a value is meaningful is checked by the call itself.
+The annotation of an argument determines its allowed types. Numbers are real numbers, including those of NumPy but not
+booleans. Sequences include arrays and iterators but not strings. Arrays are all values that NumPy converts to an array. The
+call itself checks the values.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _REAL = {bool: "True or False", int: "a whole number", float: "a number"}
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
     """Return a decorator that raises `error` for arguments that do not match their annotation.
 
-    It decorates functions, or classes, whose constructor and public methods it checks.
+    It decorates functions, and classes, of which it checks the constructor and the public methods.
     """
 
     def decorate(call: F) -> F:
@@ -57,7 +57,7 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
             values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
-        except TypeError:  # Python's message on missing and unknown arguments is the best
+        except TypeError:  # Python's message is best for missing and unknown arguments
             return call(*args, **kwargs)
         for key, value in values.items():
             parameter = signature.parameters[key]
@@ -81,7 +81,7 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 
 
 def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:
-    """Return the signature for `help`, with the keys of an unpacked `TypedDict` as keyword arguments (default None)."""
+    """Return the signature for `help`, with the keys of an unpacked `TypedDict` as keyword arguments with default None."""
     parameters = list(signature.parameters.values())
     if not parameters or not str(parameters[-1].annotation).startswith("Unpack["):
         return signature
@@ -95,7 +95,7 @@ def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Si
 
 
 def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
-    """Return the name of a function, of a class as the user knows it, or of a method of it."""
+    """Return the name of a function, of the class of a constructor, or of a method with its class."""
     owner, _, method = name.rpartition(".")
     if call.__name__ == "__init__" and args:
         return type(args[0]).__name__
@@ -103,7 +103,7 @@ def _called(call: Callable[..., Any], name: str, args: tuple[Any, ...]) -> str:
 
 
 def check_fields(owner: str, values: abc.Mapping[str, Any], kind: type, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value, by name, is not of the type of this field of a dataclass; messages name the `owner`."""
+    """Raise `error` if a value does not have the type of the dataclass field with its name; messages name the `owner`."""
     known = {name: text for base in reversed(kind.__mro__) for name, text in types_of(base).items()}
     for name, value in values.items():
         check_type(f"{name} of {owner}", value, known.get(name, Any), error)
@@ -118,13 +118,13 @@ def types_of(call: Callable[..., Any]) -> dict[str, Any]:
     for name, text in given.items():
         try:
             annotations |= typing.get_type_hints(types.SimpleNamespace(__annotations__={name: text}), space)
-        except (NameError, TypeError):  # imported for type checkers only, or not the annotation of an argument
+        except (NameError, TypeError):  # a name that only type checkers import, or not the annotation of an argument
             continue
     return annotations
 
 
 def check_type(name_shown: str, value: Any, annotation: Any, error: type[FastcontactError]) -> None:
-    """Raise `error` if a value is not of the annotated type, or has a mask; the message names it `name_shown`."""
+    """Raise `error` if a value does not have the annotated type or is masked; the message calls it `name_shown`."""
     if is_masked(value):
         raise error(f"{name_shown} {REFUSAL}")
     if fits(value, annotation):
@@ -153,7 +153,7 @@ def _is_number(text: str) -> bool:
 
 
 def values_at(function: Callable[..., Any], points: Any, name: str, error: type[FastcontactError]) -> Any:
-    """Return the values of a user's function, called `name` in messages, at `points`; raises `error` if it fails."""
+    """Return the values of a user's function at `points`; if it fails, raise `error` with `name` in the message."""
     try:
         returned = function(points)
     except Exception as failure:
@@ -168,25 +168,25 @@ def values_at(function: Callable[..., Any], points: Any, name: str, error: type[
 
 
 class Kind(NamedTuple):
-    """An annotated type: a test of values, which does not consume iterators, and its name in messages."""
+    """Test of the values of an annotated type, which does not consume iterators, and the name of the type in messages."""
 
     fits: Callable[[Any], bool]
     words: str
 
 
 def fits(value: Any, annotation: Any) -> bool:
-    """Return whether a value is of the annotated type, as far as can be tested without consuming an iterator."""
+    """Return whether a value has the annotated type; the members of iterators are not tested."""
     return kind_of(annotation).fits(value)
 
 
 def words(annotation: Any) -> str:
-    """Return an annotated type in words: "a number or a function"."""
+    """Return the name of an annotated type in messages, such as "a number or a function"."""
     return kind_of(annotation).words
 
 
 @functools.cache
 def kind_of(annotation: Any) -> Kind:
-    """Return the test of an annotated type, and its name."""
+    """Return the test and the name of an annotated type."""
     kind, members = typing.get_origin(annotation) or annotation, typing.get_args(annotation)
     if annotation == np.typing.ArrayLike or kind is np.ndarray:
         return Kind(_makes_an_array, "an array of numbers")
@@ -223,7 +223,7 @@ def _test(annotation: Any, kind: Any, members: tuple[Any, ...]) -> Callable[[Any
 
 
 def _union(members: tuple[Any, ...]) -> Kind:
-    if {*members} >= _ARRAY_LIKE:  # a union itself, joined with further types
+    if {*members} >= _ARRAY_LIKE:  # ArrayLike is itself a union
         members = (np.typing.ArrayLike, *(member for member in members if member not in _ARRAY_LIKE))
     kinds = [kind_of(member) for member in members]
     phrases = sorted(dict.fromkeys(kind.words for kind in kinds), key="None".__eq__)
@@ -231,7 +231,7 @@ def _union(members: tuple[Any, ...]) -> Kind:
 
 
 def _series(kind: Any, members: tuple[Any, ...]) -> Kind:
-    """Return the test of a series; members of iterators are not tested, and of arrays only the first one."""
+    """Return the test of a sequence; it tests all members, except of iterators (none) and of arrays (the first)."""
     kinds = [kind_of(member) for member in members if member is not ...]
     if kind is tuple and members and members[-1] is not ...:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))
@@ -297,7 +297,7 @@ def _plural(phrase: str) -> str:
 
 
 def finite_vector(values: Any, size: int) -> np.ndarray[Any, np.dtype[np.float64]] | None:
-    """Return `values` as an array of `size` finite numbers; None if they are not."""
+    """Return `values` as an array of `size` finite numbers, or None if they are not such an array."""
     try:
         vector = np.asarray(values, float)
     except (TypeError, ValueError):

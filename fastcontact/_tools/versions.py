@@ -1,4 +1,4 @@
-"""Versions of fastcontact, Python and the libraries it uses."""
+"""Versions of fastcontact, of Python and of the main libraries."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LIBRARIES = ("numpy", "scipy", "numba", "pyamg", "meshio", "h5py")
 
 @cache
 def versions() -> dict[str, str]:
-    """Return the versions by name, without those of libraries that are not installed as packages."""
+    """Return the versions by name; libraries that are not installed as packages are omitted."""
     known = {"fastcontact": __version__, "python": platform.python_version()}
     for name in LIBRARIES:
         with contextlib.suppress(metadata.PackageNotFoundError):

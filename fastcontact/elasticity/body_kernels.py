@@ -1,10 +1,10 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loop of bodies with nonlinear laws: tangent stiffness, internal forces, stress, energy, history.
+"""Element loop of bodies with nonlinear laws: tangent stiffness, internal forces, stress, energy and history.
 
 In the reference configuration (total Lagrangian), nodal forces are integrals of P : dN/dX, and the tangent consists of
-integrals of dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). For small strains P is the Cauchy stress and J one plus the
-trace of the strain. With thermal expansion F is the elastic part of the deformation gradient, relative to the stress-free
-intermediate configuration (Lu and Pister, 1975).
+integrals of dN/dX : A : dN/dX (Bonet and Wood, 2008, chapter 9). At small strains, P is the Cauchy stress and J is one plus
+the trace of the strain. With thermal expansion, F is the elastic part of the deformation gradient, relative to the
+stress-free intermediate configuration (Lu and Pister, 1975).
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
 from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
 
-# Newton iterations for the out-of-plane strain in plane stress, and their tolerance relative to the modulus.
+# Largest number of Newton iterations for the out-of-plane strain in plane stress, and tolerance relative to the modulus.
 THROUGH, ENOUGH = 50, 1e-13
 # Status codes of `linearise`, in addition to the number of a cell.
 INVERTED, NO_PLANE_STRESS = 1, 2
@@ -53,10 +53,10 @@ def _deformation(u, gradient, hoop, F):
 
 @kernel
 def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
-    """Remove the expansion by a `rise` (n_points,) from F, shape derivatives (dim, n_nodes) and `hoop` (n_nodes,), in place.
+    """Remove the thermal expansion from F, the shape derivatives `gradient` (dim, n_nodes) and `hoop` (n_nodes,), in place.
 
-    `strain` (6,) is the thermal strain of one degree, with engineering shears. Return the volume ratio, and the thermal
-    stretch along z.
+    `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per degree, with engineering shears.
+    Returns the thermal volume ratio and the thermal stretch along z.
     """
     degrees = 0.0
     for a in range(len(cell)):
@@ -82,7 +82,7 @@ def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
 
 @kernel
 def _dilatation(F, finite, G):
-    """Return J and fill G (3, 3) with its derivative; for small strains J is one plus the trace of the strain."""
+    """Return J and fill G (3, 3) with dJ/dF; at small strains, J is one plus the trace of the strain."""
     if finite:
         cofactor(F, G)
         return determinant(F)
@@ -105,9 +105,10 @@ def _add_volumetric(F, G, pressure, turning, bulk, tangent, P, A):
 
 @kernel
 def _leave_out_initial_stress(G, J, P, turning, A):
-    """Subtract delta_ik S_JL from A, S the second Piola-Kirchhoff stress of P plus `turning` times G = dJ/dF.
+    """Subtract the initial-stress term delta_ik S_JL from A.
 
-    For a pressure, `turning` < 0, also subtract the effect of the variation of the dilatation inside a cell.
+    S is the second Piola-Kirchhoff stress of P plus `turning` times G = dJ/dF. In compression, `turning` < 0, the effect of
+    the variation of the dilatation within a cell is subtracted as well.
     """
     for row in range(9):
         for column in range(9):
@@ -123,9 +124,9 @@ def _leave_out_initial_stress(G, J, P, turning, A):
 
 @kernel
 def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
-    """Solve for the F_zz at which P_zz vanishes, and eliminate it from A; return the energy, and whether it converged.
+    """Solve for the F_zz at which P_zz vanishes, and eliminate F_zz from A.
 
-    `thicker` is the out-of-plane stretch without stress.
+    `thicker` is the stress-free out-of-plane stretch. Returns the energy density, and whether the iteration converged.
     """
     F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
     for _ in range(THROUGH):
@@ -149,8 +150,8 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, old, new, P, A, G):
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
-    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder; see `linearise`, `_through` and,
-    for `everywhere`, `respond`.
+    `pressure` is the pressure of the projected dilatation and `bulk` the bulk modulus of its remainder. The other arguments
+    are those of `linearise`, `_through` and `respond`.
     """
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
@@ -170,7 +171,7 @@ def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geomet
 
 @kernel
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
-    """Subtract the elastic tangent at small strains, without the projected dilatation, from A (9, 9)."""
+    """Subtract the elastic tangent at small strains from A (9, 9), without the part of the projected dilatation."""
     none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
     _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, np.eye(3), none, new, P, of_elasticity, G)
     A -= of_elasticity
@@ -178,10 +179,12 @@ def _subtract_elastic(constants, D, bulk, plane_stress, A):
 
 @kernel
 def _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected):
-    """Fill the Cholesky factor `mass` (m, m) of the polynomials' mass matrix, and the dilatation in orthonormal ones.
+    """Project the dilatation of a cell on polynomials.
 
-    `projected` (m, n_nodes * dim + 1) are its derivatives by displacements, first those of x, and the dilatation itself, or
-    only the latter (m, 1).
+    Fills the Cholesky factor `mass` (m, m) of the mass matrix of the polynomials, and `projected` with the coefficients of
+    the dilatation in the orthonormalised polynomials. The columns of `projected` (m, n_nodes * dim + 1) are the derivatives
+    by the displacements of all nodes along x, then along y and z, and the coefficients. With a single column, it contains
+    the coefficients only.
     """
     n_q, dim, n_nodes = gradient.shape
     last = projected.shape[1] - 1
@@ -206,7 +209,7 @@ def _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected)
 
 @kernel
 def _pressures(bulk, polynomials, mass, projected, pressure):
-    """Fill the `pressure` (n_q,) of the projected dilatation and return its energy."""
+    """Fill the `pressure` (n_q,) of the projected dilatation and return the energy of the projected dilatation."""
     m, last = projected.shape
     coefficients, energy = np.empty(m), 0.0
     for k in range(m):
@@ -222,7 +225,7 @@ def _pressures(bulk, polynomials, mass, projected, pressure):
 
 @kernel
 def _add_projected_tangent(bulk, projected, local):
-    """Add the stiffness of the projected dilatation to `local`, see `_add_tangent`."""
+    """Add the stiffness of the projected dilatation to `local`, whose layout is that of `_add_tangent`."""
     n_nodes, dim = local.shape[0], local.shape[1]
     for b in range(n_nodes):
         for k in range(dim):
@@ -235,9 +238,10 @@ def _add_projected_tangent(bulk, projected, local):
 
 @kernel
 def _add_tangent(gradient, hoop, weight, A, product, local):
-    """Add a point's tangent to `local` (n_nodes b, dim k, dim i, n_nodes a), for a <= b; `product` (9,) is work space.
+    """Add the tangent of a quadrature point to `local` (n_nodes b, dim k, dim i, n_nodes a) for a <= b.
 
-    The stress change due to component k of a node is a column of A times its shape derivatives, the third along z or hoop.
+    The change of P due to component k of node b is the product of columns of A with the shape derivatives of the node, of
+    which the third one is along z or, in 2D, the hoop direction. `product` (9,) is work space.
     """
     dim, n_nodes = gradient.shape
     in_space, third = dim == 3, gradient[2] if dim == 3 else hoop
@@ -256,7 +260,7 @@ def _add_tangent(gradient, hoop, weight, A, product, local):
 
 @kernel
 def _forces(gradient, hoop, weight, P, forces):
-    """Add a point's nodal forces to `forces` (dim, n_nodes)."""
+    """Add the nodal forces of a quadrature point to `forces` (dim, n_nodes)."""
     for i in range(gradient.shape[0]):
         for j in range(gradient.shape[0]):
             for a in range(gradient.shape[1]):
@@ -267,7 +271,7 @@ def _forces(gradient, hoop, weight, P, forces):
 
 @kernel
 def _cauchy(F, P, finite, out):
-    """Fill `out` with the Cauchy stress xx, yy, zz, xy, in 3D also yz, xz."""
+    """Fill `out` with the Cauchy stress xx, yy, zz, xy and, in 3D, yz, xz."""
     J = determinant(F) if finite else 1.0
     for c in range(out.shape[0]):
         i, j = (c, c) if c < 3 else ((0, 1) if c == 3 else ((1, 2) if c == 4 else (0, 2)))
@@ -284,7 +288,7 @@ def _cauchy(F, P, finite, out):
 def _assemble(local, slots, inside, data):
     """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `inside`.
 
-    The block of a node pair is the transpose of the opposite one, and a diagonal block is symmetric, up to round-off.
+    Up to round-off, the block of a node pair is the transpose of the opposite block, and diagonal blocks are symmetric.
     """
     n_nodes, dim = local.shape[0], local.shape[1]
     for b in range(n_nodes):
@@ -307,14 +311,15 @@ def linearise(
 ):  # fmt: skip
     """Add the tangent to `data` (n_blocks, dim, dim) and forces to `force` (n_points, dim), in rows of nodes of a `part`.
 
-    For the cells of the part, those whose first node it owns, it fills the history `new` (n_cells, n_q, 9), the Cauchy
-    `stress` (n_cells, n_q, n_components) and `energy` (n_cells, 2): elastic, plastic work. `bulk` (n_materials, 2) are
-    the bulk modulus of the dilatation projected on `polynomials` (n_q, m), and that of the remainder. Returns a status
-    and the number of a cell, zero and -1 on success. A temperature `rise` (n_points,), possibly empty, causes strains of
-    `expansion` (n_materials, 6) per degree. `geometric` 2 selects the full tangent; 1 leaves out the second derivative
-    of J under pressure; 0 also leaves out the initial-stress stiffness and the second derivative of J under tension, so
-    that the tangent is positive semidefinite. If `data` is empty, no tangent is computed; if `elastic`, it holds the
-    elastic tangent of small strains, and points with plastic flow add the difference.
+    For the cells of the part, whose first node it owns, this fills the history `new` (n_cells, n_q, 9), the Cauchy `stress`
+    (n_cells, n_q, n_components) and `energy` (n_cells, 2), the elastic energy and the plastic work. `bulk` (n_materials, 2)
+    contains the bulk moduli of the dilatation projected on `polynomials` (n_q, m) and of its remainder. A temperature `rise`
+    (n_points,), which may be empty, causes strains of `expansion` (n_materials, 6) per degree.
+
+    With `geometric` 2, the tangent is complete; with 1, the second derivative of J is omitted; with 0, the initial-stress
+    stiffness and, in tension, the second derivative of J are omitted, so that the tangent is positive semidefinite. If `data`
+    is empty, no tangent is computed. If `elastic` is true, `data` contains the elastic tangent of small strains, and the
+    difference is added at points with plastic flow. Returns a status and the number of a cell, zero and -1 on success.
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0

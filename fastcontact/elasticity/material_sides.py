@@ -1,4 +1,4 @@
-"""Nodes on material interfaces, where stress is discontinuous: one nodal value for each material."""
+"""Nodes at material interfaces, where stress is discontinuous and has a nodal value for each material."""
 
 from __future__ import annotations
 
@@ -13,16 +13,20 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class MaterialSides:
-    """Slots for nodal values: one for each node, and additional ones at material interfaces.
+    """Slots for nodal values: a slot for each node, and additional slots for the other materials at interfaces.
 
     Attributes
     ----------
-    cells : mapping of str to ndarray (n_cells, n_nodes)
+    cells : mapping of str to ndarray of int (n_cells, n_nodes)
         Slots of the nodes of each cell, by solid element type.
     node : ndarray of int (n_slots,)
-        Node of each slot; the first n_points are the nodes themselves.
-    points, material, place : ndarray of int (k,)
-        At interfaces, for each node and each of its materials: node, material, slot (`place`); ordered by node.
+        Node of each slot; slot k of the first n_points belongs to node k.
+    points : ndarray of int (k,)
+        Node of each pair of a node at an interface and one of its materials, in ascending order.
+    material : ndarray of int (k,)
+        Material number of each of these pairs.
+    place : ndarray of int (k,)
+        Slot of each of these pairs.
     """
 
     cells: Mapping[str, Numbers]
@@ -33,7 +37,7 @@ class MaterialSides:
 
 
 def material_sides(mesh: Mesh, material: Mapping[str, Numbers]) -> MaterialSides:
-    """Return the material interfaces; `material` are the numbers (n_cells,) of each cell's material, by element type."""
+    """Return the slots for nodal values; `material` contains the material number (n_cells,) of cells by element type."""
     n = mesh.n_points
     lowest, highest = np.full(n, np.iinfo(np.int32).max, np.int32), np.full(n, -1, np.int32)
     for number in np.unique(np.concatenate([np.empty(0, np.int32), *material.values()]))[::-1]:

@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Sparsity pattern of the stiffness matrix by node blocks, and the block index of each node pair of each cell.
 
-Cells of all elements are in one list: the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
+The cells of all element types are in one list, in which the nodes of cell ``c`` are ``nodes[start[c]:start[c + 1]]``.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 @interpretable_kernel
 def cells_at_nodes(start, nodes, n_points):
-    """Return (first, cells): the cells at node p are ``cells[first[p]:first[p + 1]]``, ascending."""
+    """Return (first, cells); the cells at node p are ``cells[first[p]:first[p + 1]]``, in ascending order."""
     first = np.zeros(n_points + 1, np.int64)
     for k in range(nodes.shape[0]):
         first[nodes[k] + 1] += 1
@@ -38,12 +38,12 @@ def count_neighbours(start, nodes, first, cells, low, high, count):
                 if seen[nodes[m]] != p:
                     seen[nodes[m]] = p
                     n_found += 1
-        count[p] = max(n_found, 1)  # a node without cells keeps its diagonal
+        count[p] = max(n_found, 1)  # a node without cells has a diagonal block
 
 
 @interpretable_kernel
 def neighbours(start, nodes, first, cells, low, high, indptr, indices):
-    """Fill the sorted numbers of the nodes that share a cell with each node from `low` to ``high - 1``, itself included."""
+    """Fill `indices` with the sorted nodes that share a cell with each node from `low` to ``high - 1``, and the node."""
     seen = np.full(first.shape[0] - 1, -1, np.int32)
     for p in range(low, high):
         begin = end = indptr[p]
@@ -64,7 +64,7 @@ def neighbours(start, nodes, first, cells, low, high, indptr, indices):
 
 @interpretable_kernel
 def find_slots(cells, indptr, indices, slots):
-    """Fill `slots` (n_cells, n_nodes, n_nodes): positions in `indices` of every node pair of every cell."""
+    """Fill `slots` (n_cells, n_nodes, n_nodes) with the position in `indices` of each node pair of each cell."""
     n_cells, n_nodes = cells.shape
     for c in range(n_cells):
         for a in range(n_nodes):
@@ -84,8 +84,8 @@ def find_slots(cells, indptr, indices, slots):
 def first_parts(cells, ends, unowned, owner, last, work):
     """Fill `owner` (n_points,), initially `unowned`, with the first part of the cells that contains each point.
 
-    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``; ``work[p]`` cells before ``last[p]`` have a point that it
-    owns. Both (n_parts,) are initially zero.
+    Part p consists of the cells ``ends[p]`` to ``ends[p + 1] - 1``. It owns a point of ``work[p]`` cells, all of which
+    precede cell ``last[p]``. `last` and `work` (n_parts,) are initially zero.
     """
     for part in range(len(ends) - 1):
         for c in range(ends[part], ends[part + 1]):

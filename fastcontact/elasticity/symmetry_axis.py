@@ -10,9 +10,9 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 
 def axis_nodes(mesh: Mesh) -> Indices:
-    """Return the nodes of solid cells on the axis x = 0, ascending.
+    """Return the nodes (n,) of solid cells on the axis x = 0, in ascending order.
 
-    By symmetry, points of a body on the axis only move along the axis.
+    By symmetry, points of a body on the axis move along the axis only.
     """
     near = np.abs(mesh.points[:, 0]) <= SINGLE_PRECISION * np.abs(mesh.points).max()
     used = np.zeros(mesh.n_points, bool)

@@ -20,18 +20,20 @@ from fastcontact.mesh.mesh import Mesh
 
 @dataclass(frozen=True, eq=False)
 class Conduction:
-    """Solid cells that conduct heat, in the reference configuration or a deformed one.
+    """Solid cells that conduct heat, in the reference configuration or a deformed configuration.
 
     Attributes
     ----------
     mesh : Mesh
+        Mesh of the model.
     kinematics : str
-        Axisymmetric models are integrated over the full circle, plane ones per unit thickness.
+        Kinematics of the model. Axisymmetric models are integrated over the full circle, plane models per unit thickness.
     materials : sequence of Material
+        Materials of the model.
     number : mapping of str to ndarray of int (n_cells,)
-        By solid element: the material number of every cell.
+        Material number of each cell, by solid element type.
     displacement : ndarray (n_points, dim), optional
-        Displacement of the configuration; conductivities are evaluated at reference positions [length].
+        Displacement of the deformed configuration [length]. Conductivities are evaluated at reference positions.
     """
 
     mesh: Mesh
@@ -41,7 +43,7 @@ class Conduction:
     displacement: Array | None = None
 
     def check(self) -> None:
-        """Raise ModelError if some of the cells have no conductivity."""
+        """Raise ModelError if the material of a cell has no conductivity."""
         without = [material.conductivity is None for material in self.materials]
         missing = sum(int(np.array(without)[numbers].sum()) for numbers in self.number.values())
         if missing:
@@ -64,7 +66,7 @@ class Conduction:
         return csr_array((values[:, 0], pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
-        """Return the mean heat flux (n_solids, dim) of every cell [power / area] for temperatures (n_points,)."""
+        """Return the mean heat flux (n_solids, dim) [power / area] of each cell for a `temperature` (n_points,)."""
         flux = []
         for name, rows in portions(self.mesh):
             gradient, k, volume = self._at(name, rows)
@@ -74,7 +76,10 @@ class Conduction:
         return np.concatenate(flux)
 
     def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
-        """Return gradients (c, q, n, dim) [1 / length], conductivities (c, q, dim, dim), volumes (c, q) at all points."""
+        """Return the gradients of shape functions, the conductivities and the volumes at the quadrature points of cells.
+
+        Their shapes are (c, q, n, dim) [1 / length], (c, q, dim, dim) [power / (length temperature)] and (c, q) [volume].
+        """
         mesh, (xi, weights) = self.mesh, integration_rule(elements.get(name))
         N, dN = elements.get(name).shape(xi), elements.get(name).gradient(xi)
         nodes = mesh.cells[name][rows]

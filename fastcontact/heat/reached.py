@@ -10,16 +10,16 @@ from fastcontact.arrays import AnyArray, Indices, Mask
 
 
 def not_reached(body: AnyArray, held: Mask, joined: AnyArray) -> Indices:
-    """Return the numbers of bodies with undetermined steady temperature, ascending.
+    """Return the numbers (n,) of the bodies whose steady temperature is undetermined, in ascending order.
 
     Parameters
     ----------
     body : ndarray of int (n_points,)
-        Body of each point, -1 for none.
+        Body of each point, -1 for points without a body.
     held : ndarray of bool (n_points,)
-        Points with a prescribed temperature or a film.
+        Whether each point has a prescribed temperature or a film.
     joined : ndarray of int (m, 2)
-        Points between which heat passes.
+        Pairs of points between which heat flows.
     """
     ends = body[joined]
     ends, count = ends[(ends >= 0).all(axis=1)], int(body.max()) + 1

@@ -15,17 +15,18 @@ def facets_with_nodes(
 ) -> dict[str, Numbers]:
     """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all chosen, by facet element.
 
-    Each facet appears once, with the orientation of its first cell, which is outward for facets of a single cell.
+    Each facet appears once, with the orientation of its first cell. This is outward for facets of a single cell.
 
     Parameters
     ----------
     solids : mapping of str to ndarray of int (n_cells, n_nodes)
         Connectivity by element type.
     chosen : ndarray of bool (n_points,)
+        Whether each point is chosen.
     between : bool
-        Whether to return facets between two cells; otherwise those of a single cell.
+        If True, return the facets between two cells; if False, the facets of a single cell.
     among : mapping of str to ndarray of bool (n_cells,), optional
-        Cells to which the facets must belong, by default all.
+        Whether the facets of each cell are considered; by default those of all cells.
     """
     candidates: dict[str, list[Numbers]] = {}
     flags: dict[str, list[Mask]] = {}
@@ -50,10 +51,10 @@ def facets_with_nodes(
 
 
 def added(block: Numbers, facets: Numbers) -> tuple[Numbers, Indices]:
-    """Return a block of facets extended by missing ones, and the rows of all `facets` in it."""
+    """Return a block of facets with the missing facets appended, and the row of each of the `facets` in it."""
     both = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
-    row = first[facet.ravel()]  # the first with equal nodes
+    row = first[facet.ravel()]  # row of the first facet with the same nodes
     new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
     place = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
     return np.concatenate([block, both[new]]), place[row[len(block) :]].astype(np.intp)

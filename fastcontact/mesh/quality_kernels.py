@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of solid cells at quadrature points, and their longest edges, for the detection of bad cells."""
+"""Jacobian determinants of solid cells at quadrature points, and their longest edges, for the detection of poor cells."""
 
 import numpy as np
 
@@ -9,14 +9,14 @@ from fastcontact.mesh.jacobian_kernels import jacobian_2d, jacobian_3d, transpos
 
 @kernel
 def _determinant_2d(x, slopes, q):
-    """Return det J of the cell with nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
+    """Return det J of a cell with nodes x (2, n_nodes) at point q of the shape derivatives `slopes` (n_q, 2, n_nodes)."""
     j00, j01, j10, j11 = jacobian_2d(x, slopes, q)
     return j00 * j11 - j01 * j10
 
 
 @kernel
 def _determinant_3d(x, slopes, q):
-    """Return det J of the cell with nodes x (3, n_nodes) at point q of the slopes (n_q, 3, n_nodes)."""
+    """Return det J of a cell with nodes x (3, n_nodes) at point q of the shape derivatives `slopes` (n_q, 3, n_nodes)."""
     j00, j01, j02, j10, j11, j12, j20, j21, j22 = jacobian_3d(x, slopes, q)
     return j00 * (j11 * j22 - j12 * j21) + j01 * (j12 * j20 - j10 * j22) + j02 * (j10 * j21 - j11 * j20)
 
@@ -27,11 +27,18 @@ def extremes(points, cells, dN, weights, edges, low, high, measure, longest):
 
     Parameters
     ----------
-    points : (n_points, dim), cells : (n_cells, n_nodes)
-    dN : (n_q, n_nodes, dim), weights : (n_q,)
-        Shape derivatives at the points of a quadrature, and its weights.
+    points : (n_points, dim)
+        Coordinates of the points.
+    cells : (n_cells, n_nodes)
+        Connectivity of the cells.
+    dN : (n_q, n_nodes, dim)
+        Shape derivatives at the quadrature points.
+    weights : (n_q,)
+        Weights of the quadrature points.
     edges : (n_edges, 2)
-        Local nodes at the ends of the edges, which are treated as straight.
+        Local end nodes of the edges, which are treated as straight.
+    low, high, measure, longest : (n_cells,)
+        Smallest and largest det J, area or volume, and longest edge.
     """
     n_q, n_nodes, dim = dN.shape
     slopes, x = transposed(dN), np.empty((dim, n_nodes))

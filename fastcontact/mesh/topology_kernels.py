@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Boundary facets, and cells connected by facets, by sorting facets by their nodes."""
+"""Boundary facets, and cells that are connected by facets, found by sorting the facets by their nodes."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from fastcontact._jit.decorators import interpretable_kernel, kernel
 
 @kernel
 def _sorted_nodes(facets):
-    """Return the nodes (n_nodes, n_facets) of every facet, ascending."""
+    """Return the nodes (n_nodes, n_facets) of each facet in ascending order."""
     n, n_nodes = facets.shape
     keys = np.empty((n_nodes, n), np.int32)
     for f in range(n):
@@ -32,7 +32,7 @@ def _same(keys, f, g):
 
 @kernel
 def _root(parent, cell):
-    """Return the root of the set of `cell`, with path halving."""
+    """Return the root of the tree of `cell`, with path halving."""
     while parent[cell] != cell:
         parent[cell] = parent[parent[cell]]
         cell = parent[cell]
@@ -43,11 +43,11 @@ def _root(parent, cell):
 def alone(facets, owner, n_points, single, parent):
     """Fill `single` (n_facets,) with whether no other of the facets (n_facets, n_nodes) has the same nodes.
 
-    Cells, the `owner` (n_facets,) of each facet, that have facets with the same nodes are united in the forest `parent`
-    (n_cells,), in place: the lower root becomes the root of both.
+    `owner` (n_facets,) is the cell of each facet. Cells with facets that have the same nodes are united in the forest
+    `parent` (n_cells,), in place; the lower root becomes the root of both.
 
-    The facets are sorted by counting sorts over their nodes, the lowest last. Facets with the same nodes are then
-    consecutive, in a time independent of the number of facets at a node.
+    The facets are sorted by counting sorts over their nodes, the lowest node last. Facets with the same nodes are then
+    consecutive, in a time that does not depend on the number of facets at a node.
     """
     keys, n = _sorted_nodes(facets), facets.shape[0]
     order, other = np.empty(n, np.int32), np.empty(n, np.int32)

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Inside or outside: winding numbers of closed curves of lines, and of closed surfaces of triangles."""
+"""Winding numbers of closed polygons and of closed surfaces of triangles, which tell inside from outside."""
 
 import numpy as np
 
@@ -19,9 +19,11 @@ def _solid_angle(triangles, k, point):
 
 @kernel
 def winding_numbers(points, pieces, winding):
-    """Fill the winding numbers of a closed surface around each of ``points`` (n, dim): 1 inside, 0 outside.
+    """Fill `winding` (n,) with the winding number of a closed surface around each of ``points`` (n, dim).
 
-    The number is the sum of the angles of its ``pieces`` (m, dim, dim), lines or triangles, positive for outward normals.
+    The winding number is 1 inside and 0 outside. It is the sum of the angles, or solid angles, of the ``pieces``
+    (m, dim, dim) of the surface, which are lines or triangles, divided by a full angle. Angles are positive for outward
+    normals.
     """
     for i in range(points.shape[0]):
         total = 0.0
