@@ -6,7 +6,7 @@ lists the functions that case files can name. All normal contacts have `radius` 
 length.
 
 Positions are numbers or arrays of any shape (...), and results have the same shape. ModelError is raised for a number out
-of range, and if several loads are given where exactly one is needed.
+of range, and unless exactly one load is given where one is needed.
 """
 
 from __future__ import annotations

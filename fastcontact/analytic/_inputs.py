@@ -147,7 +147,7 @@ class Bodies:
         if body not in (1, 2):
             raise ModelError(f"body is {body!r}: it must be 1 or 2")
         if body > len(self._elastic):
-            raise ModelError("body 2 is rigid (E2 is None): it has no displacement field, ask for body 1")
+            raise ModelError("body 2 is rigid (E2 is None): it has no displacement field, request body 1")
         return self._elastic[body - 1]
 
 

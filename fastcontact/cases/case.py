@@ -183,7 +183,7 @@ def _parsed(path: Path) -> tuple[str, dict[str, Any]]:
             raise CaseError(f"'{path}' is a pipe or a terminal, and a case is read more than once: save it in a file")
         if path.stat().st_size > toml_text.LARGEST:
             raise CaseError(
-                f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a file of its own"
+                f"the case file '{path}' is larger than {toml_text.LARGEST >> 20} MB: put its mesh into a separate file"
             )
         text = path.read_text(encoding="utf-8-sig")  # Windows editors begin files with a byte order mark
     except (OSError, ValueError) as error:  # ValueError: a null byte in the name, or text that is not UTF-8
@@ -352,7 +352,7 @@ def _theories(
         if pairs is not None and pair not in pairs:
             raise CaseError(unknown("contact pair in 'theory'", pair, pairs))
         if not isinstance(entry, dict):
-            raise CaseError(f"'theory.{pair}' must be a table of keys, kind first, not {entry!r:.80}")
+            raise CaseError(f"'theory.{pair}' must be a table with the key 'kind', not {entry!r:.80}")
         constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
         theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": _share(f"theory.{pair}", entry)}
         if "mesh_converged" in entry:

@@ -21,7 +21,7 @@ ONLY_IN_SPACE = ("stress.yz", "stress.xz", "displacement.z", "force.z", "moment.
 # Quantities that need an option of the pair: the option, and the message if it is missing.
 NEEDED = {
     "torque": ("rotation", "only an obstacle with a 'rotation' has one"),
-    "heat": ("conductance", "only a contact with the option 'conductance' passes any"),
+    "heat": ("conductance", "only a contact with the option 'conductance' transmits heat"),
     "wear_max": ("wear", "only a contact with the option 'wear' has one"),
 }
 

@@ -102,13 +102,13 @@ def check_settings(data: Mapping[str, Any]) -> None:
         if not (key == "units" and isinstance(data.get(key), str)):
             check_keys(key, data.get(key, {}), known)
     if data.get("modes", {}).get("n", 1) < 1:
-        raise CaseError(f"modes.n = {data['modes']['n']}: ask for one mode or more")
+        raise CaseError(f"modes.n = {data['modes']['n']}: request one mode or more")
     diameters = data.get("modes", {}).get("nodal_diameters", "all")
     wrong = isinstance(diameters, list) and any(
         not isinstance(d, int) or isinstance(d, bool) or d < 0 for d in diameters
     )
     if wrong or (isinstance(diameters, str) and diameters != "all"):
-        raise CaseError(f'modes.nodal_diameters = {diameters!r}: write "all", or whole numbers from 0 on')
+        raise CaseError(f'modes.nodal_diameters = {diameters!r}: write "all", or non-negative whole numbers')
     for key, (kind, form) in STUDY_ENTRIES.items():
         entries = data.get("study", {}).get(key, ())
         for place, entry in entries.items() if isinstance(entries, dict) else enumerate(entries):
@@ -135,7 +135,7 @@ def called(where: str, function: Callable[..., Any], arguments: dict[str, Any]) 
         return function(**arguments)
     except (TypeError, ValueError) as error:
         given = ", ".join(f"{key} = {repr(value)}" for key, value in arguments.items())
-        raise CaseError(f"'{where}': {given} are not of the kinds that it takes ({error})") from error
+        raise CaseError(f"'{where}': {given} have invalid types ({error})") from error
     except FastcontactError as error:
         raise CaseError(_of_key(where, str(error)) or f"'{where}': {error}") from error
 

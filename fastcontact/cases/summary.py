@@ -292,7 +292,7 @@ def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) 
     if inside is None:
         return "open"
     if outside is None:
-        return f"radius {valued(inside, unit, 'length')}, to its end"
+        return f"radius {valued(inside, unit, 'length')}, to the end of the surface"
     return f"radius {inside:.4g} to {valued(outside, unit, 'length')}"
 
 
@@ -300,7 +300,7 @@ def _regularised_line(report: Mapping[str, Any], unit: Mapping[str, str]) -> str
     return (
         f"  held by contact alone: {'; '.join(report['motions'])}. Regularised by springs of "
         f"{valued(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} of the "
-        "load in the end"
+        "load at the end"
     )
 
 
@@ -350,6 +350,6 @@ def _why(check: Mapping[str, Any]) -> list[str]:
     if check["passed"] or off is None or abs(off) <= check["tolerance"]:
         return []
     return [
-        f"    why: the theory is not exact for these bodies: on ever finer meshes the deviation tends to {off:+.3%}, beyond "
-        f"the {check['tolerance']:.3g} that this check asks for"
+        f"    reason: the theory is not exact for these bodies: on finer meshes the deviation tends to {off:+.3%}, more than "
+        f"the {check['tolerance']:.3g} that this check requires"
     ]

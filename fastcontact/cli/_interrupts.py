@@ -66,7 +66,7 @@ def interruptible(raised: list[int] | None = None) -> Iterator[None]:
 
 @contextlib.contextmanager
 def meant(raised: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt in place of an error that a C function has made of it, if a signal was `raised`."""
+    """Raise KeyboardInterrupt if a signal was `raised` and a C function has replaced the exception by another error."""
     try:
         yield
     except Exception as error:

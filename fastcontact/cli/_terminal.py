@@ -63,7 +63,7 @@ def flushed(code: int) -> int:
 
 def _unwritten(error: OSError) -> str:
     """Return the message for a failed write to standard output, for example on a full disk."""
-    return f"cannot write to standard output ({error.strerror}): send it elsewhere"
+    return f"cannot write to standard output ({error.strerror}): redirect it"
 
 
 def encodable(text: str, stream: TextIO) -> str:

@@ -13,7 +13,7 @@ from fastcontact.cli._warnings import warnings_shown
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error and mesh error"
-HINT = "--html FILE makes a report to send on"
+HINT = "--html FILE writes a report"
 ARGUMENTS: Arguments = {
     "case": "case file (TOML); its table [study] defines the meshes",
     "--levels N": (5, "number of meshes (default 5)"),

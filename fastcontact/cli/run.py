@@ -191,7 +191,7 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
     others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
     if others:
         warn(
-            f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file are kept, also that at "
+            f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file are kept, with that at "
             f"load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
         )
 
@@ -207,7 +207,7 @@ def _kept_steps(output: Path, steps: int) -> str:
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:
     """Return a message on the files written and the number of earlier steps."""
     if done == total:
-        nothing = f"{output} was complete with {total} steps, nothing was left to solve"
+        nothing = f"{output} was complete with {total} steps, no step remained to be solved"
         return "; wrote ".join([nothing, ", ".join(others)] if others else [nothing])
     after = f" (resumed after step {done})" if done else ""
     return f"wrote {', '.join([f'{output}{after}', *others])}"

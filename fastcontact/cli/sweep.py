@@ -40,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         wanted[name] = listed
     chosen = {"element": options.element, "formulation": options.formulation, "level": options.level}
     sweep = _study.finished(options, partial(parameter_sweep, options.case, wanted, **chosen))
-    return _study.report(options, sweep, "--png FILE makes a picture", [text for _, text in sweep.failed])
+    return _study.report(options, sweep, "--png FILE writes a picture", [text for _, text in sweep.failed])
 
 
 def values(text: str) -> tuple[str, list[Any]]:

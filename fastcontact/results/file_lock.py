@@ -67,7 +67,7 @@ class PathLock:
                 file.seek(0)
                 holder = file.read().decode("ascii", "replace").strip() or "unknown"
                 file.close()
-                raise FileError(f"'{target}' is being written by process {holder}: let it end or name another file")
+                raise FileError(f"'{target}' is being written by process {holder}: wait for it or name another file")
             if self._is_current(file):
                 break
             file.close()  # the previous holder removed the file between `open` and `lock`
@@ -109,7 +109,7 @@ def _own_file(path: Path) -> IO[Any]:
     except OSError as error:
         if error.errno != errno.ELOOP:
             raise
-        raise FileError(f"'{path}' is a link, but a lock must be a file of its own: remove it") from error
+        raise FileError(f"'{path}' is a link, but a lock must be a regular file: remove it") from error
     status = os.fstat(descriptor)
     if (
         not stat.S_ISREG(status.st_mode)
@@ -117,7 +117,7 @@ def _own_file(path: Path) -> IO[Any]:
         or (hasattr(os, "getuid") and status.st_uid != os.getuid())
     ):
         os.close(descriptor)
-        raise FileError(f"'{path}' is no plain file of yours, as a lock must be: remove it or write to another folder")
+        raise FileError(f"'{path}' is not a regular file of yours, as a lock must be: remove it or write elsewhere")
     return os.fdopen(descriptor, "r+b", buffering=0)
 
 

@@ -108,7 +108,7 @@ def _digest(file: IO[bytes], offset: int, count: int) -> bytes:
 
 def _forged(file: IO[bytes], reason: str) -> FileError:
     name = getattr(file, "name", "the file")
-    return FileError(f"the journal at the end of '{name}' {reason}: no writer leaves that, compute the file again")
+    return FileError(f"the journal at the end of '{name}' {reason}: it is damaged, compute the file again")
 
 
 class Repeated(io.RawIOBase):

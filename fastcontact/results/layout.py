@@ -264,7 +264,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
         if field is None and name in HEAT_FIELDS:
             continue
         if np.ma.isMaskedArray(field):
-            raise FileError(f"step {step.index}: {name} is a masked array, and files keep no masks: fill it first")
+            raise FileError(f"step {step.index}: {name} is a masked array, which files cannot store: fill it first")
         given = np.shape(field)
         if given != shape:
             raise FileError(f"step {step.index}: {name} has shape {given}, but the mesh of the file needs {shape}")
@@ -275,7 +275,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
         given = np.shape(step.cell_fields.get(name, ()))
         if given != (count,):
             raise FileError(
-                f"step {step.index}: the cell field '{name}' that was announced has shape {given}, but ({count},) is "
+                f"step {step.index}: the declared cell field '{name}' has shape {given}, but ({count},) is "
                 "needed, a number for each solid cell"
             )
 

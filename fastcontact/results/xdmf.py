@@ -49,7 +49,7 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
         raise FileError(f"XDMF cannot show '{result_path}' with {names}: open the .vtkhdf file itself (ParaView 5.12)")
     reference = os.path.relpath(os.path.realpath(os.fspath(result_path)), target.parent)
     if ":" in reference or not reference.isascii():
-        raise FileError(f"XDMF readers find no '{reference}': name it without colons and with ASCII letters only")
+        raise FileError(f"XDMF readers cannot open '{reference}': use a name in ASCII without colons")
     n_points, n_cells, n_steps = mesh.n_points, sum(map(len, mesh.solids.values())), len(load_factors)
     shape = [
         f'<Topology TopologyType="Mixed" NumberOfElements="{n_cells}">',

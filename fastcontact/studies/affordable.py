@@ -21,7 +21,7 @@ BYTES_PER_UNKNOWN = 2500
 def check_runs(count: int) -> None:
     """Raise CaseError if a study has more than `MOST_RUNS` runs."""
     if count > MOST_RUNS:
-        raise CaseError(f"a study of {count} runs would not end: give at most {MOST_RUNS}, or fewer values")
+        raise CaseError(f"a study of {count} runs is too large: at most {MOST_RUNS} are possible")
     log.info("%d runs", count)
 
 

@@ -39,7 +39,7 @@ def by_law(law: Any, value: Any, where: str) -> Any:
     if match[1] is None and match[2] is None:
         return value
     if isinstance(value, str) or (match[2] is not None and value < 0):
-        raise CaseError(f"{where} = '{law}' cannot be taken of {value!r}")
+        raise CaseError(f"{where} = '{law}' cannot be evaluated for {value!r}")
     try:
         return float(match[1] or 1.0) * float(value) ** float(match[2] or 1.0)
     except ArithmeticError:

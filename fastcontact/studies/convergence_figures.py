@@ -128,7 +128,7 @@ def draw_differences(
     split, same = best.split(quantity), best.split_equal_force(quantity)
     assert split is not None
     model, bar = 100 * split.model, 100 * split.uncertainty
-    ax.axhline(model, color="tab:red", lw=1.2, label=f"model error {model:+.3f} % (stays)")
+    ax.axhline(model, color="tab:red", lw=1.2, label=f"model error {model:+.3f} % (mesh-independent)")
     ax.axhspan(model - bar, model + bar, color="tab:red", alpha=0.15, lw=0)
     if same is not None and quantity != "force":
         label = f"model error at equal force {100 * same.model:+.3f} %"

@@ -55,7 +55,7 @@ class Study(Report):
 
     @property
     def best(self) -> Series:
-        """Results of the most accurate combination that was solved on all levels, by the rank of `Combination`."""
+        """Results of the combination with the highest rank among those that were solved on the most levels."""
         complete = max(len(series.levels) for series in self.series)
         candidates = [series for series in self.series if len(series.levels) == complete]
         return max(candidates, key=lambda series: series.combination.rank)

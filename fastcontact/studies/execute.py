@@ -121,7 +121,7 @@ class Store:
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise FileError(f"the folder '{folder}' cannot be made: {error.strerror}; name another store") from error
+            raise FileError(f"the folder '{folder}' cannot be created: {error.strerror}; name another store") from error
 
     def path(self, job: Run) -> Path:
         """Return the path of the file for the result of a run."""
@@ -161,7 +161,7 @@ def _run_rest(
 def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[tuple[int, Result]]:
     """Run jobs in `count` local processes; yield the index and the result of each job as it ends.
 
-    After the death of a worker process, each remaining job runs again in a process of its own.
+    If a worker process dies, each remaining job runs again in a separate process.
     """
     if _imports_its_script():
         # The script calls the study outside "if __name__ == '__main__'"; the parent process reports the error.
@@ -228,7 +228,7 @@ def started_pool(count: int) -> Iterator[Workers]:
                 pool.submit(os.getpid).result()
         except BrokenProcessPool:
             raise FastcontactError(
-                "no worker process could start: in a script, put what calls the study under if __name__ == '__main__':, "
+                "no worker process could start: in a script, put the call of the study under if __name__ == '__main__':, "
                 "or use workers=1"
             ) from None
         yield pool
@@ -253,7 +253,7 @@ def _alone(job: Run) -> Result:
         with started_pool(1) as pool:
             return pool.submit(run, job, 1).result()
     except BrokenProcessPool:
-        text = "its worker process was killed, as the system does when the memory is full: use coarser meshes"
+        text = "its worker process was killed, probably because the memory was full: use coarser meshes"
         return {"error": text, "kind": "BrokenProcessPool"}
 
 

@@ -89,9 +89,7 @@ class Run:
     @property
     def key(self) -> str:
         """Name of the run in a store, a hash of all its inputs; CaseError if the inputs are unknown."""
-        raise CaseError(
-            "a store keeps runs of case files, whose text tells what they do: of a function leave 'store' out"
-        )
+        raise CaseError("a store is for case files, since the inputs of a function are not known: leave out 'store'")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -104,7 +102,7 @@ class Job(Run):
     base: Mesh | None  # mesh of the case, if it is read from a file
     folder: Path = Path()  # folder to which file names in the case are relative
 
-    @cached_property  # hash of the files at the begin of a study
+    @cached_property  # hash of the files at the start of a study
     def key(self) -> str:
         """Hash of all inputs of the run: the case, its mesh, the contents of the files in the case, and the version."""
         data = {key: value for key, value in self.data.items() if key not in ("title", "units", "check")}

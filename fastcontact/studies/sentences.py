@@ -81,7 +81,7 @@ def _about_cancelling(series: Series, quantity: str, split: Split) -> list[str]:
     level = series.levels[best]
     return [
         f"Level {level.number} ({level.n_dofs} degrees of freedom) lies only {percent(off[best])} from theory because its "
-        f"mesh error of {percent(off[best] - split.model)} cancels model error: this agreement is no proof of a good mesh."
+        f"mesh error of {percent(off[best] - split.model)} cancels model error: the agreement does not prove a good mesh."
     ]
 
 

@@ -79,7 +79,7 @@ def data_of(case: Case) -> dict[str, Any]:
     except ValueError:
         data = {}
     if "mesh" not in data:
-        kind = "an input deck" if case.deck is not None else "made of data that no case file can hold"
+        kind = "an input deck" if case.deck is not None else "made of data that a case file cannot represent"
         raise CaseError(
             f"'{case.name}' is {kind}: studies change the mesh and the numbers of a case file (TOML), write one"
         )
@@ -126,7 +126,7 @@ def _generator(data: dict[str, Any], study: dict[str, Any]) -> tuple[str | None,
     if generator is not None:
         check_known("study.generator", generator, GENERATORS, CaseError)
     if by_shape and generator is None:
-        raise CaseError(f"study.{next(iter(by_shape))} needs 'study.generator', the mesh maker it is meant for")
+        raise CaseError(f"study.{next(iter(by_shape))} needs 'study.generator', the generator to which it applies")
     if not by_shape and "generator" in study and study["generator"] != data["mesh"].get("generator"):
         raise CaseError("'study.generator' needs the arguments of level 0 in [study.triangles] or [study.quadrangles]")
     for shape, arguments in by_shape.items():

@@ -45,7 +45,7 @@ ACCIDENTS = [
     ("the result file is write-protected", protected_file, ["run", "case.toml", "-o", "old.vtkhdf"],
      r"'.*old\.vtkhdf' is write-protected: remove the protection or name another file"),
     ("another run writes the result file", other_writer, ["run", "case.toml", "-o", "busy.vtkhdf"],
-     r"'.*busy\.vtkhdf' is being written by process \d+: let it end or name another file"),
+     r"'.*busy\.vtkhdf' is being written by process \d+: wait for it or name another file"),
     ("the result file exists and is something else", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
      r"'.*text\.vtkhdf' exists and is not a result file: name another file or remove it first"),
     ("the result file is a pipe", pipe, ["run", "case.toml", "-o", "pipe.vtkhdf"],

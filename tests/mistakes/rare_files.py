@@ -195,6 +195,6 @@ CALLS = [
     ("a result whose point numbers are broken", lambda folder: resulting(folder, broken_point_numbers), fc.errors.FileError, r"the contact table of 'pair' is of another kind"),
     ("a result with a cell field cut off", lambda folder: resulting(folder, cell_field_cut_off), fc.errors.FileError, r"error of step 0 is cut off or of another kind"),
     ("a cell field with a name of two words", announced, fc.errors.FileError, r"'two words' cannot be the name of a cell field: it is taken or no plain word; choose another"),
-    ("a cell field that never came", not_announced, fc.errors.FileError, r"step 1: the cell field 'error' that was announced has shape \(0,\), but \(4,\) is needed, a number for each solid cell"),
+    ("a cell field that never came", not_announced, fc.errors.FileError, r"step 1: the declared cell field 'error' has shape \(0,\), but \(4,\) is needed, a number for each solid cell"),
     ("a result file that others change", changed_by_others, fc.errors.FileError, r"a\.vtkhdf' was changed by another program after 0 steps, what it holds now is left alone: let no other program write to it"),
 ]  # fmt: skip

@@ -159,7 +159,7 @@ class Assembly:
         known = [n for n in candidates if n in items and n in numbers]
         if len(known) < len(numbers):
             absent = f"{len(numbers) - len(known)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
-            self.content.note(entry, f"{absent} are no {kind}s and left out")
+            self.content.note(entry, f"{absent} are not {kind}s and are ignored")
         return (items[n] for n in known)
 
     def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
@@ -201,7 +201,7 @@ class Assembly:
         """Return the point of a node number or of a set with one node; CaseError if it is not defined or not unique."""
         nodes = self.nodes(name, location)
         if len(nodes) != 1:
-            raise location.refuse(f"'{name}' holds {len(nodes)} nodes where one is needed")
+            raise location.refuse(f"'{name}' has {len(nodes)} nodes, but one is needed")
         return nodes[0]
 
     def faces(self, name: str, location: Location) -> list[Face]:
@@ -211,7 +211,7 @@ class Assembly:
             whole, _, left = self.faces_of_nodes(definition, scope)
             if left:
                 raise definition.refuse(
-                    f"the nodes of surface '{definition.name}' make up no whole faces: {len(left)} belong to none "
+                    f"the nodes of surface '{definition.name}' do not form whole faces: {len(left)} belong to none "
                     f"(first: node {self.number_of(left[0])}), and *{location.keyword} in line {location.line} "
                     "needs faces, TYPE=ELEMENT"
                 )

@@ -16,7 +16,7 @@ LARGEST = 1 << 28
 MOST_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
 LONGEST_LINE = 1 << 16
-_TOO_LONG = f"the line has more than {LONGEST_LINE} characters: end it where its entries end"
+_TOO_LONG = f"the line has more than {LONGEST_LINE} characters: break it between two entries"
 LONGEST_QUOTED = 80
 LARGEST_WHOLE = 1 << 53  # all integers up to this one are exact in double precision
 Entry = TypeVar("Entry")
@@ -144,7 +144,7 @@ class Block(Item):
         """
         rows = self.rows
         if len(rows) != 1:
-            text = f"{len(rows)} data lines where one is needed"
+            text = f"{len(rows)} data lines, but one is needed"
             raise self.refuse(text + (f": constants that depend on {why} are not supported" if why else ""))
         return rows[0]
 
@@ -223,7 +223,7 @@ def files_of_deck(path: Path) -> list[Path]:
 
 
 class _Line(NamedTuple):
-    """A line without surrounding blanks, with its number and the byte offsets of its begin and of the next line."""
+    """A line without surrounding blanks, with its number and the byte offsets of its start and of the next line."""
 
     number: int
     begin: int
@@ -237,9 +237,7 @@ def _contents(path: Path, source: Source) -> bytes:
     try:
         source.size += path.stat().st_size
         if source.size > LARGEST or len(source.files) > MOST_FILES:
-            raise FileError(
-                f"'{path}' with what it includes is more than {LARGEST >> 20} MiB or {MOST_FILES} files: too much for a deck"
-            )
+            raise FileError(f"'{path}' and its included files have more than {LARGEST >> 20} MiB or {MOST_FILES} files")
         contents = path.read_bytes().removeprefix(BOM_UTF8)
     except OSError as error:
         raise FileError(f"cannot read '{path}': {error.strerror or error}") from error
@@ -358,7 +356,7 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
         raise block.refuse(f"'{shown}' is not a file name") from None
     if not inside:
         raise block.refuse(
-            f"'{shown}' is outside the folder of the deck: refused, copy the file below '{source.folder}'"
+            f"'{shown}' is outside the folder of the deck: copy the file into or below '{source.folder}'"
         )
     if not there:
         raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")

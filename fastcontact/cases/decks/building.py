@@ -167,7 +167,7 @@ class Building:
         for element in members:
             if axes.part is not self.content.root and self.assembly.turned(element.scope):
                 raise axes.refuse(
-                    "axes of a part whose instance is turned are not supported: give them in the assembly"
+                    "axes of a part whose instance is rotated are not supported: give them in the assembly"
                 )
         if axes.distribution:
             return axes_by_cell(self.assembly, axes, members)
@@ -316,7 +316,7 @@ class Building:
         material = self._material(element.given_section)
         if material.density is None:
             location = conditions.loads.tracks[name].location
-            raise location.refuse(f"material '{material.name}' has no *DENSITY, so {name.kind} is no force")
+            raise location.refuse(f"material '{material.name}' has no *DENSITY, which {name.kind} requires")
         return material.density
 
     def _springs(self) -> None:
@@ -342,8 +342,8 @@ class Building:
         if all(map(all_nodes_carry, self.assembly.groups[secondary])):
             options["formulation"] = "node_to_segment"
         self.content.note(
-            pair, f"the nodes of surface '{pair.secondary}' make up no whole faces: they alone of the facets around "
-            "them are in contact"
+            pair, f"the nodes of surface '{pair.secondary}' do not form whole faces: of the facets around them, only "
+            "these nodes are in contact"
         )  # fmt: skip
         return options
 
@@ -390,7 +390,7 @@ class Building:
         if pair.clearance is not None:
             if np.ptp(gaps) > size:
                 raise pair.refuse(
-                    f"*CLEARANCE is supported between sides of one distance, these are {gaps.min():.6g} to "
+                    f"*CLEARANCE is supported between sides at a uniform distance only, and these are {gaps.min():.6g} to "
                     f"{gaps.max():.6g} apart"
                 )
             return {"clearance": pair.clearance - float(gaps.mean())}
@@ -406,7 +406,7 @@ class Building:
             if np.ptp(gaps) <= size
             else f"of {moved.min():.6g} to {moved.max():.6g} at {len(moved)} nodes"
         )
-        self.content.note(pair, f"ADJUST: the distance {distance} of the sides counts as none")
+        self.content.note(pair, f"ADJUST: the distance {distance} of the sides is taken as zero")
         if np.ptp(gaps) <= size:
             return {"clearance": -float(gaps.mean())}
         closing = -np.where(gaps <= within, gaps, 0.0)

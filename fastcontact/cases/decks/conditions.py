@@ -34,7 +34,7 @@ class Acting:
     begins, ends : float
         Load factors between which the support acts [-].
     keeps : bool
-        Whether the support holds the displacement at its begin.
+        Whether the support holds the displacement at its start.
     """
 
     location: Location | None
@@ -92,7 +92,7 @@ class Conditions:
             {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
 
     def _change(self, number: int) -> None:
-        """Record the supports that begin or end at the begin of step `number`."""
+        """Record the supports that begin or end at the start of step `number`."""
         begin, changing = number - 1.0, self.supports.changing
         kept = (name for name in self.acting if name in changing and name not in self.keeping)
         moved = dict.fromkeys(name for name in kept if self._acts(name) and self.acting[name].keeps)

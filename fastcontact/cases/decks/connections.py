@@ -17,9 +17,9 @@ def contact_pair(content: Content, block: Block) -> None:
     """Read *CONTACT PAIR; the first surface of a line is the secondary side."""
     kinds = ("NODE TO SURFACE", "SURFACE TO SURFACE", "MORTAR", "LINMORTAR", "PGLINMORTAR")
     if block.choice("TYPE", kinds) == "NODE TO SURFACE":
-        content.note(block, "NODE TO SURFACE: mortar contact is solved, which passes uniform pressures on any meshes")
+        content.note(block, "NODE TO SURFACE: mortar contact is used, which transmits uniform pressures on any meshes")
     if "SMALL SLIDING" in block.parameters:
-        content.note(block, "SMALL SLIDING: sides are paired on the deformed shape nevertheless")
+        content.note(block, "SMALL SLIDING: no effect, contact is detected in the deformed configuration")
     adjust = block.get("ADJUST") if "ADJUST" in block.parameters else ""
     content.pairs += [
         Pair(*sides, block.required("INTERACTION"), adjust=adjust) for sides in _sides(block, "a contact pair")
@@ -106,7 +106,7 @@ def multi_point(content: Content, block: Block) -> None:
             known = ", ".join(("PIN", "TIE", "BEAM", *LEAST))
             raise row.refuse(f"an MPC of type {kind[:40]} is not supported, only {known}")
         elif len(nodes) != 2:
-            raise row.refuse(f"{kind} needs two nodes, the one that follows and the one that leads")
+            raise row.refuse(f"{kind} needs two nodes, the dependent and the independent one")
         elif kind == "BEAM":
             content.links.append(Link(row.location, nodes[1], nodes[0], "nodes"))
         else:

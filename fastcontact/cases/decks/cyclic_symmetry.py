@@ -45,7 +45,7 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
         first, second = np.array(sectors.points[:3]), np.array(sectors.points[3:])
         direction = (second - first) / np.linalg.norm(second - first)
         if model.mesh.dim == 2 and np.abs(direction[:2]).max() > 1e-9:
-            raise sectors.refuse("the axis of a plane model is along z: give two points above each other")
+            raise sectors.refuse("the axis of a plane model is along z: give two points that differ in z only")
         for name in ends.surfaces:
             deck_mesh.faces(name, ends.location)
         groups = [group_of_surface(deck_mesh, name) for name in ends.surfaces]
@@ -56,7 +56,7 @@ def add_sectors(model: Model, deck_mesh: DeckMesh) -> list[MultiPointConstraint]
             )  # fmt: skip
     for ends in content.sector_ends:
         if id(ends) not in used:
-            raise ends.refuse("no *CYCLIC SYMMETRY MODEL says how many sectors there are, and round which axis")
+            raise ends.refuse("no *CYCLIC SYMMETRY MODEL defines the number of sectors and the axis")
     return model.relations[before:]
 
 

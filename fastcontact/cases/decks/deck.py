@@ -210,8 +210,8 @@ class Deck:
             strain = self._largest_strain(step)
             angle, _ = largest_rotation(self.model.mesh, step.displacement)
             warn(
-                f"{asked.location}: NLGEOM, but small strains and rotations were solved; found an equivalent strain up to "
-                f"{strain:.3g} and a rotation up to {angle:.3g} radian, of which linear kinematics leave out the squares"
+                f"{asked.location}: NLGEOM, but small strains and rotations were assumed; the equivalent strain is up to "
+                f"{strain:.3g} and the rotation up to {angle:.3g} radian, whose squares linear kinematics neglect"
             )
             return
 
@@ -265,7 +265,7 @@ def read_deck(path: PathLike) -> Deck:
     if building.linearised:
         step = next(step for step in content.steps if step.nonlinear)
         warn(
-            f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are solved; the result is "
+            f"{step.location}: NLGEOM: with {building.linearised} small strains and rotations are assumed; the result is "
             "valid only while they stay small, and a warning after the solution reports how large they are"
         )
     return Deck(
@@ -301,7 +301,7 @@ def _notes(content: Content, thickness: float) -> tuple[str, ...]:
         kinds = ", ".join(f"*{keyword}" for keyword in output)
         notes.append(f"{kinds}: no effect, the result file holds all output of all steps")
     if "CONTROLS" in requests:
-        notes.append("*CONTROLS: no effect, convergence has criteria of its own")
+        notes.append("*CONTROLS: no effect, the package has its own convergence criteria")
     if thickness != 1.0:
-        notes.append(f"thickness {thickness:g}: the model has a unit of it, results of the deck are those of the whole")
+        notes.append(f"thickness {thickness:g}: the model has unit thickness, results are for the whole thickness")
     return tuple(notes)

@@ -77,7 +77,7 @@ def element_type(name: str) -> ElementType | None:
     table, kinematics = (SOLIDS, "3d") if base[:3] == "C3D" else (PLANES, FAMILIES.get(base[:3], ""))
     element = table.get(base[3:])
     if modes and kinematics == "axisymmetric":
-        modes, note = False, "without incompatible modes: stiffer where thin parts of linear elements bend"
+        modes, note = False, "without incompatible modes, which makes thin parts stiffer in bending"
     return ElementType(name, element, kinematics, note, modes, conducts) if element and kinematics else None
 
 

@@ -66,7 +66,7 @@ def spring(content: Content, block: Block) -> None:
     """Read *SPRING: the stiffness of springs along their axis."""
     rows = block.rows
     if len(rows) != 1:
-        raise block.refuse("linear springs along their line need an empty line and then one with the stiffness")
+        raise block.refuse("linear springs along their axis need an empty line, followed by a line with the stiffness")
     if rows[0].text(1):
         raise rows[0].refuse("only linear springs are supported: one stiffness")
     content.springs[folded(block.required("ELSET"))] = (block.location, rows[0].positive(0, "stiffness"))
@@ -121,14 +121,14 @@ def add_gap(model: Model, deck_mesh: DeckMesh, gap: GapGroup, conditions: Condit
     first, second = model.mesh.points[gap.ends[:, 0]], model.mesh.points[gap.ends[:, 1]]
     size = TOUCHING * float(np.ptp(model.mesh.points, axis=0).max())
     if np.ptp(first @ gap.direction) > size:
-        raise gap.refuse("gap elements are supported where their nodes lie in a plane across their direction")
+        raise gap.refuse("gap elements are supported if their nodes lie in a plane normal to their direction")
     if gap.opposite:
         between = second - first
         along = between @ gap.direction
         off = np.abs(between - np.outer(along, gap.direction)).max()
         if max(np.ptp(along), off, -along.mean()) > size:
             raise gap.refuse(
-                "gap elements between bodies are supported along their direction, in planes across it only"
+                "gap elements between bodies are supported along their direction, in planes normal to it only"
             )
         with refusing(gap):
             model.add_contact(
@@ -158,7 +158,7 @@ def _motion(gap: GapGroup, conditions: Conditions) -> Table:
         tables = {supports.table(name) for name in names if name in supports.tracks and name not in temporary}
         if len(tables) != 1 or not all(name in supports.tracks and name not in temporary for name in names):
             raise gap.refuse(
-                "gap elements are supported to nodes that are held, or driven as one, along their direction"
+                "gap elements need second nodes that are fixed, or have the same prescribed motion, along their direction"
             )
         by_axis.append((float(gap.direction[axis]), np.array(tables.pop())))
     times = np.unique(np.concatenate([table[:, 0] for _, table in by_axis]))

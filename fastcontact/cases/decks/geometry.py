@@ -31,7 +31,7 @@ def nodes(content: Content, part: Part, block: Block) -> None:
         if 3 * known == len(part.coordinates):
             part.coordinates.extend(position)
         elif part.coordinates[3 * known : 3 * known + 3] != position:
-            raise row.refuse(f"node {number} is defined twice, at different places")
+            raise row.refuse(f"node {number} is defined twice, at different positions")
         numbers.append(number)
     if block.get("NSET"):
         part.add("node", block.get("NSET"), [Members(block.location, numbers)])

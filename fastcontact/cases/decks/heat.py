@@ -36,12 +36,12 @@ def check_steps(content: Content) -> None:
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
             raise step.refuse(
-                "steps of heat alone, of heat with displacements, and static ones after these cannot be in one deck: make "
+                "steps with heat alone, with heat and displacements, and static steps after them cannot be in one deck: make "
                 "all *HEAT TRANSFER, or *COUPLED TEMPERATURE-DISPLACEMENT"
             )
         for block in (given.block for given in step.given):
             if block.keyword in OF_HEAT and not step.heat:
-                raise block.refuse("heats bodies in steps with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
+                raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
                 raise block.refuse("temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11")
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
@@ -123,7 +123,7 @@ class HeatConditions:
         for row in given.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
-                    raise row.refuse(f"component {row.text(1)} is not 11, that of heat")
+                    raise row.refuse(f"component {row.text(1)} is not 11, the temperature")
                 for point in self._of_solids(row):
                     self.powers.give(point, row.number(2), given.amplitude, row.location)
                 continue
@@ -142,7 +142,7 @@ class HeatConditions:
         if before is not None and before != film:
             if before in self.films.changing:
                 (new,), (old,) = film.numbers, before.numbers
-                raise row.refuse(f"{new:g} is the second coefficient here in one step, after {old:g}")
+                raise row.refuse(f"{new:g} is the second coefficient in this step, after {old:g}")
             if before in self.films.tracks and self.films.tracks[before].alive:
                 self.films.dying[before] = None
         self.film_of[film.keyword, film.face] = film
@@ -236,8 +236,8 @@ def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
     location = content.initial[0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
         raise location.refuse(
-            f"initial temperatures from {min(values):g} to {max(values):g} are not supported where computed ones expand "
-            "bodies: strains count from one temperature"
+            f"initial temperatures from {min(values):g} to {max(values):g} are not supported if computed temperatures expand "
+            "bodies: strains refer to a single temperature"
         )
-    content.note(location, "no effect: initial temperatures differ, and steady ones do not depend on them")
+    content.note(location, "no effect: initial temperatures differ, and steady temperatures do not depend on them")
     return 0.0

@@ -17,7 +17,7 @@ from fastcontact.cases.decks.content import Amplitude, Content, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
-# Duration of a jump at the begin of a step, relative to the duration of the step.
+# Duration of a jump at the start of a step, relative to the duration of the step.
 JUMP = 1e-9
 # Number of decimals to which scaled histories must agree to be merged.
 ALIKE = 12
@@ -129,7 +129,7 @@ class Histories(Generic[Name]):
     first : Values
         Values given before all steps, which are effective in the first step unless that step changes them.
     time : float
-        Total time at the begin of the current step.
+        Total time at the start of the current step.
     lasting : dict
         Tracks whose amplitudes are in total time, by the identity of the track.
     """
@@ -149,8 +149,8 @@ class Histories(Generic[Name]):
             first, other, before = self.changing.get(name)
             if (first, other) != (value, amplitude):
                 raise location.refuse(
-                    f"{value:g} is the second value here in one step, after {first:g} in line {before.line}: programs "
-                    "differ in what that means, so give it once"
+                    f"{value:g} is the second value in this step, after {first:g} in line {before.line}, which programs "
+                    "interpret differently: give one value"
                 )
         self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
@@ -303,7 +303,7 @@ def given_values(values: Array, positions: Array) -> Array:
 def _shaped(value: float, shape: Amplitude, begin: float, start: float, period: float) -> list[tuple[float, float]]:
     """Return load factors and values of an amplitude in a step that begins at the load factor `begin`.
 
-    `start` is the total time at the begin of the step and `period` its duration.
+    `start` is the total time at the start of the step and `period` its duration.
     """
     first = start if shape.total else 0.0
     low, high = bisect_right(shape.times, first), bisect_left(shape.times, first + period)

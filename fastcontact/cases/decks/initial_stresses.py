@@ -28,7 +28,7 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
         for row in block.each():
             if len(row.entries) != 1 + len(names):
                 raise row.refuse(
-                    f"{len(row.entries)} entries where {1 + len(names)} are needed: an element or a set, and the components "
+                    f"{len(row.entries)} entries, but {1 + len(names)} are needed: an element or a set, and the components "
                     f"{', '.join(names)} of its stress; stresses by integration point are not supported"
                 )
             numbers = [row.number(index) for index in range(1, 1 + len(names))]

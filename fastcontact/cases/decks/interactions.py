@@ -31,12 +31,12 @@ def interaction(content: Content, block: Block) -> Interaction:
     properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
         block.rows[0].number(0, 1.0)
-        content.note(block.rows[0], "the thickness of the interaction has no effect: that of the sections counts")
+        content.note(block.rows[0], "the thickness of the interaction has no effect: that of the sections is used")
     return properties
 
 
 def changed_interaction(content: Content, block: Block) -> Interaction:
-    """Read *CHANGE FRICTION; a *FRICTION below it sets the friction from the begin of the current step."""
+    """Read *CHANGE FRICTION; a *FRICTION below it sets the friction from the start of the current step."""
     name = block.required("INTERACTION")
     before = defined("surface interaction", name, content.interactions, block)
     changed = Interaction(name, block.location, friction=-1.0)  # set by *FRICTION
@@ -67,7 +67,7 @@ def _table(block: Block) -> float | list[tuple[float, float]]:
         TabularLaw("", points)
     except ContactError:
         raise block.refuse(
-            "TABULAR needs pressures and overclosures that both ascend, the first pressure zero"
+            "TABULAR needs ascending pressures and overclosures, with a first pressure of zero"
         ) from None
     return points[1][1] / points[1][0] if len(points) == 2 and points[0][0] == 0.0 else points
 
@@ -95,11 +95,11 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
     row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
-        raise row.refuse(f"the share {share:g} of the work of friction that becomes heat must lie between 0 and 1")
+        raise row.refuse(f"the share {share:g} of the frictional work that becomes heat must lie between 0 and 1")
     if secondary != 0.5:
         raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
     if row.number(2, 0.0) > 0.0:
-        raise row.refuse("a given velocity is not supported: sides slide by their displacements")
+        raise row.refuse("a prescribed sliding velocity is not supported")
     current.friction_heat = block.location, share
 
 
@@ -112,15 +112,15 @@ def keep(content: Content, current: Interaction, block: Block) -> None:
 
 def stabilization(content: Content, current: Interaction, block: Block) -> None:
     """Read *DAMAGE STABILIZATION, which has no effect."""
-    content.note(block, "no effect: layers break without viscosity")
+    content.note(block, "no effect: damage has no viscous regularisation")
 
 
 def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
-    """Return the friction options of a pair, with the changes by *CHANGE FRICTION at the begin of steps."""
+    """Return the friction options of a pair, with the changes by *CHANGE FRICTION at the start of steps."""
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.refuse("one *FRICTION must follow, and nothing else of the interaction changes")
+            raise changed.refuse("one *FRICTION must follow, and no other change of the interaction")
         table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
         sticks |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
@@ -156,7 +156,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
         content.note(behaviour, "neither stiffness nor damage: the sides are tied")
         return {"kind": "tied"}
     if initiation is None or evolution is None:
-        raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed: layers here break")
+        raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed")
     strength, shear = _in_modes(initiation, "strengths")
     criterion = INITIATIONS[initiation.choice("CRITERION", tuple(INITIATIONS))]
     given = {"strength": strength, "shear_strength": shear, "initiation": criterion}
@@ -164,7 +164,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     if stiffness is None:
         content.note(
             behaviour,
-            f"no stiffness: damage begins at {ELASTIC:g} of the opening at which the layer is broken",
+            f"no stiffness: damage begins at {ELASTIC:g} of the opening at which the layer fails",
         )
     else:
         given["stiffness"] = stiffness
@@ -184,7 +184,7 @@ def _stiffness(block: Block) -> float | None:
     row = block.only("modes or fields")
     values = {row.number(index, row.number(0)) for index in range(3)}
     if len(values) > 1:
-        raise row.refuse("a layer has one stiffness here, the same for opening and for sliding")
+        raise row.refuse("a layer must have the same stiffness for opening and for sliding")
     return row.positive(0, "stiffness")
 
 
@@ -199,7 +199,7 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
         power = as_number(block.location, block.required("POWER"))
         return {"energy": energy, "shear_energy": shear, "mixed_mode": MODES[mode], "exponent": power}
     if mode in MODES:
-        raise block.refuse(f"MIXED MODE BEHAVIOR={mode} is that of TYPE=ENERGY")
+        raise block.refuse(f"MIXED MODE BEHAVIOR={mode} requires TYPE=ENERGY")
     value = block.only("modes or fields").positive(0, "number")
     if kind == "ENERGY":
         return {"energy": value, "shear_energy": value}
@@ -229,24 +229,22 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
         if len({row.number(2, 0.0) for row in block.rows}) > 1:
             raise block.refuse("a conductance that depends on the temperature is not supported: give one table")
         if not rows or any(b[0] <= a[0] for a, b in pairwise(rows)):
-            raise block.refuse("needs conductances with pressures or clearances that ascend")
+            raise block.refuse("needs conductances with ascending pressures or clearances")
         if len(rows) == 1:
             tables["number"] = rows[0][1]
             continue
         pressure = "PRESSURE" in block.parameters
         by = "pressure" if pressure or rows[-1][1] >= rows[0][1] else "gap"
         if not pressure:
-            meant = (
-                "rises with: pressure, as in CalculiX" if by == "pressure" else "falls with: clearance, as in Abaqus"
-            )
-            content.note(block, f"the conductance is by what it {meant}")
+            meant = "depends on pressure, as in CalculiX" if by == "pressure" else "depends on clearance, as in Abaqus"
+            content.note(block, f"the conductance {meant}")
         end = (rows[-1][0] * BEYOND, 0.0)
         tables[by] = rows if by == "pressure" else [*rows, end]
         if by == "pressure" and content.heat == "alone":
-            content.note(block, "steps of heat alone have no pressures: sides that touch conduct as without any")
+            content.note(block, "steps with heat alone have no pressures: closed contact conducts as at zero pressure")
     given = tables.pop("number", None)
     if given is not None and tables:
-        raise law.conductance[0].refuse("one conductance, and a table besides: give one of them")
+        raise law.conductance[0].refuse("a constant conductance and a table are given: leave out one of them")
     if given is None and not tables:
         return {}
     with refusing(law.conductance[0]):
@@ -263,7 +261,7 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
     location, share = law.friction_heat
     periods = {step.period for step in content.steps}
     if len(periods) > 1:
-        raise location.refuse("heat of friction is supported in steps of the same length only, which is their time")
+        raise location.refuse("frictional heating is supported only if all steps have the same duration")
     return {"friction_heat": share / periods.pop()}
 
 
@@ -271,5 +269,5 @@ def perfect_conductance(content: Content, model: Model, location: Location) -> A
     """Return the conductance of a tie [power / (area temperature)], which does not depend on pressure and gap."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
-    content.note(location, f"heat crosses by a conductance of {h:.3g}: temperatures of both sides differ by some 1e-8")
+    content.note(location, f"the conductance is {h:.3g}, with which the temperatures of the sides differ by about 1e-8")
     return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h

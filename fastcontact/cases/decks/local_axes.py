@@ -32,9 +32,9 @@ def orientation(content: Content, part: Part, block: Block) -> None:
     if not distribution:
         points = tuple(rows[0].number(i) for i in range(6))
         if any(rows[0].entries[6:]) and any(rows[0].number(6 + i, 0.0) for i in range(3)):
-            raise rows[0].refuse("an origin of the axes is not supported: give points seen from 0, 0, 0")
+            raise rows[0].refuse("an origin of the axes is not supported: give points relative to 0, 0, 0")
     if len(rows) > 1 and rows[1].number(1, 0.0):
-        raise rows[1].refuse("a further rotation of the axes is not supported: turn the points of the first line")
+        raise rows[1].refuse("a further rotation of the axes is not supported: rotate the points of the first line")
     content.orientations[key] = Axes(block.location, "", system == "CYLINDRICAL", points, distribution, part)
 
 
@@ -77,7 +77,7 @@ def orientation_of(content: Content, name: str, location: Location) -> Axes:
         raise location.refuse(f"orientation '{name}' is not defined; orientations: {known}")
     if axes.distribution and location.keyword != "SOLID SECTION":
         raise location.refuse(
-            f"orientation '{name}' is one of cells, by a distribution: it can be used in sections only"
+            f"orientation '{name}' varies by element, by a distribution: it can be used in sections only"
         )
     return axes
 
@@ -106,9 +106,7 @@ def axes_by_cell(assembly: Assembly, axes: Axes, members: Sequence[Element]) -> 
     for element in members:
         axes_here = given.get(id(element), default)
         if axes_here is None:
-            raise block.refuse(
-                f"element {element.number} has no axes, and no line without an element gives those of others"
-            )
+            raise block.refuse(f"element {element.number} has no axes, and there is no default line without an element")
         frames[first[element.solid.element] + element.row] = axes_here
     return frames
 

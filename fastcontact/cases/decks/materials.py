@@ -105,7 +105,7 @@ def plastic(content: Content, current: Material, block: Block) -> None:
     hardening = block.choice("HARDENING", ("ISOTROPIC", "KINEMATIC"))
     elastic = None if current.law is None else current.law(None)
     if type(elastic) is not LinearElastic:
-        raise block.refuse(f"material '{current.name}': isotropic *ELASTIC constants come before it")
+        raise block.refuse(f"material '{current.name}': isotropic *ELASTIC constants must precede it")
     table = [(row.number(1, 0.0), row.number(0)) for row in block.rows]
     if not table:
         raise block.refuse("a data line with a yield stress is needed")
@@ -137,7 +137,7 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
         raise block.refuse(f"material '{current.name}': {kind} has {first} constants, {len(numbers)} are given")
     constants, compressible = numbers[:first], [*numbers[first : first + rest], *[0.0] * rest][:rest]
     if any(compressible[1:]):
-        raise block.refuse(f"material '{current.name}': of the compressibility only D1 is supported")
+        raise block.refuse(f"material '{current.name}': only the compressibility constant D1 is supported")
     mu = _shear_modulus(kind, constants)
     bulk = 2.0 / compressible[0] if compressible[0] else 2.0 * mu * (1.0 + UNGIVEN) / (3.0 * (1.0 - 2.0 * UNGIVEN))
     if not compressible[0]:
@@ -177,9 +177,7 @@ def expansion(content: Content, current: Material, block: Block) -> None:
     """Read *EXPANSION: coefficients of thermal expansion at one temperature."""
     current.expansion = along_axes(current, block)
     if "ZERO" in block.parameters:
-        content.note(
-            block, "ZERO has no effect: strains count from the initial temperatures, coefficients are constant"
-        )
+        content.note(block, "ZERO has no effect: strains refer to the initial temperatures, coefficients are constant")
 
 
 def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
@@ -187,7 +185,7 @@ def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
     if len(block.rows) != 1:
         raise block.refuse(
-            f"material '{current.name}': {len(block.rows)} data lines where one is needed: coefficients that depend on "
+            f"material '{current.name}': {len(block.rows)} data lines, but one is needed: coefficients that depend on "
             "temperatures are not supported"
         )
     row, count = block.rows[0], COEFFICIENTS[kind]
@@ -213,7 +211,7 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
     heated = content.heat or any(given.block.keyword == "TEMPERATURE" for step in content.steps for given in step.given)
     if expansion is None:
         if heated:
-            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures do not strain it")
+            content.note(material, f"material '{material.name}' has no *EXPANSION: temperatures cause no strain")
         return replace(law, expansion=0.0) if heated else law
     if not heated:
         content.note(material, f"material '{material.name}': without temperatures the expansion has no effect")

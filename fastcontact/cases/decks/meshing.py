@@ -111,7 +111,7 @@ class DeckMesh(Assembly):
         mesh = Mesh(points, cells, groups, self.point_groups)
         mesh, turned = topology.oriented(mesh)
         if turned:
-            self.content.notes.append(f"{turned} elements were inside out and are turned")
+            self.content.notes.append(f"{turned} elements were inverted and are reoriented")
         return mesh
 
 

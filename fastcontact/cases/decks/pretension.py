@@ -18,11 +18,11 @@ from fastcontact.model.model import Model
 def pretension_section(content: Content, block: Block) -> None:
     """Read *PRE-TENSION SECTION: a surface across a bolt, and the node for the shortening and the force of the bolt."""
     if len(block.rows) > 1:
-        raise block.refuse(f"{len(block.rows)} data lines where one is needed, the normal")
+        raise block.refuse(f"{len(block.rows)} data lines, but one is needed, the normal")
     row = block.rows[0] if block.rows else None
     normal = None if row is None else (row.number(0), row.number(1, 0.0), row.number(2, 0.0))
     if normal is not None and not any(normal):
-        raise block.refuse("the normal has no length")
+        raise block.refuse("the normal is zero")
     content.pretensions.append(
         PretensionSection(block.location, block.required("SURFACE"), block.required("NODE"), normal)
     )
@@ -34,7 +34,7 @@ def section_points(assembly: Assembly) -> dict[int, PretensionSection]:
     for section in assembly.content.pretensions:
         point = assembly.node(section.node, section.location)
         if point in assembly.of_solids:
-            raise section.refuse(f"node {section.node} belongs to an element: a section needs one of its own")
+            raise section.refuse(f"node {section.node} belongs to an element: a section needs a separate node")
         if point in sections:
             raise section.refuse(f"node {section.node} has a section already, in line {sections[point].location.line}")
         sections[point] = section

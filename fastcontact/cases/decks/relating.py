@@ -71,8 +71,8 @@ def _pinned(deck_mesh: DeckMesh, pin: Pin) -> list[list[Term]]:
         second = second * len(first)
     if len(first) != len(second) or set(zip(first, second, strict=True)) & set(zip(second, first, strict=True)):
         raise pin.refuse(
-            f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: as many are needed, or one that "
-            "leads, each another one"
+            f"'{pin.first}' and '{pin.second}' have {len(first)} and {len(second)} nodes: the numbers must be equal, or the "
+            "second one, and the nodes must differ"
         )
     return [
         [(p, axis, 1.0), (q, axis, -1.0)] for p, q in zip(first, second, strict=True) for axis in range(deck_mesh.dim)
@@ -165,7 +165,7 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
 def _normals_to(constraint: MultiPoint, line: Array) -> Array:
     """Return two unit vectors (2, 3) [-] normal to a line."""
     if not line.any():
-        raise constraint.refuse("the first two nodes of STRAIGHT are at one place")
+        raise constraint.refuse("the first two nodes of STRAIGHT coincide")
     return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
@@ -180,13 +180,13 @@ def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> li
     length = np.linalg.norm(axis)
     if length == 0.0:
         raise constraint.refuse(
-            "the coordinates of the last node of MEANROT are the direction of the axis, and all zero"
+            "the coordinates of the last node of MEANROT are the direction of the axis, which must not be zero"
         )
     axis = axis / length
     offset = places - np.outer(places @ axis, axis)
     squared = np.einsum("nd,nd->n", offset, offset)
     if squared.min() <= FLAT * squared.max():
-        raise constraint.refuse("a node of MEANROT lies in the middle of the others, where it has no angle")
+        raise constraint.refuse("a node of MEANROT lies on the axis through the centre, where it has no angle")
     arms = np.cross(axis, offset) / squared[:, None] / len(offset)
     arms -= arms.mean(axis=0)
     return [*_terms(nodes[:-1], arms), (nodes[-1], 0, -1.0)]

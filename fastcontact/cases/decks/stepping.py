@@ -15,7 +15,7 @@ def new_step(content: Content, block: Block) -> Step:
     """Read *STEP and return the new step."""
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
     if content.modes is not None:
-        raise block.refuse("follows a step with *FREQUENCY, which is supported as the last one only")
+        raise block.refuse("follows a step with *FREQUENCY, which must be the last step")
     block.choice("AMPLITUDE", ("RAMP",))
     content.steps.append(Step(block.location, nonlinear, perturbation="PERTURBATION" in block.parameters))
     return content.steps[-1]
@@ -28,10 +28,10 @@ def static(content: Content, step: Step, block: Block) -> None:
     if step.modes:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     if step.perturbation:
-        raise step.refuse("PERTURBATION is not supported: contact has no linear perturbation, but modes by *FREQUENCY")
+        raise step.refuse("PERTURBATION is not supported with *STATIC, only with *FREQUENCY")
     step.static = True
     if "STABILIZE" in block.parameters:
-        content.note(block, "STABILIZE has no effect: contact is exact, and bodies that it alone holds need no damping")
+        content.note(block, "STABILIZE has no effect: bodies that are held by contact alone need no damping")
     for row in block.rows[:1]:
         step.increment = row.number(0, 1.0)
         step.period = row.number(1, 1.0)
@@ -44,7 +44,7 @@ def static(content: Content, step: Step, block: Block) -> None:
 def heated(content: Content, step: Step, block: Block) -> None:
     """Read *HEAT TRANSFER, *COUPLED or *UNCOUPLED TEMPERATURE-DISPLACEMENT like *STATIC, with steady heat conduction."""
     if "STEADY STATE" not in block.parameters:
-        raise block.refuse("only STEADY STATE is supported: heat is not followed in time")
+        raise block.refuse("only STEADY STATE is supported, not transient heat conduction")
     static(content, step, block)
     step.heat = "alone" if block.keyword == "HEAT TRANSFER" else "coupled"
     if block.keyword[:2] == "UN":
@@ -57,7 +57,7 @@ def frequency(content: Content, step: Step, block: Block) -> None:
         raise block.refuse("a step has either *STATIC or one *FREQUENCY")
     number = block.rows[0].whole(0, 10) if block.rows else 10
     if number < 1:
-        raise block.rows[0].refuse("requests no mode: write how many")
+        raise block.rows[0].refuse("the number of modes must be at least 1")
     step.modes = number
 
 
@@ -65,20 +65,20 @@ def end_step(content: Content, step: Step) -> None:
     """Read *END STEP; a step with *FREQUENCY becomes a request for modes instead of a load step."""
     if not step.modes:
         if not step.static:
-            raise step.refuse("the step has no *STATIC or other procedure, so it is unknown what to solve")
+            raise step.refuse("the step has no *STATIC or other procedure")
         return
     if step.given:
-        raise step.given[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the supports of before")
+        raise step.given[0].block.refuse("cannot be in a step with *FREQUENCY: modes have the earlier supports")
     content.steps.pop()
     if not content.steps:
-        raise step.refuse("*FREQUENCY needs a step with *STATIC before: modes are those about its end")
+        raise step.refuse("*FREQUENCY needs a step with *STATIC before it: modes are vibrations about its last state")
     if content.steps[-1].heat == "alone":
-        raise step.refuse("*FREQUENCY behind *HEAT TRANSFER is not supported: bodies are at rest there")
+        raise step.refuse("*FREQUENCY after *HEAT TRANSFER is not supported: displacements are fixed there")
     stiffening = step.perturbation or any(earlier.nonlinear for earlier in content.steps)
     content.modes = {"n": step.modes, "stress_stiffening": stiffening}
     content.note(
         step,
-        f"{step.modes} modes at the last step, {'with' if stiffening else 'without'} the stiffness by its stresses "
+        f"{step.modes} modes at the last step, {'with' if stiffening else 'without'} the initial-stress stiffness "
         "(PERTURBATION, or NLGEOM before)",
     )
 

@@ -46,9 +46,9 @@ def _by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Lo
 
 
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
-    """Add temperatures relative to the initial temperatures to a model, as the smaller of two numbers of fields.
+    """Add temperatures relative to the initial temperatures to a model.
 
-    There is one field for each shape of history, or one for each time at which a history has a corner.
+    There is a field for each shape of history or a field for each time with a corner of a history, whichever are fewer.
     """
     fields = list(ByShape.of((_rise(table), points) for table, points in histories.alike()))
     times = sorted({time for *_, table in fields for time, _ in table})

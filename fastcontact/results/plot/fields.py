@@ -127,7 +127,7 @@ OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
     "von_mises": ("von Mises stress", von_mises),
     "von_mises_signed": ("von Mises stress with the sign of the trace", von_mises_signed),
     "tresca": (
-        "Tresca stress (largest less smallest principal)",
+        "Tresca stress (largest minus smallest principal stress)",
         lambda stress: principal_stress(stress, 2) - principal_stress(stress, 0),
     ),
     "stress.principal_max": ("largest principal stress", partial(principal_stress, number=2)),
@@ -145,5 +145,5 @@ CELLS = {
     "J": "volume over reference volume",
     "logarithmic_strain": "principal logarithmic strain",
 }
-SLIPS = {"contact_slip": "slip of the step", "contact_slip_total": "slip so far"}
+SLIPS = {"contact_slip": "slip of the step", "contact_slip_total": "total slip"}
 DISPLACEMENTS = ("displacement", "displacement.x", "displacement.y", "displacement.z")

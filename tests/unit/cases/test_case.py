@@ -38,7 +38,7 @@ def test_a_file_of_another_size_than_cases_have_is_not_parsed(tmp_path):
     path = tmp_path / "huge.toml"
     with open(path, "wb") as file:
         file.truncate(1 << 40)  # takes no room
-    with pytest.raises(fc.CaseError, match=r"larger than \d+ MB: put its mesh into a file of its own"):
+    with pytest.raises(fc.CaseError, match=r"larger than \d+ MB: put its mesh into a separate file"):
         read_case(path)
 
 
@@ -211,7 +211,7 @@ MISTAKES = {
         (
             GOOD[GOOD.index("[theory") : GOOD.index("[[check")],
             "[theory]\nhertz = 3\n",
-            r"'theory.hertz' must be a table of",
+            r"'theory.hertz' must be a table with",
         ),
         (
             "E = 20000.0\nnu",

@@ -247,7 +247,7 @@ def test_standard_output_on_a_full_disk_is_told_in_one_line(files):
         done = subprocess.run(
             [sys.executable, "-c", PRINTING], stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=files
         )
-    said = "error: cannot write to standard output (No space left on device): send it elsewhere"
+    said = "error: cannot write to standard output (No space left on device): redirect it"
     commands = ["info old.vtkhdf", "profile old.vtkhdf", "--help", "--version", "--print-completion bash"]
     assert done.stderr.splitlines() == [line for command in commands for line in (said, f"1 {command}")]
 

@@ -469,7 +469,7 @@ def test_an_open_old_file_can_still_be_read_when_a_new_one_takes_its_place(path:
 def test_a_second_writer_is_refused_and_damages_nothing(path: Path) -> None:
     with ResultWriter(path, MESH) as out:
         out.write(step_result(0))
-        with pytest.raises(FileError, match=f"is being written by process {os.getpid()}: let it end"):
+        with pytest.raises(FileError, match=f"is being written by process {os.getpid()}: wait for it"):
             ResultWriter(path, MESH)
         link = path.with_name("link.vtkhdf")
         link.symlink_to(path)

@@ -135,7 +135,7 @@ def test_what_cannot_be_exported(tmp_path: Path) -> None:
         write_xdmf(path, tmp_path / "nowhere" / "a.xdmf")
     for name in ("a:b.vtkhdf", "é.vtkhdf"):
         path = path.rename(tmp_path / name)
-        with pytest.raises(FileError, match=rf"XDMF readers find no '{name}': name it without colons"):
+        with pytest.raises(FileError, match=rf"XDMF readers cannot open '{name}': use a name in ASCII without colons"):
             write_xdmf(path, tmp_path / "a.xdmf")
     lines = Mesh(MESH.points, {"line2": MESH.cells["line2"]})
     write(tmp_path / "lines.vtkhdf", 1, lines)

@@ -64,5 +64,5 @@ def test_a_law_is_a_power_of_the_value_and_nothing_else(law):
 
 
 def test_a_power_of_a_negative_number_is_refused():
-    with pytest.raises(CaseError, match=r"cannot be taken of -2\.0"):
+    with pytest.raises(CaseError, match=r"cannot be evaluated for -2\.0"):
         substituted(DATA, "n", -2.0, {"n": {"contact.pair.friction": "value^0.5"}})

@@ -136,7 +136,7 @@ def test_a_mesh_that_agrees_with_theory_by_chance_is_told(case):
     for k, level in enumerate(levels):
         level["values"]["pressure_max"] = 1.04 * PRESSURE * (1.0 - 0.16 * 0.25**k)
     text = "\n".join(gathered(case, [levels]).lines())
-    assert "this agreement is no proof of a good mesh" in text
+    assert "the agreement does not prove a good mesh" in text
     assert "Level 1 " in text
 
 

@@ -103,7 +103,7 @@ def test_what_no_study_can_use_is_told(given, message):
     [
         ({"quantities": {"x": lambda step: step.x}}, "the quantity 'x' is a function that failed .AttributeError"),
         ({"quantities": ["bore"]}, "unknown quantity 'bore'"),
-        ({"store": "there"}, "of a function leave 'store' out"),
+        ({"store": "there"}, "leave out 'store'"),
         ({"workers": 2, "quantities": {"x": lambda step: 1.0}}, "cannot be sent to other processes"),
     ],
 )

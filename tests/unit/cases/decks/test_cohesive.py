@@ -86,7 +86,7 @@ WHOLE_LAYER = LAYER.format("QUADS", "1., 2., 2.", "type=ENERGY, mixed mode behav
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("1000., 1000., 1000.", "1000., 10., 10.", r"\*COHESIVE BEHAVIOR: a layer has one stiffness"),
+        ("1000., 1000., 1000.", "1000., 10., 10.", r"\*COHESIVE BEHAVIOR: a layer must have the same stiffness"),
         ("criterion=QUADS", "criterion=MAXE", r"\*DAMAGE INITIATION: CRITERION=MAXE is not supported"),
         ("\n1., 2., 2.\n*Damage", "\n1., 2., 3.\n*Damage", r"\*DAMAGE INITIATION: the strengths along both shear"),
         ("power=2.", "softening=EXPONENTIAL", r"\*DAMAGE EVOLUTION: SOFTENING=EXPONENTIAL"),

@@ -56,7 +56,7 @@ def test_in_a_part_with_its_instance_moved(tmp_path, wanted):
     (step,) = deck_of(tmp_path, text + steps).solve()
     assert step.displacement == pytest.approx(wanted.displacement, abs=1e-10)
     turned = text.replace("5., 0., 0.\n", "5., 0., 0.\n5., 0., 0., 5., 0., 1., 90.\n")
-    with pytest.raises(fc.CaseError, match=r"\*ORIENTATION: axes of a part whose instance is turned"):
+    with pytest.raises(fc.CaseError, match=r"\*ORIENTATION: axes of a part whose instance is rotated"):
         deck_of(tmp_path, turned + steps)
 
 

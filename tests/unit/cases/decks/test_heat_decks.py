@@ -78,7 +78,7 @@ def test_tied_bars_are_one(tmp_path):
     deck, (step,) = solved(tmp_path, between="*TIE, NAME=glue\nUB, LT\n")
     flux = 100.0 / (LENGTH / 50.0 + LENGTH / 20.0)
     assert -step.heat["contacts"]["UB/LT"] == pytest.approx(flux * SIDE**2, rel=1e-7)
-    assert any("heat crosses by a conductance of" in note for note in deck.notes)
+    assert any("with which the temperatures of the sides differ by" in note for note in deck.notes)
 
 
 @pytest.mark.parametrize(
@@ -173,9 +173,9 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
         (", STEADY STATE", "", r"line 63, \*HEAT TRANSFER: only STEADY STATE"),
         ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n0.\n", r"\*CONDUCTIVITY: material 'A': the conductivity 0 must be"),
         ("STATE\n", "STATE\n*FILM\nup, F2, 20., -3.\n", r"\*FILM: the coefficient -3 of the film"),
-        ("*END STEP\n", "*END STEP\n*STEP\n*FREQUENCY\n3\n*END STEP\n", r"\*STEP: \*FREQUENCY behind \*HEAT TRANSFER"),
+        ("*END STEP\n", "*END STEP\n*STEP\n*FREQUENCY\n3\n*END STEP\n", r"\*STEP: \*FREQUENCY after \*HEAT TRANSFER"),
         ("*CONDUCTIVITY\n50.\n", "", r"\*MATERIAL: material 'A' has no \*CONDUCTIVITY"),
-        ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n50., 0.\n60., 100.\n", r"material 'A': 2 data lines where one"),
+        ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n50., 0.\n60., 100.\n", r"material 'A': 2 data lines, but one"),
         ("STATE\n", "STATE\n*CLOAD\nHOT, 1, 2.\n", r"\*CLOAD: is not a heat load"),
         ("STATE\n", "STATE\n*TEMPERATURE\nHOT, 2.\n", r"\*TEMPERATURE: temperatures are computed"),
         ("STATE\n", "STATE\n*RADIATE\nup, R1, 2.\n", r"\*RADIATE: .*without radiation"),
@@ -185,9 +185,9 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 0., 20.\n2000., 1., 50.\n", r"depends on the temperature"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 1.\n2000., 1.\n", r"\*GAP CONDUCTANCE: .* ascend"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n-1000.\n", r"\*GAP CONDUCTANCE: the conductance -1000"),
-        ("1000.\n", "1000.\n*GAP CONDUCTANCE\n1000., 0.\n2000., 1.\n", r"one conductance, and a table besides"),
+        ("1000.\n", "1000.\n*GAP CONDUCTANCE\n1000., 0.\n2000., 1.\n", r"a constant conductance and a table"),
         ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.3\n", r"only half of it"),
-        ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.5, 3.\n", r"a given velocity is not supported"),
+        ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.5, 3.\n", r"a prescribed sliding velocity is not supported"),
         ("HEAT TRANSFER, STEADY STATE", "STATIC", r"line 7, .*component 11|conduct heat alone"),
         ("HOT, 11, 11, 100.", "99, 11, 11, 100.", r"node 99 is not defined"),
     ],
@@ -242,7 +242,7 @@ def test_temperatures_come_go_and_come_again_from_what_they_find(tmp_path):
 
 def test_two_films_on_a_face_and_heat_that_nothing_holds_are_refused(tmp_path):
     head = two_bars() + MATERIALS + CONTACT
-    with pytest.raises(fc.CaseError, match="3 is the second coefficient here in one step, after 2"):
+    with pytest.raises(fc.CaseError, match="3 is the second coefficient in this step, after 2"):
         deck_of(tmp_path, head + ENDS + STEP.format("*FILM\n5, F2, 20., 2.\n*FILM\n5, F2, 20., 3.\n"))
     gone = ENDS + STEP.format("") + STEP.format("*BOUNDARY, OP=NEW\n")
     deck = deck_of(tmp_path, head + gone)

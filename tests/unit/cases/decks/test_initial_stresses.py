@@ -68,9 +68,9 @@ def test_in_the_plane_there_are_four_components(tmp_path):
     [
         (
             "1, 1, 20., 0., 0., 0., 0., 0.\n",
-            r"line \d+, \*INITIAL CONDITIONS: 8 entries where 7 are needed: .* integration point",
+            r"line \d+, \*INITIAL CONDITIONS: 8 entries, but 7 are needed: .* integration point",
         ),
-        ("low, 20.\n", r"2 entries where 7 are needed"),
+        ("low, 20.\n", r"2 entries, but 7 are needed"),
         ("lo, 20., 0., 0., 0., 0., 0.\n", r"line \d+, \*INITIAL CONDITIONS: .*'lo'"),
         ("low, a, 0., 0., 0., 0., 0.\n", "'a' is not a number"),
     ],

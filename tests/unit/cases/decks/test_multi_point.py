@@ -84,11 +84,11 @@ def test_a_line_stays_straight(tmp_path):
         ("PIN, low_face, x0\n", "'low_face' and 'x0' have 4 and 8 nodes"),
         ("PIN, 11, 11\n", "'11' and '11' have 1 and 1 nodes"),
         ("TIE, 99, 5\n", "node 99"),
-        ("BEAM, 11, top\n", "'top' holds 4 nodes where one is needed"),
+        ("BEAM, 11, top\n", "'top' has 4 nodes, but one is needed"),
         ("PLANE, 5, 6, 7\n", r"line 48, \*MPC: PLANE needs 4 different nodes or more"),
         ("PLANE, 5, 1, 11, 7\n", "the first three nodes of PLANE lie on a line"),
-        ("STRAIGHT, 5, 11, 6\n", "the first two nodes of STRAIGHT are at one place"),
-        ("MEANROT, 5, 5, 5, 6, 6, 6, 1\n", "the last node of MEANROT are the direction of the axis, and all zero"),
+        ("STRAIGHT, 5, 11, 6\n", "the first two nodes of STRAIGHT coincide"),
+        ("MEANROT, 5, 5, 5, 6, 6, 6, 1\n", "the last node of MEANROT are the direction of the axis, which must not be"),
     ],
 )
 def test_what_is_refused(line, message, tmp_path):

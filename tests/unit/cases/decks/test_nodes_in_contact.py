@@ -22,7 +22,7 @@ def test_an_edge_of_nodes_carries_alone(tmp_path):
     assert at[deck.point(11)] + at[deck.point(14)] + held_up == pytest.approx(100.0)
     assert at.get(deck.point(12), 0.0) == 0.0
     assert at[deck.point(11)] > 10.0
-    assert any("make up no whole faces" in note for note in deck.notes)
+    assert any("do not form whole faces" in note for note in deck.notes)
 
 
 def test_all_nodes_of_a_face_are_that_face(tmp_path):
@@ -67,7 +67,7 @@ def test_kinematic_coupling_of_nodes(tmp_path):
         (
             EDGE,
             "sm, nodes",
-            r"line \d+, \*SURFACE: the nodes of surface 'nodes' make up no whole faces: 2 belong to none "
+            r"line \d+, \*SURFACE: the nodes of surface 'nodes' do not form whole faces: 2 belong to none "
             r"\(first: node 11\), and \*CONTACT PAIR in line \d+ needs faces",
         ),
     ],

@@ -85,7 +85,7 @@ MODEL = {
         instead(STEP, "*Coupling, ref node=1, surface=ss\n"),
         r"\*COUPLING: \*KINEMATIC or \*DISTRIBUTING must follow",
     ),
-    "perturbation": (instead("*Step\n", "*Step, perturbation\n"), "PERTURBATION is not supported: contact has no lin"),
+    "perturbation": (instead("*Step\n", "*Step, perturbation\n"), "PERTURBATION is not supported with"),
     "step without length": (instead("*Static\n", "*Static\n1., 0.\n"), "the increment and the length of the step must"),
     "thickness": (FLAT.replace("material=steel\n1.", "material=steel\n0.", 1), "the thickness 0 must be positive"),
     "two thicknesses": (FLAT.replace("1.\n*Boundary", "2.\n*Boundary"), "thickness 2 after 1: plane models have one"),
@@ -164,7 +164,7 @@ CONTACTS = {
         before(
             "*Boundary", "*Clearance, slave=ss, master=sm, value=0.1\n", instead("11, 0., 0., 1.", "11, 0., 0., 1.1")
         ),
-        r"\*CLEARANCE is supported between sides of one distance, these are",
+        r"\*CLEARANCE is supported between sides at a uniform distance only",
     ),
     "adjust by a word": (instead("type=SURFACE TO", "adjust=some, type=SURFACE TO"), "ADJUST=some: only a distance"),
     "a surface without faces": (instead("up, S1\n", ""), "surface 'ss' has no faces"),
@@ -199,7 +199,7 @@ RELATIONS = {
     ),
     "equation of a rotation": (before("*Boundary", "*Equation\n1\n15, 4, 1.\n"), "component 4 of '15' is not within 1 to 3"),
     "equation of zeros": (before("*Boundary", "*Equation\n1\n15, 1, 0.\n"), "all coefficients of the equation are zero"),
-    "equation of a set": (before("*Boundary", "*Equation\n1\ntop, 1, 1.\n"), "'top' holds 4 nodes where one is needed"),
+    "equation of a set": (before("*Boundary", "*Equation\n1\ntop, 1, 1.\n"), "'top' has 4 nodes, but one is needed"),
     "coupling of component 7": (
         before("*Boundary", "*Coupling, ref node=15, surface=roof\n*Kinematic\n7\n"),
         "the components 7 to 7 are not within 1 to 6",
@@ -208,7 +208,7 @@ RELATIONS = {
         before("*Boundary", "*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),
         "'alone' holds no nodes that could follow the reference node",
     ),
-    "springs of two": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line and then one"),
+    "springs of two": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line, followed by"),
     "spring with a law": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),
     "spring of no stiffness": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n0.\n"), "the stiffness 0 must be"),
     "spring of a solid": (before("*Boundary", "*Spring, elset=up\n\n1.\n"), "element 2 is not a spring of type SPRINGA"),

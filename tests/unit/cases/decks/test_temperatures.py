@@ -119,7 +119,7 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
         (heated(steps="*Temperature, file=heat.frd\n"), r"\*TEMPERATURE: the parameter FILE"),
         (heated(steps="*Temperature\nall, 120., 3.\n"), r"\*TEMPERATURE: gradients"),
         (heated(steps="*Temperature\nnone, 120.\n"), r"\*TEMPERATURE: set 'none' is not defined"),
-        (heated(steps="*Cflux\n17, 11, 3.\n"), r"\*CFLUX: heats bodies in steps with"),
+        (heated(steps="*Cflux\n17, 11, 3.\n"), r"\*CFLUX: needs a step with"),
     ],
 )
 def test_what_is_refused(tmp_path, text, said):
