@@ -107,7 +107,7 @@ class Case:
         return {**chosen, "criteria": self.criteria}
 
     def finished(self, step: StepResult) -> StepResult:
-        """Return a step as it is stored in results; a deck scales the forces of plane models by the thickness."""
+        """Return a step as it is stored in results, which for an input deck is that of `Deck.finished`."""
         return step if self.deck is None else self.deck.finished(step)
 
 
@@ -383,7 +383,7 @@ def _theory(where: str, data: dict[str, Any]) -> Any:
 def described(data: dict[str, Any]) -> dict[str, Any]:
     """Return the title, the theories, the approaches and the table of the ramp of a case, as in `Case`.
 
-    `data` are the parsed text of a case file that is stored in a result file; they may be empty.
+    `data` is the parsed text of the case file that is stored in a result file; it may be empty.
     """
     theories, approach = _theories(data)
     return {

@@ -80,11 +80,11 @@ class PrintVersion(argparse.Action):
 
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """Return the parser of the subcommand `command`, or of all subcommands if there is none with this name."""
-    top = Parser(prog="fastcontact", description="Elastic contact by finite elements, fast.")
+    top = Parser(prog="fastcontact", description="Fast finite elements for elastic contact problems.")
     top.add_argument("--version", action=PrintVersion, nargs=0, help="show program's version number and exit")
     top.add_argument(
         "--print-completion", metavar="SHELL", choices=SHELLS, action=PrintCompletion,
-        help=f"print what makes a shell complete commands and options: {', '.join(SHELLS)}",
+        help=f"print the completion script of a shell: {', '.join(SHELLS)}",
     )  # fmt: skip
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
     names = [name for _, name, _ in pkgutil.iter_modules([os.path.dirname(__file__)]) if not name.startswith("_")]

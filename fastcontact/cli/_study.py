@@ -17,14 +17,14 @@ ARGUMENTS: Arguments = {
     "--json FILE": "write all numbers",
     "--csv FILE": "write the table",
     "--png FILE": "write a picture",
-    "--html FILE": "write a report in one file, pictures inside",
-    "--workers N": (int, "processes (default: one per processor; 1: this one)"),
+    "--html FILE": "write a self-contained HTML report",
+    "--workers N": (int, "number of processes (default: one per processor; 1: this process)"),
     "--executor WHERE": (
         "processes",
         "processes (default), mpi (start with: mpiexec -n N python -m mpi4py.futures -m fastcontact ...), or the "
         "address of a Dask scheduler such as tcp://host:8786",
     ),
-    "--store DIR": "folder of finished runs, which are not repeated if the study is started again",
+    "--store DIR": "folder of finished runs, which are not repeated when the study is resumed",
 }
 
 

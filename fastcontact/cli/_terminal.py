@@ -19,7 +19,7 @@ from fastcontact.errors import FileError, printable
 def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
     """Add the verbosity options, which all commands have, with the default value `default`."""
     table = {
-        "-v --verbose": "say what is being done and why",
+        "-v --verbose": "report what is being done and why",
         "-q --quiet": "print nothing but errors and warnings",
     }
     declare(parser.add_mutually_exclusive_group(), table, default=default)

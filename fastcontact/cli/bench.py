@@ -14,15 +14,15 @@ from fastcontact.errors import FastcontactError
 HELP = "run the benchmarks of the checkout"
 ARGUMENTS: Arguments = {
     "names": ({"nargs": "*", "metavar": "NAME"}, "benchmarks (default: all)"),
-    "--smallest": "run the smallest size of each once, as a check only",
+    "--smallest": "run the smallest size of each benchmark once, as a check",
     "--sizes N": ({"type": int, "nargs": "+"}, "approximate numbers of unknowns"),
     "--json FILE": "write results and environment",
-    "--png FOLDER": "draw time and memory against unknowns, a picture for each benchmark",
+    "--png FOLDER": "plot time and memory over the number of unknowns, for each benchmark",
     "--compare FILE": "compare with a run stored by --json",
-    "--problem NAME": "a contact problem in detail: sphere-on-block, forma04c ...",
+    "--problem NAME": "solve one contact problem in detail: sphere-on-block, forma04c ...",
     "--dofs N": (int, "with --problem: approximate number of unknowns"),
     "--linear SOLVER": "with --problem: linear solver (default: the problem's)",
-    "--tolerance T": (float, "with --problem: of solver and geometry (1e-8)"),
+    "--tolerance T": (float, "with --problem: tolerance of solver and geometry (1e-8)"),
 }
 
 

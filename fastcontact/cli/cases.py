@@ -12,10 +12,10 @@ from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
-HELP = "list the ready-made cases; print one, or copy it to change it"
+HELP = "list the ready-made cases, or print or copy one of them"
 ARGUMENTS: Arguments = {
     "name": ({"nargs": "?"}, "print this case file instead of the list"),
-    "--copy NAME": "copy this case file, and the mesh file it reads",
+    "--copy NAME": "copy this case file and its mesh file",
     "-o --output FILE": "copy to this file (default: NAME.toml, here)",
 }
 
@@ -27,7 +27,7 @@ def run(options: argparse.Namespace) -> int:
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")
     if options.output and not options.copy:
-        raise FastcontactError("-o says where to copy to: give --copy NAME with it")
+        raise FastcontactError("-o needs --copy NAME, the case to copy")
     if options.copy:
         written = copied(shipped_case(options.copy), Path(options.output or f"{options.copy}.toml"))
         say_written(options, *written)

@@ -26,7 +26,7 @@ ARGUMENTS: Arguments = {
             "refine where the error is large until this quantity is accurate (default pressure_max)",
         ),
         "--tolerance T": (1e-3, "relative error (default 0.001)"),
-        "--max-dofs N": (400_000, "where to stop (default 400000)"),
+        "--max-dofs N": (400_000, "largest number of degrees of freedom (default 400000)"),
         "-o --output FILE": "result file of the last mesh, with the error of each cell",
     },
     **_study.ARGUMENTS,

@@ -13,7 +13,7 @@ from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
-ARGUMENTS: Arguments = {"--warmup": "compile the kernels now, so that later runs start fast"}
+ARGUMENTS: Arguments = {"--warmup": "compile all kernels, so that later runs start fast"}
 
 
 def run(options: argparse.Namespace) -> int:
@@ -51,6 +51,6 @@ def _warm_up(show: bool) -> int:
         error_lines = errors.read().split("\n")
     if failed:
         how = f"by {signal.Signals(-failed[0]).name}" if failed[0] < 0 else f"with exit code {failed[0]}"
-        why = next(filter(None, reversed(error_lines)), "was it lack of memory?")
+        why = next(filter(None, reversed(error_lines)), "the memory may have been full")
         raise FastcontactError(f"a process that compiles kernels ended {how}, {done} of {total} kernels begun: {why}")
     return done

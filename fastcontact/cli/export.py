@@ -12,7 +12,7 @@ HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidec
 ARGUMENTS: Arguments = {
     "file": "result file (.vtkhdf)",
     "--med FILE": "write mesh and fields of all steps as MED",
-    "--xdmf FILE": "write an XDMF file that points into the result file",
+    "--xdmf FILE": "write an XDMF file that refers to the result file",
 }
 
 

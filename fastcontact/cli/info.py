@@ -16,7 +16,7 @@ ARGUMENTS: Arguments = {
     "file": "mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)",
     "--contacts": "show the surfaces of bodies that face each other instead",
     "--distance LENGTH": (float, "largest gap for --contacts (default: the size of facets)"),
-    "--angle DEGREES": (45.0, "by how much normals may deviate from opposite (45)"),
+    "--angle DEGREES": (45.0, "largest deviation of normals from opposite directions (45)"),
     "--png FILE": "write a picture of the contacts",
 }
 
@@ -131,6 +131,6 @@ def _result_lines(results: Any) -> Iterator[str]:
     interfaces = results[-1].material_stress if len(results) else None
     if interfaces is not None:
         yield (
-            f"  materials meet at {len(set(interfaces.points.tolist()))} nodes: stress there is that of the side with the "
-            "largest von Mises stress; material_stress holds that of each side"
+            f"  materials meet at {len(set(interfaces.points.tolist()))} nodes: stress there is that of the material with "
+            "the largest von Mises stress; material_stress contains that of each material"
         )

@@ -12,7 +12,7 @@ from fastcontact.cli._arguments import declare
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.cli._terminal import add_loudness, say
 
-HELP = "make a mesh with named groups and report its quality"
+HELP = "generate a mesh with named groups and report its quality"
 
 
 def add_generators(parser: argparse.ArgumentParser) -> None:

@@ -27,11 +27,11 @@ ARGUMENTS: Arguments = {
     },
     "--field NAME": (
         "von_mises",
-        "what colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
+        "field that colours the mesh: von_mises (default), stress.xx, stress.principal_min, displacement.y, contact_slip ...",
     ),
-    "--phases N": (int, "with --animate: one vibration of the shape that is --step, in N pictures"),
-    "--zoom LENGTH": (float, "half the width to draw around the largest value"),
-    "--mirrored": "draw the mirror image beyond the axis, too",
+    "--phases N": (int, "with --animate: one period of vibration with the shape of --step, in N pictures"),
+    "--zoom LENGTH": (float, "half width of the part around the largest value to draw"),
+    "--mirrored": "draw the mirror image about the axis as well",
     "--scale SCALE": (1.0, "factor on the displacements (default 1)"),
 }
 
@@ -42,10 +42,10 @@ def run(options: argparse.Namespace) -> int:
     from fastcontact.results.reader import open_results
 
     if not (options.png or options.view or options.animate):
-        raise CaseError("name the picture to write with --png FILE, or ask for a window with --view")
+        raise CaseError("name the picture to write with --png FILE, or request a window with --view")
     check_outputs([options.file], [options.animate], [options.png])
     if options.phases is not None and not options.animate:
-        raise CaseError("--phases N are those of an animation: name its file with --animate FILE")
+        raise CaseError("--phases N needs an animation: name its file with --animate FILE")
     if options.png and options.animate:
         raise CaseError("--animate FILE names the file to write: leave out --png")
     plane = _plane(options.section) if options.section else None

@@ -17,7 +17,7 @@ HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
 ARGUMENTS: Arguments = {
     **_results.ARGUMENTS,
     "--csv FILE": "write the table",
-    "--agr FILE": "write an XMGRACE project with the computed and Hertz's curve",
+    "--agr FILE": "write an XMGRACE project with the computed and the theoretical pressure",
     "--png FILE": "write a picture",
 }
 

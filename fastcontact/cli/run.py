@@ -30,16 +30,16 @@ LARGE = 30_000
 ARGUMENTS: Arguments = {
     "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
     "-o --output OUTPUT": "result file (default: the case's name with .vtkhdf, here)",
-    "--resume": "continue after the last complete step of the result file, if it holds any",
+    "--resume": "continue after the last complete step of the result file, if there is one",
     "--json FILE": "write a summary of the last step and the iterations, or why the run failed",
     "--plot PNG": "plot the contact pressure of the last step, compared with theory",
     "--modes FILE": "write the natural modes of the state of the last step (.vtkhdf)",
     "--nodal-diameters N[,N...]": "nodal diameters of the modes of a cyclic sector, such as 0,1,2, or all; mode shapes are "
     "those of the full ring",
     "--linear SOLVER": "auto, direct, amg, cholmod or pyamg (default: the case's)",
-    "--estimate-error": "estimate the error of every cell and write it into the file",
+    "--estimate-error": "estimate the error of each cell and write it to the result file",
     "--strict": "exit with code 3 if a check of the case fails",
-    "--threads N": (int, "threads of parallel kernels"),
+    "--threads N": (int, "number of threads of parallel kernels"),
 }
 
 

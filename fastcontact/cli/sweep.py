@@ -19,10 +19,10 @@ ARGUMENTS: Arguments = {
     "--set NAME=VALUES": (
         {"action": "append", "required": True},
         "a path in the case such as material[0].E, or a name of [study.parameters], and its values: 1,2,5 or "
-        "FIRST:LAST:COUNT, in equal ratios with :log behind it; given twice, all combinations are run",
+        "FIRST:LAST:COUNT, with equal ratios if :log is appended; given twice, all combinations are run",
     ),
     "--element NAME": "element (default: the last of study.combinations)",
-    "--formulation NAME": "contact formulation (default: likewise)",
+    "--formulation NAME": "contact formulation (default: that of the last combination)",
     "--level N": (int, "refinement of the mesh, as in converge"),
     **_study.ARGUMENTS,
 }

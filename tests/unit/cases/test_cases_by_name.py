@@ -87,7 +87,7 @@ def test_a_case_is_copied_with_its_mesh_and_runs_there(tmp_path, monkeypatch, ca
         (["cases", "flatpunch"], "did you mean 'flat-punch'"),
         (["cases", "--copy", "flatpunch"], "did you mean 'flat-punch'"),
         (["cases", "press-fit", "--copy", "press-fit"], "not both"),
-        (["cases", "-o", "x.toml"], "give --copy NAME"),
+        (["cases", "-o", "x.toml"], "needs --copy NAME"),
     ],
 )
 def test_wrong_names_are_one_line(arguments, message, capsys):

@@ -355,7 +355,7 @@ def test_kernels_are_compiled_on_request(capsys):
     ("helper", "end"),
     [
         ("print(0); raise SystemExit('no memory')", "with exit code 1, 1 of {} kernels begun: no memory"),
-        ("import os; os.kill(os.getpid(), 9)", "by SIGKILL, 0 of {} kernels begun: was it lack of memory?"),
+        ("import os; os.kill(os.getpid(), 9)", "by SIGKILL, 0 of {} kernels begun: the memory may have been full"),
     ],
 )
 def test_a_warm_up_tells_what_failed(helper, end, monkeypatch, capsys):
