@@ -155,7 +155,8 @@ class FloatingBodies:
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
-        self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float
+        self, solve_at: Callable[[Array], Solution], springs: Indices, start: Array, load: float, noise: float,
+        round_off: float,
     ) -> RigidPosition:
         """Solve the contact problem and anchor the springs at the new position, repeatedly, until they are slack.
 
@@ -163,6 +164,8 @@ class FloatingBodies:
         ----------
         solve_at : callable
             Function that returns the `Solution` of the contact problem with the springs anchored at a position (k,) [length].
+        springs : ndarray of int (k,)
+            Numbers of the unknowns at `dofs`, among the unknowns of the solution.
         start : ndarray (k,)
             First position [length].
         load : float
@@ -181,7 +184,7 @@ class FloatingBodies:
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_POSITIONS + 1):
             state = solve_at(position)
-            elongation, iterations = state.u[self.dofs], iterations + state.iterations
+            elongation, iterations = state.u[springs], iterations + state.iterations
             left = float(np.abs(elongation).max())
             force = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if

@@ -66,7 +66,7 @@ class Plan:
         pairs = problem.pairs.values()
         # Newton's method for the geometry is not available for pairs with fluid pressure.
         known = not any(pair.options.source is not None for pair in pairs)
-        newton = known and not iterative and problem.floating_bodies is None
+        newton = known and not iterative
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,

@@ -347,11 +347,11 @@ def active_dofs(
 ) -> ActiveDofs:  # fmt: skip
     """Return the degrees of freedom of the contact problem.
 
-    They are those of the contact surfaces if the solver condenses the stiffness matrix to the unknowns `involved`, and if
-    no body is floating. Otherwise they are all degrees of freedom.
+    They are those of the contact surfaces and of the springs of floating bodies if the solver condenses the stiffness
+    matrix to the unknowns `involved`. Otherwise they are all degrees of freedom.
     """
-    if pairs and bodies is None and solver.condenses:
-        return SurfaceDofs(system, contact_dofs, involved)
+    if pairs and solver.condenses:
+        return SurfaceDofs(system, contact_dofs, np.empty(0, np.intp) if bodies is None else bodies.dofs, involved)
     return ActiveDofs(system, contact_dofs)
 
 
