@@ -30,7 +30,8 @@ SEMISMOOTH_UPDATES = 8
 # Number of pairings after which nodes are assumed to alternate between facets: the iteration then restarts without
 # extrapolation, or with rounded edges.
 PATIENT_UPDATES = 25
-# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
+# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step. A Newton
+# step that does not gain this factor is not worth its derivatives.
 SAFETY = 3.0
 
 
@@ -162,11 +163,11 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size):
             return settled
-        elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size):
+        elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size, mixing.contraction):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed, enough = None, tolerances.enough(moved.size)
-        if mixing.newton(moved.change, enough) and solution.settled:
+        if mixing.newton(moved.change, enough, constraints.state(solution.active)) and solution.settled:
             stepped = newton_step(step, constraints, solution, moved.before, displacement, enough / moved.change, nodes)
             mixed = None if stepped is None else mixing.stepped(*stepped)
         if mixed is None:
@@ -273,26 +274,36 @@ class _Mixing:
     accelerated : Anderson
     newton : bool
         Whether to use Newton's method for the geometry.
+
+    Attributes
+    ----------
+    contraction : float
+        Factor by which a solution contracts changes of the geometry, from the last Newton step; infinite if unknown.
     """
 
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
-        self._newton, self._change, self._contraction = newton, np.inf, np.inf
+        self._newton, self._change, self.contraction = newton, np.inf, np.inf
+        self._expected, self._in_vain, self._state = np.inf, 0, np.empty(0)
 
-    def newton(self, change: float, enough: float) -> bool:
+    def newton(self, change: float, enough: float, state: AnyArray) -> bool:
         """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
 
-        Newton's method is given up once changes increase, because it does not converge if nodes alternate between facets. It
-        is also not used if the next solution alone is expected to change displacements by no more than `enough` [length],
-        because a solution without a Newton step costs less.
+        Newton's method is given up once changes increase, because it does not converge if nodes alternate between facets,
+        and if changes with the same contact `state` (m,) are twice about those without a Newton step, because derivatives
+        are inexact there. It is also not used if the next solution alone is expected to change displacements by no more than
+        `enough` [length], because a solution without a Newton step costs less.
         """
-        self._newton, self._change = self._newton and change <= self._change, change
-        return self._newton and SAFETY * self._contraction * change > enough
+        alike = self._expected / SAFETY < change < self._expected * SAFETY
+        self._in_vain += alike and np.array_equal(state, self._state)
+        self._newton = self._newton and change <= self._change and self._in_vain < 2
+        self._change, self._state, self._expected = change, state, np.inf
+        return self._newton and SAFETY * self.contraction * change > enough
 
     def stepped(self, next_pairing: Array, contraction: float) -> Array:
         """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
-        self._contraction = contraction
+        self.contraction, self._expected = contraction, contraction * self._change
         return next_pairing
 
     def restart(self) -> None:

@@ -15,7 +15,7 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
-from fastcontact.analysis.floating_bodies import FloatingBodies
+from fastcontact.analysis.floating_bodies import FloatingBodies, Freed
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, Path, Response, Slid, Solution
@@ -26,7 +26,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
-from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,38 +173,25 @@ def _with_floating_bodies(
             start = start + moved
             known = active | _touching(step, constraints, iterate.u + bodies.rigid(moved))
     noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
-    springs = dofs.numbers(bodies.dofs)
-    rigid = bodies.settle(solve_at, springs, start, state.largest_rigid_force, noise, state.gap_round_off)
+    # The response takes many linear solutions, which are cheap with factors only.
+    freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
+    rigid = bodies.settle(
+        solve_at, freed, dofs.numbers(bodies.dofs), start, state.largest_rigid_force, noise, state.gap_round_off
+    )
     if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
         text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
         raise ConvergenceError(text, iterate.history)
     iterate.rigid = rigid
     solution = rigid.state
-    if solution.response is not None:
-        solution = replace(solution, response=partial(_free_response, solution.response, bodies, constraints, dofs))
+    if freed is not None and solution.response is not None:
+        solution = replace(solution, response=partial(_response, freed, solution.response))
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.position))
 
 
-def _free_response(
-    held: Callable[[], Response], bodies: FloatingBodies, constraints: Constraints, dofs: ActiveDofs
-) -> Response:
-    """Return the linear response of floating bodies whose springs stay slack, given that `held` by springs."""
-    respond, springs, modes = held(), dofs.numbers(bodies.dofs), bodies.motions.displacement
-    along = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
-    none = np.zeros_like(modes[:, 0])
-    rigid = np.stack([dofs.unknowns(mode, none) for mode in modes.T], axis=1)
-    unloaded = np.zeros(len(rigid))
-    strained = np.stack([respond(unloaded, along[..., k]) for k in range(len(modes.T))], axis=1)
-    moved = rigid + strained
-
-    def respond_freely(force: Array, gaps: Array) -> Array:
-        u = respond(force, gaps)
-        # Motions that contact does not restrain leave springs slack.
-        position = np.linalg.lstsq(strained[springs], u[springs], rcond=LENGTH_ROUND_OFF)[0]
-        return np.asarray(u - moved @ position)
-
-    return respond_freely
+def _response(freed: Callable[[Response], Freed], held: Callable[[], Response]) -> Response:
+    """Return the linear response with springs that stay slack, given that of a solution with springs at its position."""
+    return freed(held()).respond
 
 
 def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:

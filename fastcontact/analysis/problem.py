@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import SOFT, FloatingBodies
+from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.slip import at_points
 from fastcontact.analysis.state import State
@@ -319,7 +319,7 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, SOFT) if len(motions) else None
+    bodies = FloatingBodies(motions, system, SOFT if solver.iterative else STIFF) if len(motions) else None
     involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
