@@ -35,7 +35,7 @@ from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 # Stiffness of the springs relative to that of the softest body: STIFF for factors, whose accuracy soft springs reduce (with
-# 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of three plates scatter by 2e-11, and with 1 by 1e-12), and SOFT
+# 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11, and with 1 by 1e-12), and SOFT
 # for multigrid, which stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a stack with friction takes 4.1, 4.2 and
 # 65 linear solutions, and a bolt 2.8, 5.3 and 27. STIFF also compensates the negative stiffness that rotated bodies may have
 # under load. The reference is the softest body, because a contact is not stiffer than the softer one
@@ -256,7 +256,7 @@ class FloatingBodies:
             if left > before:
                 mixing.restart()
             step = None if left > before else _newton_step(freed, state, elongation)
-            # Without Newton's method positions are accelerated, because parts that are much softer than the springs, such as a
+            # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
             position = mixing.mixed(position, position + elongation) if step is None else position + step
             before, relaxed = left, 0.0 if step is None else left

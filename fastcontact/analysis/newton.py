@@ -245,7 +245,9 @@ class _Newton:
         """Return the regularisations to try, in order."""
         floats = self._problem.floating_bodies is not None
         closed = self._settled is not None and self._settled.solution.active.any()
-        whole = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]]
+        whole = [
+            Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
+        ]
         held = [Regularisation(held=stiffness, stiff=floats) for stiffness in HELD] if closed else []
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
