@@ -43,10 +43,12 @@ class ActiveDofs:
     ----------
     compared : ndarray of int
         Positions, among the active components, of those on which contact depends.
+    determined : ndarray of int
+        Positions, among the active components, of those at which direct solvers compute the solutions of the contact problem.
     """
 
     def __init__(self, system: System, contact_dofs: Indices) -> None:
-        self._system, self.compared = system, contact_dofs
+        self._system, self.compared, self.determined = system, contact_dofs, contact_dofs
 
     def for_step(self, u: Array, lift: Array) -> ActiveDofs:
         """Return the object for a load step that begins at displacements `u`."""
@@ -122,6 +124,7 @@ class SurfaceDofs(ActiveDofs):
     def __init__(self, system: System, contact_dofs: Indices, springs: Indices, unknowns: Indices) -> None:
         self._dofs, self._unknowns = np.union1d(contact_dofs, springs), unknowns
         super().__init__(system, np.searchsorted(self._dofs, contact_dofs))
+        self.determined = np.arange(len(self._dofs))
         T = eye_array(len(system.free), format="csr") if system.T is None else system.T
         self._T = csr_array(T[self._dofs][:, unknowns])
         self._transpose = csr_array(self._T.T)

@@ -30,8 +30,7 @@ SEMISMOOTH_UPDATES = 8
 # Number of pairings after which nodes are assumed to alternate between facets: the iteration then restarts without
 # extrapolation, or with rounded edges.
 PATIENT_UPDATES = 25
-# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step. A Newton
-# step that does not gain this factor is not worth its derivatives.
+# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
 SAFETY = 3.0
 
 
@@ -167,7 +166,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed, enough = None, tolerances.enough(moved.size)
-        if mixing.newton(moved.change, enough, constraints.state(solution.active)) and solution.settled:
+        if mixing.newton(moved.change, enough) and solution.settled:
             stepped = newton_step(step, constraints, solution, moved.before, displacement, enough / moved.change, nodes)
             mixed = None if stepped is None else mixing.stepped(*stepped)
         if mixed is None:
@@ -285,25 +284,20 @@ class _Mixing:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
         self._newton, self._change, self.contraction = newton, np.inf, np.inf
-        self._expected, self._in_vain, self._state = np.inf, 0, np.empty(0)
 
-    def newton(self, change: float, enough: float, state: AnyArray) -> bool:
+    def newton(self, change: float, enough: float) -> bool:
         """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
 
-        Newton's method is given up once changes increase, because it does not converge if nodes alternate between facets,
-        and if changes with the same contact `state` (m,) are twice about those without a Newton step, because derivatives
-        are inexact there. It is also not used if the next solution alone is expected to change displacements by no more than
-        `enough` [length], because a solution without a Newton step costs less.
+        Newton's method is given up once changes increase, because it does not converge if nodes alternate between facets. It
+        is also not used if the next solution alone is expected to change displacements by no more than `enough` [length],
+        because a solution without a Newton step costs less.
         """
-        alike = self._expected / SAFETY < change < self._expected * SAFETY
-        self._in_vain += alike and np.array_equal(state, self._state)
-        self._newton = self._newton and change <= self._change and self._in_vain < 2
-        self._change, self._state, self._expected = change, state, np.inf
+        self._newton, self._change = self._newton and change <= self._change, change
         return self._newton and SAFETY * self.contraction * change > enough
 
     def stepped(self, next_pairing: Array, contraction: float) -> Array:
         """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
-        self.contraction, self._expected = contraction, contraction * self._change
+        self.contraction = contraction
         return next_pairing
 
     def restart(self) -> None:

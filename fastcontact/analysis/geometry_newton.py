@@ -43,7 +43,8 @@ def newton_step(
     solution : Solution
         Solution with these constraints, of those of shared nodes with their representatives.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length].
+        Active displacements of the pairing and of the solution [length]; displacements that solutions do not determine are
+        taken from the latter.
     accuracy : float
         Relative accuracy of the change that suffices.
     nodes : SharedNodes, optional
@@ -83,8 +84,11 @@ def newton_step(
     # Far from the solution a step in which the response adds more than the change itself leads anywhere.
     if not responding <= size:
         return None
-    # Components on which contact does not depend, such as those at the springs of floating bodies, follow the others.
-    mixed = image + size * varied(v) if len(where) < len(image) else before + size * v
+    mixed, determined = image.copy(), step.dofs.determined
+    if len(determined) > len(where):  # there are springs of floating bodies
+        mixed[determined] += size * varied(v)[determined]
+    else:
+        mixed[where] = before[where] + size * v
     return mixed, responding / (size * largest(v) or 1.0)
 
 
