@@ -43,10 +43,12 @@ class ActiveDofs:
     ----------
     compared : ndarray of int
         Positions, among the active components, of those on which contact depends.
+    determined : ndarray of int
+        Positions, among the active components, of those at which direct solvers compute the solutions of the contact problem.
     """
 
     def __init__(self, system: System, contact_dofs: Indices) -> None:
-        self._system, self.compared = system, contact_dofs
+        self._system, self.compared, self.determined = system, contact_dofs, contact_dofs
 
     def for_step(self, u: Array, lift: Array) -> ActiveDofs:
         """Return the object for a load step that begins at displacements `u`."""
@@ -92,6 +94,10 @@ class ActiveDofs:
         """Return the generalised forces (l,) on the active unknowns, given nodal forces (n,) [force]."""
         return self._system.reduced(force)
 
+    def numbers(self, unknowns: Indices) -> Indices:
+        """Return the numbers of unknowns of the system (k,) among the active unknowns."""
+        return unknowns
+
     def size(self, v: Array) -> float:
         """Return the largest absolute value of all unknowns; condensed ones count with their values before the step."""
         return largest(v)
@@ -107,27 +113,28 @@ class SurfaceDofs(ActiveDofs):
     Parameters
     ----------
     system : System
-    contact_dofs : ndarray of int (k,)
-        Components that contact constraints may involve, in ascending order. They are the active components.
+    contact_dofs : ndarray of int
+        Components that contact constraints may involve, in ascending order.
+    springs : ndarray of int
+        Components to which the springs of floating bodies are attached. The active components are these and `contact_dofs`.
     unknowns : ndarray of int (l,)
         Unknowns on which these components depend, in ascending order; see `System.involved`.
     """
 
-    def __init__(self, system: System, contact_dofs: Indices, unknowns: Indices) -> None:
-        super().__init__(system, np.arange(len(contact_dofs)))
-        self._dofs, self._unknowns = contact_dofs, unknowns
+    def __init__(self, system: System, contact_dofs: Indices, springs: Indices, unknowns: Indices) -> None:
+        self._dofs, self._unknowns = np.union1d(contact_dofs, springs), unknowns
+        super().__init__(system, np.searchsorted(self._dofs, contact_dofs))
+        self.determined = np.arange(len(self._dofs))
         T = eye_array(len(system.free), format="csr") if system.T is None else system.T
-        self._T = csr_array(T[contact_dofs][:, unknowns])
+        self._T = csr_array(T[self._dofs][:, unknowns])
         self._transpose = csr_array(self._T.T)
 
-    # Prescribed displacements of the active components, and the largest condensed unknown; set by `for_step`.
-    _lift: Array
+    # The largest condensed unknown; set by `for_step`.
     _unknown_beyond: float
 
     def for_step(self, u: Array, lift: Array) -> SurfaceDofs:
         """See `ActiveDofs`."""
         step = copy.copy(self)
-        step._lift = lift[self._dofs]
         beyond = self._system.unknowns(u, lift)
         beyond[self._unknowns] = 0.0
         step._unknown_beyond = largest(beyond)
@@ -159,7 +166,7 @@ class SurfaceDofs(ActiveDofs):
 
     def displacement(self, v: Array, lift: Array) -> Array:
         """See `ActiveDofs`."""
-        return self._lift + self.varied(v)
+        return np.asarray(lift[self._dofs] + self.varied(v))
 
     def varied(self, v: Array) -> Array:
         """See `ActiveDofs`."""
@@ -168,6 +175,10 @@ class SurfaceDofs(ActiveDofs):
     def reduced(self, force: Array) -> Array:
         """See `ActiveDofs`."""
         return np.asarray(self._transpose @ force[self._dofs])
+
+    def numbers(self, unknowns: Indices) -> Indices:
+        """See `ActiveDofs`."""
+        return np.searchsorted(self._unknowns, unknowns)
 
     def size(self, v: Array) -> float:
         """See `ActiveDofs`."""

@@ -1,11 +1,16 @@
 """Floating bodies, which contact alone restrains: soft springs regularise their singular stiffness matrix.
 
-Each rigid-body mode that supports leave free gets one spring at one node, which is soft compared with the body. The springs
-are anchored at a position of the bodies, so that the contact problem is regular. Its solution stretches the springs, and
-they are anchored again at the new position. This is the proximal point method for the minimum of the energy under the
-inequalities of contact (Rockafellar, 1976). If contact restrains the bodies, each solution reduces the forces of the
-springs by about the ratio of their stiffness to that of the contact. At convergence the springs carry no force. Each
-pairing begins at the last position, so that most pairings need only one solution.
+Each rigid-body mode that supports leave free gets one spring at one node. The springs are anchored at a position of the
+bodies, so that the contact problem is regular. Its solution stretches the springs, and they are anchored again at a new
+position, until they carry no force. Each pairing begins at the last position.
+
+If factors give the linear response of the contact problem to the position, Newton's method finds the position at which the
+springs are slack. It takes one step for the final contact state, whatever the stiffness of the springs.
+
+Otherwise the springs are soft compared with the body, and the new position is where they would be slack without contact.
+This is the proximal point method for the minimum of the energy under the inequalities of contact (Rockafellar, 1976). If
+contact restrains the bodies, each solution reduces the forces of the springs by about the ratio of their stiffness to that
+of the contact.
 """
 
 from __future__ import annotations
@@ -16,20 +21,24 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.linalg import LinAlgError
 from scipy.linalg import qr
 from scipy.sparse import bsr_array
 
+from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
-from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
-# Stiffness of the springs relative to that of the softest body. Softer springs reduce the accuracy of factorisations (with
-# 1e-6, a wedge has an error of 3e-9). Stiffer ones need more solutions: with 1e-3, 1e-2 and 1, a stack with friction takes
-# 4.1, 4.2 and 65 linear solutions, and a bolt 2.8, 5.3 and 27. If rotated bodies under load have a negative stiffness,
-# springs with STIFF compensate it. The reference is the softest body, because a contact is not stiffer than the softer one
+# Stiffness of the springs relative to that of the softest body: STIFF for factors, whose accuracy soft springs reduce (with
+# 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11, and with 1 by 1e-12), and SOFT
+# for multigrid, which stiff ones would cost more solutions: with 1e-3, 1e-2 and 1, a stack with friction takes 4.1, 4.2 and
+# 65 linear solutions, and a bolt 2.8, 5.3 and 27. STIFF also compensates the negative stiffness that rotated bodies may have
+# under load. The reference is the softest body, because a contact is not stiffer than the softer one
 # of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT, STIFF = 1e-3, 1.0
 # Largest number of positions for one pairing.
@@ -65,6 +74,42 @@ class RigidPosition:
     positions: int
     slack: bool
     dofs: Indices
+
+
+@dataclass(frozen=True)
+class Freed:
+    """Linear response of the solution of a contact problem, with fixed contact state, to positions of the springs.
+
+    Attributes
+    ----------
+    held : callable
+        The `Response` with springs at a fixed position.
+    moved : ndarray (n, k)
+        Change of the unknowns, including the rigid-body motion, for each position [-].
+    stretched : ndarray (k, k)
+        Change of the elongations of the springs for each position [-].
+    springs : ndarray of int (k,)
+        Numbers of the unknowns at springs.
+    """
+
+    held: Response
+    moved: Array
+    stretched: Array
+    springs: Indices
+
+    def slackened(self, elongation: Array) -> Array:
+        """Return the change (k,) of the positions [length] that makes springs with an `elongation` (k,) slack.
+
+        In motions that contact does not restrain, the springs move by their elongation.
+        """
+        left = elongation + self.stretched @ elongation
+        return np.asarray(elongation - np.linalg.lstsq(self.stretched, left, rcond=LENGTH_ROUND_OFF)[0])
+
+    def respond(self, force: Array, gaps: Array) -> Array:
+        """Return the `Response` with springs that stay slack."""
+        u = self.held(force, gaps)
+        position = np.linalg.lstsq(self.stretched, -u[self.springs], rcond=LENGTH_ROUND_OFF)[0]
+        return np.asarray(u + self.moved @ position)
 
 
 class FloatingBodies:
@@ -125,6 +170,16 @@ class FloatingBodies:
         """Return the displacements (n_dofs,) of the rigid-body motion with the values `position` (k,) at `dofs` [length]."""
         return np.asarray(self.motions.displacement @ position)
 
+    def freed(self, constraints: Constraints, dofs: ActiveDofs, respond: Response) -> Freed:
+        """Return the linear response to positions of the springs, given the one with springs at a fixed position."""
+        modes, springs = self.motions.displacement, dofs.numbers(self.dofs)
+        along = np.stack([rows @ modes for rows in (constraints.B, *constraints.tangents)])
+        still = np.zeros(len(modes))
+        rigid = np.stack([dofs.unknowns(mode, still) for mode in modes.T], axis=1)
+        unloaded = np.zeros(len(rigid))
+        strained = np.stack([respond(unloaded, gaps) for gaps in np.moveaxis(along, -1, 0)], axis=1)
+        return Freed(respond, rigid + strained, strained[springs], springs)
+
     def report(self, rigid: RigidPosition, load: float) -> dict[str, Any]:
         """Return a report of the regularisation, as a dict of numbers and strings.
 
@@ -155,14 +210,19 @@ class FloatingBodies:
         return [name for name, w in zip(self.names, work, strict=True) if w > 0.1 * work.max()]
 
     def settle(
-        self, solve_at: Callable[[Array], Solution], start: Array, load: float, noise: float, round_off: float
-    ) -> RigidPosition:
+        self, solve_at: Callable[[Array], Solution], freed: Callable[[Response], Freed] | None, springs: Indices,
+        start: Array, load: float, noise: float, round_off: float,
+    ) -> RigidPosition:  # fmt: skip
         """Solve the contact problem and anchor the springs at the new position, repeatedly, until they are slack.
 
         Parameters
         ----------
         solve_at : callable
             Function that returns the `Solution` of the contact problem with the springs anchored at a position (k,) [length].
+        freed : callable, optional
+            Function that returns the linear response to positions, given that of a solution; see the method `freed`.
+        springs : ndarray of int (k,)
+            Numbers of the unknowns at `dofs`, among the unknowns of the solution.
         start : ndarray (k,)
             First position [length].
         load : float
@@ -177,16 +237,17 @@ class FloatingBodies:
         RigidPosition
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
-        position, before, iterations = start, np.inf, 0
+        position, before, iterations, relaxed = start, np.inf, 0, 0.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_POSITIONS + 1):
             state = solve_at(position)
-            elongation, iterations = state.u[self.dofs], iterations + state.iterations
+            elongation, iterations = state.u[springs], iterations + state.iterations
             left = float(np.abs(elongation).max())
             force = max(load, float(np.abs(state.multiplier).max(initial=0.0))) / self.stiffness
             # Springs are slack if their forces are round-off of the loads and of the contact forces (the only forces if
-            # prescribed displacements move the bodies), or as small as the accuracy of the linear solver allows.
-            slack = left <= max(ROUND_OFF * force, noise * float(np.abs(state.u).max()))
+            # prescribed displacements move the bodies), as small as the accuracy of the linear solver allows, or round-off of
+            # the elongation that a Newton step has `relaxed`.
+            slack = left <= max(ROUND_OFF * force, noise * float(np.abs(state.u).max()), LENGTH_ROUND_OFF * relaxed)
             # If the forces of the springs no longer decrease, a larger tolerance applies.
             if not slack and left >= 0.5 * before and positions > 3:
                 slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
@@ -194,11 +255,23 @@ class FloatingBodies:
                 break
             if left > before:
                 mixing.restart()
-            # Positions are accelerated, because parts that are much softer than the springs, such as a peeling layer,
-            # approach equilibrium slowly.
-            position, before = mixing.mixed(position, position + elongation), left
+            step = None if left > before else _newton_step(freed, state, elongation)
+            # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
+            # peeling layer, approach equilibrium slowly.
+            position = mixing.mixed(position, position + elongation) if step is None else position + step
+            before, relaxed = left, 0.0 if step is None else left
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
+
+
+def _newton_step(freed: Callable[[Response], Freed] | None, state: Solution, elongation: Array) -> Array | None:
+    """Return the change of the positions (k,) by Newton's method [length], None if the response is unknown."""
+    if freed is None or state.response is None:
+        return None
+    try:
+        return freed(state.response()).slackened(elongation)
+    except LinAlgError:  # the constraints are linearly dependent
+        return None
 
 
 def _softest(diagonal: Array, solid: Mask, moving: Mask) -> float:

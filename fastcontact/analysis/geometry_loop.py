@@ -66,7 +66,7 @@ class Plan:
         pairs = problem.pairs.values()
         # Newton's method for the geometry is not available for pairs with fluid pressure.
         known = not any(pair.options.source is not None for pair in pairs)
-        newton = known and not iterative and problem.floating_bodies is None
+        newton = known and not iterative
         return cls(
             until_settled=fixed is None,
             limit=criteria.max_geometry_updates if fixed is None else fixed,
@@ -162,7 +162,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size):
             return settled
-        elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size):
+        elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size, mixing.contraction):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
         mixed, enough = None, tolerances.enough(moved.size)
@@ -273,12 +273,17 @@ class _Mixing:
     accelerated : Anderson
     newton : bool
         Whether to use Newton's method for the geometry.
+
+    Attributes
+    ----------
+    contraction : float
+        Factor by which a solution contracts changes of the geometry, from the last Newton step; infinite if unknown.
     """
 
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
-        self._newton, self._change, self._contraction = newton, np.inf, np.inf
+        self._newton, self._change, self.contraction = newton, np.inf, np.inf
 
     def newton(self, change: float, enough: float) -> bool:
         """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
@@ -288,11 +293,11 @@ class _Mixing:
         because a solution without a Newton step costs less.
         """
         self._newton, self._change = self._newton and change <= self._change, change
-        return self._newton and SAFETY * self._contraction * change > enough
+        return self._newton and SAFETY * self.contraction * change > enough
 
     def stepped(self, next_pairing: Array, contraction: float) -> Array:
         """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
-        self._contraction = contraction
+        self.contraction = contraction
         return next_pairing
 
     def restart(self) -> None:

@@ -43,7 +43,7 @@ def newton_step(
     solution : Solution
         Solution with these constraints, of those of shared nodes with their representatives.
     before, image : ndarray (k,)
-        Active displacements of the pairing and of the solution [length]; displacements on which contact does not depend are
+        Active displacements of the pairing and of the solution [length]; displacements that solutions do not determine are
         taken from the latter.
     accuracy : float
         Relative accuracy of the change that suffices.
@@ -63,8 +63,8 @@ def newton_step(
     dim, n_dofs, where = step.problem.model.mesh.dim, len(step.load.lift), step.dofs.compared
     gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
 
-    def along(v: Array) -> Array:
-        """Return ``v - S'(u) v``."""
+    def varied(v: Array) -> Array:
+        """Return the active components (k,) of ``S'(u) v``."""
         active = np.zeros_like(image)
         active[where] = v
         u = step.dofs.put(np.zeros(n_dofs), active)
@@ -74,18 +74,21 @@ def newton_step(
             gaps[: len(changed), rows] = changed
             force[: varied.size] += varied.ravel()
         merged = gaps if nodes is None else nodes.merged(gaps)
-        return v - step.dofs.varied(respond(step.dofs.reduced(force), merged))[where]
+        return step.dofs.varied(respond(step.dofs.reduced(force), merged))
 
     changed = (image - before)[where]
-    system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
+    system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
     size = largest(changed) or 1.0
     v, _ = gmres(system, changed / size, rtol=max(ACCURACY, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
     responding = largest_difference(size * v, changed)
     # Far from the solution a step in which the response adds more than the change itself leads anywhere.
     if not responding <= size:
         return None
-    mixed = image.copy()
-    mixed[where] = before[where] + size * v
+    mixed, determined = image.copy(), step.dofs.determined
+    if len(determined) > len(where):  # there are springs of floating bodies
+        mixed[determined] += size * varied(v)[determined]
+    else:
+        mixed[where] = before[where] + size * v
     return mixed, responding / (size * largest(v) or 1.0)
 
 

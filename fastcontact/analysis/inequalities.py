@@ -5,8 +5,9 @@ Floating bodies, which only contact restrains, are held by springs, whose positi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -14,10 +15,10 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
-from fastcontact.analysis.floating_bodies import FloatingBodies
+from fastcontact.analysis.floating_bodies import FloatingBodies, Freed
 from fastcontact.analysis.iterate import Iterate
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution
+from fastcontact.analysis.solution import Accuracy, Path, Response, Slid, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
@@ -109,7 +110,7 @@ def solve_inequalities(
     -------
     solution : Solution
     displacement : ndarray (k,)
-        Displacements of the components of `step.dofs`; with floating bodies, all displacements (n_dofs,) [length].
+        Displacements of the components of `step.dofs` [length].
     """
     if step.problem.floating_bodies is not None:
         return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
@@ -149,19 +150,19 @@ def _with_floating_bodies(
     active: Mask,
     accuracy: Accuracy,
 ) -> tuple[Solution, Array]:
-    """Solve if contact alone restrains some bodies; return the solution and all displacements (n_dofs,) [length].
+    """Solve if contact alone restrains some bodies; return the same as `solve_inequalities`.
 
     The springs at rigid positions hold these bodies; `FloatingBodies.settle` iterates the positions until the springs are
     free of forces.
     """
-    problem, state, lift = step.problem, step.state, step.load.lift
+    problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.dofs
     known, near = active, iterate.u
 
     def solve_at(position: Array) -> Solution:
         nonlocal known, near
         at = lift + bodies.rigid(position)
         solution = _solve(step, constraints, iterate, known, accuracy, at, near)
-        known, near = solution.wanted, problem.system.displacement(solution.u, at)
+        known, near = solution.wanted, dofs.put(near.copy(), dofs.displacement(solution.u, at))
         return solution
 
     start = iterate.u[bodies.dofs]
@@ -172,14 +173,25 @@ def _with_floating_bodies(
             start = start + moved
             known = active | _touching(step, constraints, iterate.u + bodies.rigid(moved))
     noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
-    rigid = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off)
+    # The response takes many linear solutions, which are cheap with factors only.
+    freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
+    rigid = bodies.settle(
+        solve_at, freed, dofs.numbers(bodies.dofs), start, state.largest_rigid_force, noise, state.gap_round_off
+    )
     if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
         text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
         raise ConvergenceError(text, iterate.history)
     iterate.rigid = rigid
-    at = lift + bodies.rigid(rigid.position)
-    return rigid.state, problem.system.displacement(rigid.state.u, at)
+    solution = rigid.state
+    if freed is not None and solution.response is not None:
+        solution = replace(solution, response=partial(_response, freed, solution.response))
+    return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.position))
+
+
+def _response(freed: Callable[[Response], Freed], held: Callable[[], Response]) -> Response:
+    """Return the linear response with springs that stay slack, given that of a solution with springs at its position."""
+    return freed(held()).respond
 
 
 def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:

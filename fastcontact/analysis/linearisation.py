@@ -79,4 +79,4 @@ def _floating(
         turned = floating_motions(problem.model, problem.model.prescribed_by_ramp()[0], problem.displacement(u))
         motions = turned if len(turned) == len(motions) else motions
     before = problem.floating_bodies.dofs if rigid is None else rigid.dofs
-    return FloatingBodies(motions, system, STIFF if stiff else SOFT, before)
+    return FloatingBodies(motions, system, STIFF if stiff or not problem.solver.iterative else SOFT, before)

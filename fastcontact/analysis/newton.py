@@ -245,7 +245,9 @@ class _Newton:
         """Return the regularisations to try, in order."""
         floats = self._problem.floating_bodies is not None
         closed = self._settled is not None and self._settled.solution.active.any()
-        whole = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + floats]]
+        whole = [
+            Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
+        ]
         held = [Regularisation(held=stiffness, stiff=floats) for stiffness in HELD] if closed else []
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
@@ -280,7 +282,9 @@ class _Newton:
         """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
         settled = None
         if problem.pairs:
-            dofs = problem.dofs.for_step(self._iterate.u, load.lift)
+            u0, bodies = self._iterate.u, problem.floating_bodies
+            lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
+            dofs = problem.dofs.for_step(u0, lift)
             step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs)
             settled = settle_geometry(step, extrapolation, self._begin.expected, self._iterate)
             if problem.criteria.friction_while_touching is not None and self._terms.prepared:

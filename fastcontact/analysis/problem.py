@@ -12,7 +12,7 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import SOFT, FloatingBodies
+from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.slip import at_points
 from fastcontact.analysis.state import State
@@ -319,7 +319,7 @@ def prepare(
     contact_dofs = _contact_dofs(mesh, pairs, len(driven))
     involved = system.involved(contact_dofs)
     motions = floating_motions(model, supported)
-    bodies = FloatingBodies(motions, system, SOFT) if len(motions) else None
+    bodies = FloatingBodies(motions, system, SOFT if solver.iterative else STIFF) if len(motions) else None
     involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
     return Problem(
         model, ramp, criteria, solver, pairs, field, sides, system, bodies,
@@ -347,11 +347,11 @@ def active_dofs(
 ) -> ActiveDofs:  # fmt: skip
     """Return the degrees of freedom of the contact problem.
 
-    They are those of the contact surfaces if the solver condenses the stiffness matrix to the unknowns `involved`, and if
-    no body is floating. Otherwise they are all degrees of freedom.
+    They are those of the contact surfaces and of the springs of floating bodies if the solver condenses the stiffness
+    matrix to the unknowns `involved`. Otherwise they are all degrees of freedom.
     """
-    if pairs and bodies is None and solver.condenses:
-        return SurfaceDofs(system, contact_dofs, involved)
+    if pairs and solver.condenses:
+        return SurfaceDofs(system, contact_dofs, np.empty(0, np.intp) if bodies is None else bodies.dofs, involved)
     return ActiveDofs(system, contact_dofs)
 
 

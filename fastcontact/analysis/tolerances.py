@@ -134,7 +134,9 @@ class Watch:
         self._forces: list[Array] = []
         self._changes: list[float] = []
 
-    def seen(self, unknowns: Array, force: Array, change: float, size: float) -> Scatter | None:
+    def seen(
+        self, unknowns: Array, force: Array, change: float, size: float, contraction: float = np.inf
+    ) -> Scatter | None:
         """Add an update to the window, and return the scatter of the window.
 
         Parameters
@@ -147,6 +149,8 @@ class Watch:
             Largest change of the displacements in this update [length].
         size : float
             Largest displacement [length].
+        contraction : float
+            Factor by which updates are known to contract changes. Half the window then suffices if it is below DECLINE [-].
 
         Returns
         -------
@@ -159,10 +163,11 @@ class Watch:
         self._parts.append(unknowns.copy())
         self._forces.append(force.copy())
         self._changes.append(change)
-        del self._parts[:-WINDOW], self._forces[:-WINDOW], self._changes[:-WINDOW]
-        if len(self._changes) < WINDOW:
+        window = WINDOW if contraction > DECLINE else WINDOW // 2
+        del self._parts[:-window], self._forces[:-window], self._changes[:-window]
+        if len(self._changes) < window:
             return None
-        changes, half = self._changes, WINDOW // 2
+        changes, half = self._changes, window // 2
         scatter = Scatter(_last_change(self._parts) / size, _last_change(self._forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
         if declining or scatter.displacement * size > APART * float(np.median(changes)):

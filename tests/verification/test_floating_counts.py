@@ -110,8 +110,8 @@ def layer(contrast):
 
 
 @pytest.mark.filterwarnings("ignore:.*element across", "ignore:Young.s moduli differ")
-def test_springs_of_stiff_bodies_are_as_soft_as_what_they_lie_on():
+def test_a_layer_between_stiff_bodies_costs_as_much_at_any_contrast():
     steps = [fc.solve(layer(contrast), 1)[-1] for contrast in (1e6, 1e7)]
-    assert [step.iterations["regularised"]["positions"] for step in steps] == [1, 1]
+    assert [step.iterations["active_set_iterations"] for step in steps] == [19, 19]
     one, other = (step.contact["disc"].force for step in steps)
     np.testing.assert_allclose(one, other, rtol=1e-3)

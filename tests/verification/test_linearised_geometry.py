@@ -50,6 +50,25 @@ def blocks(mesh, **options):
     return model
 
 
+def pressed_ball(element, **options):
+    """A sphere on a block that a pressure presses; contact alone holds it vertically."""
+    mesh = fc.generate.sphere_on_block(element, contact_size=4.0, contact_radius=8.0)
+    model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y")
+    model.add_pressure("SPHERE_TOP", 20.0)
+    model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
+    return model
+
+
+def loose_blocks(mesh, **options):
+    """A block that lies on a wider one without supports, pressed and pushed."""
+    sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.0}
+    mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
+    model = elastic_model(mesh, LOWER_BOTTOM="xy")
+    model.add_traction("UPPER_TOP", x=0.1, y=-1.0)
+    model.add_contact("hertz", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    return model
+
+
 # The derivative of weighted gaps leaves out how cuts and weights move, and in 3D replaces integrals over segments by those
 # over facets.
 EXACT, WEIGHTED, IN_SPACE = 1e-7, 0.01, 0.1
@@ -157,6 +176,12 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
         (ball_on_block, "tet4", {"formulation": "node_to_segment", **FRICTION}, 4),
         (ball_on_block, "hex8", {"formulation": "continuous", **FRICTION}, 5),
         (ball_on_block, "hex8", FRICTION, 5),
+        (pressed_ball, "hex8", {"formulation": "continuous"}, 4),
+        (pressed_ball, "tet4", {"formulation": "node_to_segment"}, 4),
+        (pressed_ball, "hex8", FRICTION, 5),
+        (loose_blocks, "quad4", {"formulation": "node_to_segment", **FRICTION}, 4),
+        (loose_blocks, "quad4", FRICTION, 4),
+        (loose_blocks, "quad8", {"formulation": "continuous", **FRICTION}, 4),
     ],
 )
 def test_load_steps_take_few_pairings_and_converge_quadratically(make, mesh, options, updates):

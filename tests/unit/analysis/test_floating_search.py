@@ -36,7 +36,7 @@ def test_a_contact_problem_that_does_not_settle_is_returned():
         calls.append(position)
         return solution(1.0 - position[0], settled=len(calls) != 2)
 
-    found = bodies_at(DOFS).settle(lambda position: solve_at(0.5 * position), np.zeros(1), 1.0, 0.0, 0.0)
+    found = bodies_at(DOFS).settle(lambda position: solve_at(0.5 * position), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack
     assert not found.state.settled
     assert found.state.iterations == found.positions == len(calls) == 2
@@ -49,14 +49,14 @@ def test_anchors_follow_what_contact_holds():
     def solve_at(position):
         return solution(np.linalg.solve(held + np.eye(3), load - held @ position))
 
-    found = bodies_at(np.arange(3)).settle(solve_at, np.zeros(3), 1.0, 0.0, 0.0)
+    found = bodies_at(np.arange(3)).settle(solve_at, None, np.arange(3), np.zeros(3), 1.0, 0.0, 0.0)
     assert found.slack
     assert found.positions <= 6
     np.testing.assert_allclose(found.position, np.linalg.solve(held, load), rtol=1e-9)
 
 
 def test_what_nothing_holds_is_not_slack():
-    found = bodies_at(DOFS).settle(lambda position: solution(1.0), np.zeros(1), 1.0, 0.0, 0.0)
+    found = bodies_at(DOFS).settle(lambda position: solution(1.0), None, DOFS, np.zeros(1), 1.0, 0.0, 0.0)
     assert not found.slack
     assert found.positions == MAX_POSITIONS
     np.testing.assert_array_equal(found.spring_force, [1.0])
@@ -143,6 +143,6 @@ def test_slack_is_in_units_of_the_contact_forces(force):
         found = solution(1e-9 if position[0] > 0.5 else 1.0 - position[0])
         return dataclasses.replace(found, multiplier=np.array([force]))
 
-    found = bodies_at(DOFS).settle(solve_at, np.zeros(1), load=0.0, noise=0.0, round_off=0.0)
+    found = bodies_at(DOFS).settle(solve_at, None, DOFS, np.zeros(1), load=0.0, noise=0.0, round_off=0.0)
     assert found.slack == (force > 0.0)
     assert found.position[0] > 0.5
