@@ -106,7 +106,7 @@ DOUBTS = [
         lambda: generate.half_spheres("tri3", size=5.0),
         of(STEEL, SPHERES, "[solve]\ngeometry_updates = 1\n", kinematics="axisymmetric"),
         (
-            r"the contact geometry had not converged after the 1 updates requested: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or leave them out",
+            r"the contact geometry had not converged after the 1 updates requested: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or omit the option",
         ),
     ),
     Doubt(
@@ -118,7 +118,7 @@ DOUBTS = [
         (r"contact 'pair' has opened again at the end: the smallest gap is 0\.01",),
     ),
     Doubt("contact is never reached", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
-          (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",)),
+          (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and the direction of the loads",)),
     Doubt(
         "bodies interpenetrate where no contact is defined",
         lambda: raised(0.001),
@@ -152,7 +152,7 @@ DOUBTS = [
             PAIR,
         ),
         (
-            r"the springs that regularise body 'UPPER': translation along y still carry \d\.\de-\d\d of the load: rigid motions are so much larger than deformations that round-off leaves no more",
+            r"the springs that regularise body 'UPPER': translation along y still carry \d\.\de-\d\d of the load: rigid motions are so much larger than deformations that round-off permits no higher accuracy",
             r"the loads strain the model by about .*: are loads, lengths and E in",
         ),
     ),
@@ -225,7 +225,7 @@ DOUBTS = [
         block_on_block,
         of(STEEL, BLOCKS, PAIR, "penalty = 1000.0\n"),
         (
-            r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or leave it out",
+            r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or omit it",
         ),
     ),
     Doubt(

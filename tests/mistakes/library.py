@@ -419,11 +419,11 @@ CONTACT = [
     Mistake("a penetration larger than an element", lambda: solved(blocks(changed(shift=-2.0))), fc.ContactError,
             r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
     Mistake("an obstacle that is inside out", lambda: solved(with_obstacle(1.0, (0.0, 1.0))), fc.ContactError,
-            r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: turn its normal or its facets round, or name another face of the body"),
+            r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: reverse its normal or its facets, or name another face of the body"),
     Mistake("an obstacle deep in the body", lambda: solved(with_obstacle(0.2)), fc.ContactError,
             r"contact 'plane' begins with a penetration of 0\.8 at point \d+ \[.*\], more than the length of the element there \(0\.5\): move a body apart, turn a surface that is inside out, or give an interference that is meant as clearance"),
     Mistake("a contact that is never reached", lambda: solved(blocks(changed(shift=1.0))), fc.FastcontactWarning,
-            r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push"),
+            r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and the direction of the loads"),
     Mistake("a pair was forgotten", lambda: solved(blocks(changed(shift=0.001), contact=False)), fc.FastcontactWarning,
             r"bodies '(UPPER|LOWER)' and '(UPPER|LOWER)' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet"),
     Mistake("bodies overlap and no pair joins them", lambda: solved(blocks(changed(shift=-2.0), contact=False)),
@@ -438,7 +438,7 @@ CONTACT = [
     Mistake("all nodes excluded", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"), fc.ContactError,
             r"contact 'pair' excludes all nodes of 'CONT_UPPER': nothing is left to touch"),
     Mistake("bodies pulled apart by a force", lambda: solved(lifted()), fc.ConvergenceError,
-            r"the loads pull bodies away, no contact stops them \(.*; resultant up to 10\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
+            r"the loads pull bodies away, and no contact stops them \(.*; resultant up to 10\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
 ]
 # fmt: on
 

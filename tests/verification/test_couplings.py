@@ -207,5 +207,5 @@ def test_forces_of_supports_hold_neither_springs_nor_couplings(said):
     assert found["LEFT"][1] == 0.0
     other = fc.Model(fc.generate.block((2.0, 1.0), (3, 2)), "plane_stress")
     for asked in (fc.support_forces, fc.spring_forces):
-        with pytest.raises(fc.ModelError, match="give the model that it was computed for"):
+        with pytest.raises(fc.ModelError, match="pass the model of this step"):
             asked(other, step)

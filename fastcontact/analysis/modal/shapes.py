@@ -185,7 +185,7 @@ class RingModes(Shapes):
 
     @property
     def kinematics(self) -> str:
-        """Of the model."""
+        """Kinematics of the model."""
         return self.modes._model.kinematics
 
     @cached_property
@@ -194,7 +194,7 @@ class RingModes(Shapes):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """See the class."""
+        """Mesh of all sectors, see `RingModes`."""
         part, centre = self.modes._model.mesh, self._sectors.centre
         return union(*(part.replace(points=(part.points - centre) @ turn.T + centre) for turn in self._turns))
 

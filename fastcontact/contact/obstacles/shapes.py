@@ -1,4 +1,4 @@
-"""The simple shapes: half-space, ball, cylinder, heights over the other coordinates, flat punch."""
+"""Rigid shapes: half-space, sphere, cylinder, heights over the other coordinates, and flat punch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _positive(**values: float) -> None:
 def _vector(name: str, values: ArrayLike, dim: int) -> Array:
     vector = finite_vector(values, dim)
     if vector is None:
-        raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
+        raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one per coordinate")
     return vector
 
 
@@ -78,11 +78,11 @@ class Sphere:
     Parameters
     ----------
     centre : sequence of float
-        [length].
+        Centre [length].
     R : float
         Radius [length].
     hollow : bool
-        The body lies inside.
+        Whether the body lies inside.
 
     Examples
     --------
@@ -123,7 +123,7 @@ class Cylinder:
     R : float
         Radius [length].
     hollow : bool
-        The body lies inside.
+        Whether the body lies inside.
 
     Examples
     --------
@@ -220,7 +220,8 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
 def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
     """Return a cone (a wedge in two dimensions) that rises by `slope` from its tip.
 
-    `slope` is the tangent of the angle between its side and the plane. At the tip the normal is the axis.
+    `slope` is the tangent of the angle between its side and the plane normal to its axis, `tip` the height of its tip above
+    the origin [length], and `side` ("above" or "below" the body) its position. At the tip the normal is the axis.
 
     Examples
     --------
@@ -249,9 +250,9 @@ class FlatPunch:
     Parameters
     ----------
     radius : float
-        [length].
+        Radius or half-width [length].
     height : float
-        Height of the face over the origin [length].
+        Height of the face above the origin [length].
     side : str
         ``"above"`` or ``"below"`` the body.
 

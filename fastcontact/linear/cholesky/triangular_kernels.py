@@ -79,7 +79,7 @@ def backward(
         below = begin[s + 1] - begin[s]
         for k in range(below):
             gathered[k] = x[rows[begin[s] + k]]
-        # Two columns at a time, which share the loads of the vector; the last one may be single.
+        # Two columns are processed at a time, which share the loads of the vector; the last column may be single.
         while j >= low:
             single = j == low
             one = start[j] + 1

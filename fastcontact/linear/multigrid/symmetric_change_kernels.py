@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Factors D and G of a symmetric update ``D.T G + G.T D``, restricted and multiplied.
 
-Sparse rows are given by ``indptr`` and ``indices``, in any order, and numbers. Restricted ones have a block of ``len(cols)``
+Sparse rows are given by ``indptr`` and ``indices``, in any order, and numbers. Restricted rows have a block of ``len(cols)``
 numbers for each coarse node. Kernels with `low` and `high` compute these rows of a result, each in a fixed order.
 """
 

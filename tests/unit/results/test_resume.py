@@ -207,10 +207,10 @@ def test_a_failed_run_is_tried_again_from_its_last_step(path: Path) -> None:
     assert not results.complete
     n_steps = len(results)
     assert 0 < n_steps < 3
-    assert "did not settle in 3 updates" in results.error
+    assert "did not converge in 3 updates" in results.error
     with pytest.raises(ConvergenceError):
         resumed(path, ramp, spheres(friction=0.1), criteria=few)
-    assert "did not settle in 3 updates" in open_results(path).error
+    assert "did not converge in 3 updates" in open_results(path).error
     resumed(path, ramp, spheres(friction=0.1))
     results = open_results(path)
     assert results.complete
@@ -306,7 +306,7 @@ def test_steps_without_their_state_are_refused(path: Path) -> None:
     model = fc.Model(spheres().mesh, "axisymmetric")
     with (
         ResultWriter(path, MESH, resume=True) as out,
-        pytest.raises(ModelError, match="does not hold the data to resume"),
+        pytest.raises(ModelError, match="does not contain restart data"),
     ):
         fc.solve(model, resume=out.done)
 
@@ -390,5 +390,5 @@ def test_a_damaged_state_is_no_state(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["fastcontact/restart0"][50] ^= 255
     assert open_results(path)[-1].restart is None
-    with pytest.raises(ModelError, match="does not hold the data to resume from it"):
+    with pytest.raises(ModelError, match="does not contain restart data"):
         resumed(path, fc.linear_ramp(2))
