@@ -27,7 +27,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 # 0.48, where the error of the pressure at the pole is 15 to 27 % and 27 to 43 %.
 SUSPICIOUS, ALTERNATING = 0.45, 0.3
 # Error in the energy norm above which a warning is given. It is 25 % under the same sphere on coarse triangles, and 52 to
-# 67 % in thin parts whose bending stiffness is three times too large.
+# 67 % in thin parts that carry a third of the exact load in bending.
 BENDING = 0.45
 # Elements that are over-constrained by one dilatation per cell.
 SIMPLICES = ("tri3", "tet4")

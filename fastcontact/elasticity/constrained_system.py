@@ -106,7 +106,7 @@ class ConstrainedMotion:
         wrong = np.flatnonzero(off > CONFLICT * scale)
         if len(wrong):
             raise ModelError(
-                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or relations stated "
+                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or constraints stated "
                 f"before it, by {off[wrong[0]]:.3g}: remove one of them"
             )
         lift: Array = self._elimination.T @ known + self._elimination.S @ values
@@ -238,8 +238,8 @@ class System(ConstrainedMotion):
     def balance(self, out: Array, round_off: Array | None = None) -> tuple[Array, float]:
         """Return the forces (n,) of supports and constraints, and the residual, the largest force on an unknown.
 
-        `out` (n,) are the internal minus all other forces [force]. Up to its `round_off` (n,) it does not count as
-        residual.
+        `out` (n,) are the internal minus all other forces [force]. Forces up to the `round_off` (n,) of `out` do not count
+        as residual.
         """
         residual = self.reduced(out)
         if round_off is not None:

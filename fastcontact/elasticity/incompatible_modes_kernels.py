@@ -79,7 +79,7 @@ def subtract_stiffness(
 ):
     """Subtract the condensed modes from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    `slots`, `owner` and `part` as for the element loops of the stiffness; Jacobians are known to be positive.
+    `slots`, `owner` and `part` are as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]

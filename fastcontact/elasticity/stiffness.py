@@ -151,7 +151,7 @@ def is_isotropic(moduli: Array) -> Mask:
     Parameters
     ----------
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
-        [pressure]
+        Moduli [pressure].
     """
     shear, size = moduli[:, 3, 3, None], moduli.shape[1]
     isotropic = np.zeros_like(moduli)
@@ -162,10 +162,7 @@ def is_isotropic(moduli: Array) -> Mask:
 
 
 def of_cells(material: Numbers) -> Numbers:
-    """Return one material number for each cell (n_cells,) of int, unique if nothing varies inside the cell.
-
-    The argument `material` (n_cells,) of int may also be (n_cells, n_q).
-    """
+    """Return one material number for each cell (n_cells,): that of the first quadrature point if there are (n_cells, n_q)."""
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
 

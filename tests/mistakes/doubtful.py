@@ -166,7 +166,7 @@ DOUBTS = [
         bent,
         of(STEEL, held("ALL", x=0.0, y=0.0)),
         (
-            r"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by \d+\.\d+% of the whole; use smaller cells, or better shaped ones",
+            r"the quadrature of the stiffness is not exact on curved or distorted cells: its error is \d+\.\d+% of the total; use smaller or better-shaped cells",
         ),
     ),
     Doubt(
@@ -233,7 +233,7 @@ DOUBTS = [
         lambda: block_on_block(divisions_upper=(8, 4)),
         of(STEEL, BLOCKS, '[[spring]]\ngroup = "CONT_UPPER"\nto = "CONT_LOWER"\ny = 1e10\n'),
         (
-            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; take 6e\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact",
+            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; use 6e\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is rigid and exact",
         ),
     ),
     Doubt(
@@ -285,7 +285,7 @@ DOUBTS = [
         block_on_block,
         of(STEEL, BLOCKS, PAIR, "friction = 30.0\n"),
         (
-            r"the friction of contact 'pair' is 30, more than the 3 that surfaces have at most: is it in percent\? Where nothing is to slide, take kind='tied'",
+            r"the friction of contact 'pair' is 30, more than the 3 that surfaces have at most: is it in percent\? To exclude sliding, use kind='tied'",
         ),
     ),
     Doubt(

@@ -61,7 +61,7 @@ def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
 def test_without_friction_halves_end_where_a_ramp_of_the_same_instants_does():
     limits = {"max_active_set_iterations": 2, "geometry_updates": 0}
     model = spheres(friction=0.0)
-    with pytest.raises(fc.ConvergenceError, match="did not settle in 2 iterations"):
+    with pytest.raises(fc.ConvergenceError, match="did not converge in 2 iterations"):
         fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits, max_halvings=0))
     (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits))
     asked = fc.Ramp(tuple(step.iterations["substeps"]))

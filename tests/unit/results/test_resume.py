@@ -379,7 +379,7 @@ def test_damaged_packed_data_are_noticed() -> None:
     for size in (0, 10, len(raw) - 1):
         with pytest.raises((ValueError, LookupError, TypeError)):
             unpacked(raw[:size])
-    with pytest.raises(ValueError, match="is not one of ours"):
+    with pytest.raises(ValueError, match="is not a packed array"):
         unpacked(packed({"a": np.array(["text"])}))
 
 

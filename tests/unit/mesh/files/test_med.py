@@ -633,7 +633,7 @@ def test_names_that_med_cannot_hold(tmp_path, name, message):
 
 
 def test_mesh_name_with_a_slash(tmp_path):
-    with pytest.raises(FileError, match="holds a slash"):
+    with pytest.raises(FileError, match="contains a slash"):
         write_med_mesh(tmp_path / "slash.med", all_elements(), mesh_name="a/b")
 
 

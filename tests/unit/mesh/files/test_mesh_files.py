@@ -350,7 +350,7 @@ def test_missing_file_folder_and_suffix(tmp_path):
 
 def test_mesh_name_is_for_med_only(tmp_path):
     write_mesh(tmp_path / "mesh.vtu", patch())
-    with pytest.raises(FileError, match="leave out mesh_name='upper'"):
+    with pytest.raises(FileError, match="omit mesh_name='upper'"):
         read_mesh(tmp_path / "mesh.vtu", mesh_name="upper")
     write_mesh(tmp_path / "mesh.med", patch())
     assert read_mesh_report(tmp_path / "mesh.med", mesh_name="mesh")[1].mesh_name == "mesh"
