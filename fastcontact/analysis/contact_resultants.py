@@ -57,9 +57,7 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
     """
     centre = contact.middle if about is None else np.asarray(about, float)
     if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
-        raise ContactError(
-            f"the moment of contact '{contact.name}' about {about!r}: give one finite coordinate per dimension"
-        )
+        raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs one number per dimension")
     arm, force = contact.coordinates - centre, contact.force_vectors
     if arm.shape[1] == 2:
         return np.array([float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())])

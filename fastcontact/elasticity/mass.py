@@ -46,9 +46,7 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
             "body without mass"
         )
     if not matrix.data.any():
-        raise ModelError(
-            "all densities are zero, and a model without mass has no modes: give the materials density=..."
-        )
+        raise ModelError("all densities are zero, and a massless model has no modes: give the materials density=...")
     return matrix
 
 

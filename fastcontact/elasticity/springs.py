@@ -174,9 +174,7 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
             continue
         text = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
         softer = 0.1 * WARNING_RATIO * body
-        instead = (
-            f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is rigid and exact"
-        )
+        instead = f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is exact"
         lost = round(math.log10(ratio))
         if ratio > ERROR_RATIO:
             left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"

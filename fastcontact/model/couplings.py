@@ -185,9 +185,7 @@ class Moment(Load):
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
-            raise ModelError(
-                f"{self.name}: no moment can act on an axisymmetric model, since it vanishes over the circle"
-            )
+            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model (zero over the circle)")
         if not len(mesh.points_of(self.group)):
             raise MeshError(f"{self.name}: the group is empty")
 

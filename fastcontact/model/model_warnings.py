@@ -142,9 +142,8 @@ def _proportions(model: Model, moved: float) -> Iterator[str]:
 
 def _pushed(supports: Supports) -> Array:
     """Return the largest prescribed displacements (dim,) along their ramps, or as given without a ramp [length]."""
-    straight = {
-        ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)
-    }  # without rotations
+    # Rotations are left out.
+    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}
     peaks = [_peak(ramp) * np.abs(values).max(axis=0) for ramp, values in straight.items() if len(values)]
     return np.max([np.zeros(supports.fixed.shape[1]), *peaks], axis=0)
 
@@ -193,8 +192,8 @@ def _wetted_twice(model: Model) -> list[str]:
         for one, other in itertools.combinations(wet, 2)
     }
     return [
-        f"the fluids of contacts '{one}' and '{other}' both act on {count} secondary facets, and each bypasses the seal of the "
-        "other contact: give each pair separate facets"
+        f"the fluids of contacts '{one}' and '{other}' both act on {count} secondary facets, and each bypasses the seal of "
+        "the other contact: give each pair separate facets"
         for (one, other), count in shared.items()
         if count
     ]

@@ -233,7 +233,7 @@ DOUBTS = [
         lambda: block_on_block(divisions_upper=(8, 4)),
         of(STEEL, BLOCKS, '[[spring]]\ngroup = "CONT_UPPER"\nto = "CONT_LOWER"\ny = 1e10\n'),
         (
-            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; use 6e\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is rigid and exact",
+            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; use 6e\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is exact",
         ),
     ),
     Doubt(

@@ -494,7 +494,7 @@ LOADS = [
     Mistake("a spring as a rigid link",
             lambda: fc.solve(with_load("add_spring", group="UPPER_TOP_LEFT", to="LOWER_BOTTOM_LEFT", y=1e30), 1),
             fc.ModelError,
-            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): results would keep no digit; use \de\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is rigid and exact"),
+            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): results would keep no digit; use \de\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is exact"),
 ]
 # fmt: on
 
