@@ -67,7 +67,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def interpretable_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, but small calls run in Python while it is not compiled yet, with bitwise equal results.
+    """Compile `function` like `kernel`, but run small calls in Python until it is compiled, with bitwise identical results.
 
     The function may contain only sums, products, quotients and square roots, since powers and array sums differ in NumPy.
     Other kernels cannot call it, since the returned object is not a Numba dispatcher.
@@ -77,7 +77,7 @@ def interpretable_kernel(function: Callable[..., Any]) -> Any:
 
 
 def summing_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for long sums of products, which are vectorised in an order that is the same in every run.
+    """Compile `function` like `kernel`, with long sums of products vectorised in an order that is the same in every run.
 
     The last bits of results may differ between processors, as with BLAS. The function must neither call nor be called by
     other kernels.
@@ -86,12 +86,12 @@ def summing_kernel(function: Callable[..., Any]) -> Any:
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for parts of hot loops: Numba inlines the code at each call."""
+    """Compile `function` like `kernel`, for parts of hot loops: Numba inlines the code at each call."""
     return _compile(function, inline="always")
 
 
 def innermost_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for functions called in innermost loops: LLVM inlines the machine code at each call.
+    """Compile `function` like `kernel`, for innermost loops: LLVM inlines the machine code at each call.
 
     Small arrays then stay in registers, where `inlined_kernel` leaves them in memory.
     """

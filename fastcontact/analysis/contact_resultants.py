@@ -41,6 +41,11 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
         In the plane about z, in 3D about x, y and z [force times length]. Meaningless in axisymmetry, where the moment
         over the full circle is zero.
 
+    Raises
+    ------
+    ContactError
+        If the point of reference does not have one finite coordinate per dimension.
+
     Examples
     --------
     >>> import fastcontact as fc
@@ -202,6 +207,14 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
 @typed(ContactError)
 def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDArray[np.void]:
     """Return `contact_resultants` as a table, one row for each load step, for `write_csv` and pandas.
+
+    Parameters
+    ----------
+    model : Model
+    steps : sequence of StepResult
+        Beginning with the first one, so that the work of friction is complete.
+    name : str
+        Name of the contact pair.
 
     Returns
     -------

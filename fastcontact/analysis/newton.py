@@ -162,8 +162,8 @@ class _Newton:
             if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
                 break
         raise ConvergenceError(
-            f"Newton's method does not converge: after {len(history)} iterations the displacement changes by {changes[-1]:.1e} "
-            f"of its largest component, and forces are out of balance by {balanced.relative:.1e}; use smaller load steps",
+            f"Newton's method does not converge: after {len(history)} iterations displacements change by {changes[-1]:.1e} "
+            f"of the largest one, and forces are out of balance by {balanced.relative:.1e}; use smaller load steps",
             history,
         )
 

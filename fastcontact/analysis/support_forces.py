@@ -89,13 +89,18 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[
 
 @typed(ModelError)
 def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the tensions (m,) of the springs by name, such as ``"spring on 'TOP'"`` [force].
+    """Return the tensions of the springs by name, such as ``"spring on 'TOP'"``.
 
     Parameters
     ----------
     model : Model
     step : StepResult
         A result of this model.
+
+    Returns
+    -------
+    dict of str to ndarray (m,)
+        Tensions of the m springs of each name, positive in tension [force].
 
     Raises
     ------
@@ -124,6 +129,10 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
 
 def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     """Return force and shortening of every pretension section as a table, one row for each load step, for `write_csv`.
+
+    Parameters
+    ----------
+    steps : iterable of StepResult
 
     Returns
     -------

@@ -43,6 +43,10 @@ class Shapes(StepSequence):
             Number of the mode, from 0.
         count : int
             Number of steps; their load factors are the phases, from 0 to 1.
+
+        Returns
+        -------
+        list of StepResult
         """
         return phases(self[number], count)
 

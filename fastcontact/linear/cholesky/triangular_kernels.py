@@ -85,7 +85,7 @@ def backward(
             one = start[j] + 1
             other = one if single else start[j - 1] + 2
             first_sum, second_sum = 0.0, 0.0
-            # Slices, because they tell the compiler that entries are contiguous.
+            # Slices show the compiler that entries are contiguous.
             n = high - 1 - j
             a, b, beside = values[one : one + n], values[other : other + n], x[j + 1 : high]
             for k in range(n):
