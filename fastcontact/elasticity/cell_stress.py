@@ -73,7 +73,11 @@ class CellStress:
         return out
 
     def fill(self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array, rows: Indices) -> None:
-        """Fill `out` (n_cells, n, n_components) [pressure] in place, in parallel; other arguments are as for `at`."""
+        """Fill `out` (n_cells, n, n_components) [pressure] in place, in parallel.
+
+        The points `xi` (n, dim) [-], the `cells` (n_cells, n_nodes) of int, `material` (n_cells,) of int or (n_cells, n_q),
+        and the numbers `rows` (n_cells,) of int of the cells are as for `at`.
+        """
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if xi is element.quadrature[0]:

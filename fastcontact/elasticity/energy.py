@@ -25,8 +25,8 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
     """Return the volume (n_cells, n_q) [length^dim] per unit of the reference cell; in axisymmetry of the full circle.
 
-    `corners` (n_cells, n_nodes, dim) are the nodes of the cells [length], `N` (n_q, n_nodes) the shape functions [-], and
-    `dN` (n_q, n_nodes, dim) their derivatives [-].
+    The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], the shape functions
+    `N` (n_q, n_nodes) [-], and their derivatives `dN` (n_q, n_nodes, dim) [-].
     """
     n_q, n_nodes, dim = dN.shape
     slopes = corners.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
@@ -39,7 +39,8 @@ def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Arr
 def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
     """Return the gradients (n_cells, n_q, n_nodes, dim) of shape functions [1 / length], and det J (n_cells, n_q).
 
-    `corners` (n_cells, n_nodes, dim) are the nodes of the cells [length], `dN` (n_q, n_nodes, dim) derivatives [-].
+    The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
+    functions `dN` (n_q, n_nodes, dim) [-].
     """
     slopes = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
     return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True), np.linalg.det(slopes)

@@ -66,7 +66,7 @@ class TemporaryConstraint(MultiPointConstraint):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that continue from the values `reached` (m,) of ``rows @ u`` at the beginning [length]."""
+        """Return the constraints that continue from `reached` (m,) [length], the values of ``rows @ u`` at the beginning."""
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()

@@ -202,7 +202,7 @@ def equivalent_strain(strain: Array) -> Array:
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
 
-    `stress` has the shape (..., n_components) [pressure]; `equivalent` (...) [pressure] is its von Mises stress, if known.
+    The von Mises stress of `stress` (..., n_components) [pressure] is `equivalent` (...) [pressure], if known.
     """
     stress = _with_components(stress)
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]

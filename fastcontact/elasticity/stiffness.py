@@ -162,7 +162,10 @@ def is_isotropic(moduli: Array) -> Mask:
 
 
 def of_cells(material: Numbers) -> Numbers:
-    """Return one material number for each cell (n_cells,): that of the first quadrature point if there are (n_cells, n_q)."""
+    """Return one material number for each cell (n_cells,) of int, that of its first quadrature point.
+
+    The argument `material` (n_cells,) of int may also be given at quadrature points (n_cells, n_q).
+    """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
 

@@ -64,7 +64,7 @@ def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
 
     The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and G. Strang, A simple
     mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only the `movable` (n,) of the `points` (n, 2) [length] move,
-    in `steps` steps; the function `size` of points returns the desired length of edges (n,) [length].
+    in `steps` steps; the function `size` (n,) [length] of points returns the desired length of edges.
     """
     points = points.copy()
     if not movable.any():
@@ -98,8 +98,8 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
 
     A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges that are too long (smart
     smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved simultaneously share
-    no edge. Only the `movable` (n,) of the `points` (n, 2) [length] move, in at most `sweeps` sweeps; the function `limit` of
-    points returns the longest admissible edge (n,) [length].
+    no edge. Only the `movable` (n,) of the `points` (n, 2) [length] move, in at most `sweeps` sweeps. The function
+    `limit` (n,) [length] of points returns the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True

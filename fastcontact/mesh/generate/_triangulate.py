@@ -29,8 +29,8 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    Each of the `sides` consists of a name and nodes (n, 2) [length]. They run counter-clockwise, each from the end of the
-    previous one. `spacing` defines the longest inner edges.
+    The `sides` (n, 2) [length], each given by a name and its nodes, run counter-clockwise, each from the end of the previous
+    one. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)
