@@ -307,7 +307,7 @@ Points = _SurfacePoints | _ObstaclePoints
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """The part q m of a relative motion that closes a gap, ``q = a . o / a . m``, see `Slips`.
+    """Correction q m for the part of a relative motion that closes a gap, ``q = a . o / a . m``, see `Slips`.
 
     Attributes
     ----------
@@ -367,9 +367,9 @@ class Slips:
     .. math:: s = r + q m, \qquad q = \frac{a \cdot o}{a \cdot m}, \qquad
               \delta (t \cdot s) = t \cdot \delta s - (t \cdot \delta n) (n \cdot s)
 
-    with the relative motion r of the step and, where slip is symmetric, minus its part that closes the distance o of the
-    beginning. Both vary as points face other primary points: :math:`\delta r = - \sum_k N_{k, \alpha} \Delta u_k
-    \delta \xi^\alpha`, and o likewise with the positions at the beginning instead of the increments of displacements.
+    with the relative motion r of the step. If slip is symmetric, adding q m removes the part of the motion that closes the
+    initial distance o. Both r and o vary as points face other primary points: :math:`\delta r = - \sum_k N_{k, \alpha}
+    \Delta u_k \delta \xi^\alpha`, and o in the same way with the initial positions instead of the displacement increments.
 
     Attributes
     ----------

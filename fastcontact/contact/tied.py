@@ -1,9 +1,9 @@
 """Tied contact: no opening and no slip, as linear equations that hold from the beginning.
 
 The sides are paired once, in the undeformed configuration; the relative displacement of points that face each other stays
-zero in every direction. The test functions are the formulation's multipliers: one set of equations per node where forces
-are nodal; moments with the functions of the multiplier field where forces act at integration points, which is the mortar
-method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
+zero in every direction. The test functions are the formulation's multipliers. If forces are nodal, there is one set of
+equations per node. If forces act at integration points, the equations are moments with the functions of the multiplier
+field, which is the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
 
 At nodes that supports hold on both sides, the secondary side has one displacement less than the multipliers, which then are
 not determined: multipliers that alternate from node to node and decay along the surface do no work. They are reduced as at
@@ -11,9 +11,9 @@ the ends of mortar lines (Bernardi et al., section 3): in a direction that is he
 the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
 
 Equal displacements across a gap would resist rigid rotations: the forces of both sides would have different lines of action,
-and the moment of the shear would be lost. A rigid arm across the gap therefore rotates with the primary facet (`with_arms`):
-the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
-derivative along t on the primary facet; it vanishes in any small rotation of both sides.
+and the moment of the shear would be lost. A rigid arm across the gap therefore rotates with the primary facet (`with_arms`).
+The relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
+derivative along t on the primary facet. It vanishes in any small rotation of both sides.
 """
 
 from __future__ import annotations

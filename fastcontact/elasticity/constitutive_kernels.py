@@ -4,9 +4,9 @@
 Shared arguments: ``F`` (3, 3) is the deformation gradient [-], ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure] and
 ``A`` (9, 9) its derivative dP/dF, of which components iJ have the number 3 i + J. Laws for small strains take the symmetric
 part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin with the number of the law, see
-`nonlinear_materials`; `old` and `new` (9,) are the history at the beginning and the end of the load step: the plastic strain
-(xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume], and in plane
-stress F_zz - 1. The volumetric part of a law with a bulk modulus, U(J) = K (J - 1)^2 / 2, is added by the element loop.
+`nonlinear_materials`. `old` and `new` (9,) are the history at the beginning and the end of the load step. It consists of the
+plastic strain (xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume],
+and in plane stress F_zz - 1. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of laws with a bulk modulus.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Stresses from displacements: at quadrature points, at element nodes, averaged at nodes; equivalent stresses."""
+"""Stresses from displacements, at quadrature points, at element nodes and averaged at nodes, and equivalent stresses."""
 
 from __future__ import annotations
 

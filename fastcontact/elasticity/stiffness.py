@@ -1,4 +1,4 @@
-"""Stiffness matrix of a mesh: its sparsity, computed once, and its values; rigid-body modes."""
+"""Stiffness matrix of a mesh, whose sparsity is computed once, and rigid-body modes."""
 
 from __future__ import annotations
 
@@ -241,8 +241,8 @@ def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indic
 def rigid_modes(points: Array, kinematics: str) -> Array:
     """Return the rigid-body modes (n_points * dim, n_modes) [-], displacements of `points` (n_points, dim) [length].
 
-    Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three translations
-    and three rotations [length]. Rotations turn about the mean point.
+    The columns are the translation along the axis in axisymmetry, two translations and the rotation in the plane, and three
+    translations and three rotations in 3D [length]. Rotations are about the mean point.
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]

@@ -1,6 +1,6 @@
 """Rigid-body modes left free by supports and multi-point constraints, and whether contact can stop them.
 
-A body in contact is in equilibrium if the loads do no positive work on motions that open gaps or leave them unchanged: the
+A body in contact is in equilibrium if the loads do no positive work on motions that open gaps or leave them unchanged. The
 loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).
 """
 

@@ -24,10 +24,10 @@ LEAN = 0.27
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals point out of the obstacle, towards the body: in two dimensions to the right of a line's direction, in three
-    to the side from which the nodes of a face run counter-clockwise; facets on the outside of solid cells of their
-    mesh point out of these. Distances are exact, to the closest point of the curved facets. Beyond the border of an
-    open surface there is no contact.
+    Normals point out of the obstacle, towards the body. In two dimensions they point to the right of a line's direction,
+    in three dimensions to the side from which the nodes of a face run counter-clockwise. Normals of facets on the outside
+    of solid cells of their mesh point out of these cells. Distances to the closest point of the curved facets are exact.
+    Beyond the border of an open surface there is no contact.
 
     Parameters
     ----------

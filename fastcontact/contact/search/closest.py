@@ -38,8 +38,8 @@ class Closest(NamedTuple):
 def closest(points: Array, corners: Array) -> Closest:
     """Project `points` (n, dim) [length] on the closest of many facets of one kind, or raise ContactError if that fails.
 
-    `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets: lines of 2 or 3 nodes in 2D; triangles of 3 or 6
-    and quadrangles of 4, 8 or 9 in 3D.
+    `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets. In 2D they are lines of 2 or 3 nodes, in 3D
+    triangles of 3 or 6 nodes and quadrangles of 4, 8 or 9 nodes.
     """
     points, corners = np.ascontiguousarray(points), np.ascontiguousarray(corners)
     n, dim = points.shape

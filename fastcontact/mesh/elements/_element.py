@@ -1,4 +1,4 @@
-"""Reference elements: data, shape functions and default quadrature; shape functions of families of elements.
+"""Reference elements with shape functions and default quadrature, and shape functions of families of elements.
 
 Reference coordinates have no dimension.
 """
@@ -168,8 +168,9 @@ def with_middles(linear: Element) -> Array:
 def serendipity(box: Element) -> Functions:
     """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear square or cube with mid nodes.
 
-    In each coordinate x of a node at X, the function of a mid node has the factor 1 - x^2 along its edge, where X is 0, and
-    (1 + x X) / 2 across it; that of a corner is its linear one times the sum of x X, less dim - 1 (Zienkiewicz and Taylor).
+    The function of a mid node at X is a product over the coordinates x, with the factor 1 - x^2 along its edge, where X is 0,
+    and (1 + x X) / 2 across the edge. The function of a corner is its linear function times the sum of all x X minus dim - 1
+    (Zienkiewicz and Taylor).
     """
     nodes, dim = with_middles(box), box.dim
     corners, middles = np.split(nodes, [box.n_nodes])

@@ -1,4 +1,4 @@
-"""Positions of nodes on lines: equal or geometric segments, or segments by a size function; straight lines and arcs."""
+"""Positions of nodes on straight lines and arcs with equal segments, geometric segments, or segments by a size function."""
 
 from __future__ import annotations
 
