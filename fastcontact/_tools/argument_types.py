@@ -57,7 +57,7 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
             values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
-        except TypeError:  # Python's message on missing and unknown arguments is the best
+        except TypeError:  # Python itself has the best message for missing and unknown arguments
             return call(*args, **kwargs)
         for key, value in values.items():
             parameter = signature.parameters[key]

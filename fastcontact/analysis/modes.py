@@ -35,7 +35,7 @@ from fastcontact.results.step import StepResult
 # Shift that regularises free bodies, over the eigenvalue of a uniform deformation: below the eigenvalues of all but thin
 # bodies.
 SHIFT = 1e-4
-# A mode shape slides where slip is more than this fraction of the motion; less is round-off.
+# A mode shape slides if its slip is more than this fraction of the motion; smaller slip is round-off.
 SLIDES = 1e-3
 
 

@@ -33,15 +33,15 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Largest number of Newton iterations of a load step, and of halvings of one that inverts cells.
+# Largest number of Newton iterations of a load step, and of halvings of an iteration that inverts cells.
 MOST, HALVINGS = 40, 6
 # Trials of a line search, ratio of final to initial slope above which a step overshoots, and smallest step length.
 SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
 # Number of iterations within which the change of the displacement must have decreased at least once by the factor FALL.
 PATIENCE, FALL = 12, 0.5
-# Stiffness of springs along closed gaps over the largest of the bodies. Motions that contact does not hold, such as gaps
-# between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3, and
-# one under fluid pressure, for which the first is too soft, 13 and 22 with the others.
+# Stiffnesses of springs along closed gaps, over the largest stiffness of the bodies. Motions that contact does not constrain,
+# such as gaps between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5,
+# 2e-4, 1e-3, and an O-ring under fluid pressure, for which the first is too soft, takes 13 and 22 with the others.
 HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
@@ -113,7 +113,7 @@ class Regularisation:
     geometric : int
         Part of the geometric stiffness that it includes, see `NonlinearBodies.at`.
     held : float
-        Stiffness of springs along closed gaps, over the largest of the bodies [-].
+        Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
     """

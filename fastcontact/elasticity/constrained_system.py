@@ -180,7 +180,7 @@ class System(ConstrainedMotion):
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = diagonal_of(transformed)
-            # The terms of the transformed diagonal, without those between different components, which may cancel them.
+            # The transformed diagonal without the terms between different components, which may cancel.
             uncancelled = self.T.multiply(self.T).T @ diagonal_of_K
             # Excludes points without stiffness that constraints couple only with each other.
             self.free &= (uncancelled > 0.0) | self._without_stiffness

@@ -43,7 +43,7 @@ SOLIDS = (1e2, 2e12)
 SOME = 1000
 # Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which a warning is given.
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
-# Nodes nearer to each other than this fraction of the edges there, and than single precision, are probably meant to coincide.
+# Nodes nearer to each other than this fraction of the edges there, and than single precision, probably should coincide.
 NEAR = 1e-2
 # Largest penetration over the facet length that does not count as overlap: eight straight facets of a circle penetrate a
 # round side by less.

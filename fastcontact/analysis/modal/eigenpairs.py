@@ -74,7 +74,7 @@ def lowest(
         pairs = _by_multigrid(solver, shifted, M, start, n)
     else:
         pairs = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
-    # Ritz values in the span: more accurate than those of the iteration, and vectors of equal ones are orthogonal.
+    # Ritz pairs in the span of the iterates are more accurate, and their vectors are orthogonal for equal eigenvalues.
     small, mass = pairs.T @ (K @ pairs), pairs.T @ (M @ pairs)
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ (0.5 * (small + small.T)) @ lower.T)

@@ -131,7 +131,7 @@ def _opposite_ends(
     block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
 ) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
-    # A tolerance for round-off only does not extend the side: a cut there would leave a strip that faces the tolerance.
+    # A tolerance for round-off only does not extend the side: a cut there would leave a sliver of the tolerance's width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
     first, facets, places = 0, [], []
     for other in primary.blocks:

@@ -35,7 +35,7 @@ class RigidSide:
     """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 
     obstacle: Obstacle  # in its initial position
-    motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]
+    motion: Array  # (dim,): its displacement at multiplier 1 of its ramp [length]
     rotation: Rotation | None = None
 
     @property

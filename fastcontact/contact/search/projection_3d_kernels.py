@@ -248,7 +248,7 @@ def project(facets, f, domain, point, reach):
         if value < best:
             s, t, best, converged = a, b, value, good
     side = minus(node(facets, f, 1), node(facets, f, 0))
-    # Near the centres of curvature the distance has several minima on one triangle, so that every node is a start, too.
+    # Near the centres of curvature the distance has several minima on one triangle, so that the descent starts at every node.
     for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > dot(side, side) else 0):
         a, b, good = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
         value = half_square(terms, f, a, b, point)
