@@ -321,7 +321,7 @@ def test_temperatures_and_films_come_and_go():
 
 def test_spans_that_cannot_be_are_refused():
     model = fc.Model(fc.generate.block(), "plane_strain")
-    with pytest.raises(fc.errors.ModelError, match="begins at 1 without a ramp: give it one"):
+    with pytest.raises(fc.errors.ModelError, match="begins at 1 without a ramp: give it a ramp"):
         model.fix_temperature("RIGHT", 220.0, begins=1.0)
     with pytest.raises(
         fc.errors.ModelError, match="the film on 'RIGHT' begins at 2 and ends at 1: it must begin earlier"

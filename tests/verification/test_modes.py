@@ -321,7 +321,7 @@ def test_what_is_refused():
     model = model_of(block((1.0, 0.1), (10, 1)), "plane_stress")
     column, other = pressed_column((41, 2))
     for call, said in (
-        (lambda: fc.modes(model, n=0), "ask for one or more"),
+        (lambda: fc.modes(model, n=0), "request one or more"),
         (lambda: fc.modes(model, n=44), "modes of 44 free displacements"),
         (lambda: fc.modes(model, other), "displacements of shape .126, 2., but the mesh points of shape .22, 2."),
         (lambda: fc.modes(model, n=2, linear_solver="nothing"), "nothing"),

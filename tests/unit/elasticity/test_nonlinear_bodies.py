@@ -124,7 +124,7 @@ def test_threads_do_not_change_bits(monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda: fc.Ogden([1.0, 2.0], [2.0], bulk=10.0), "2 mu and 1 alpha"),
         (lambda: fc.Ogden(1.0, 0.0, bulk=10.0), "no alpha zero"),
         (lambda: model_with(PLASTIC, "finite"), "kinematic hardening requires small strains"),
-        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: take NeoHookean"),
+        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: use NeoHookean"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(make, text: str) -> None:
