@@ -250,7 +250,7 @@ def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> N
     begun(path, (0.5,))
     before = path.read_bytes()
     model, ramp, message = other_cases()[name]
-    with pytest.raises(ModelError, match=rf"belong to another case; changed since: {message}\. Go on"):
+    with pytest.raises(ModelError, match=rf"belong to another case; changed since: {message}\. Continue"):
         resumed(path, ramp, model)
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
