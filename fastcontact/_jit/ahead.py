@@ -33,11 +33,11 @@ from fastcontact._jit import compiling, decorators
 
 TABLE = Path(__file__).with_name("kernels.json")
 ROOT = Path(__file__).resolve().parents[2]
-# Number of helpers of a run; each takes the memory of Python with Numba.
+# Largest number of helpers of a run; each takes the memory of Python with Numba.
 MOST = 3
-# Number of uncompiled kernels after which helpers start: a single new kernel does not justify them.
+# Number of uncompiled kernels beyond which helpers start: fewer do not justify them.
 ALONE = 2
-# Kinds of runs already compiled by helpers in this process: later runs of these find their kernels.
+# Kinds of runs whose kernels helpers of this process have compiled, so that later runs need no helpers.
 _helped: set[str] = set()
 
 
@@ -108,7 +108,7 @@ def start(
 ) -> list[subprocess.Popen[str]]:
     """Start helper processes that share the compilation of the kernels of some kinds of runs.
 
-    Each writes the kernel it begins to `output`, and the reason of a failed compilation to `errors`.
+    Each helper writes the number of the kernel that it begins to `output`, and the reason of a failure to `errors`.
     """
     path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
     command = [sys.executable, "-m", __name__, str(helpers)]
@@ -194,17 +194,15 @@ class Help:
         with self._changed:
             self._left = [number for number in self._left if number not in numbers]
         for process, number in itertools.product(self._processes, numbers):
-            with contextlib.suppress(OSError):  # it has ended
+            with contextlib.suppress(OSError):  # the helper has ended
                 print(number, file=process.stdin, flush=True)
 
 
 def expect(runs: Sequence[str]) -> None:
     """Let helpers compile the kernels of some kinds of runs as soon as this process lacks more than a few of them.
 
-    They start only if one of these kernels cannot run in Python: later runs of the same kind need no helpers. There are no
-
-    helpers in worker processes, with a single thread, without a kernel cache, or if the interpreter is embedded in another
-    program.
+    Helpers start only if one of the missing kernels cannot run in Python. There are no helpers in worker processes, with a
+    single thread, without a kernel cache, or if the interpreter is embedded in another program.
     """
     new, helpers = [run for run in runs if run not in _helped], min(decorators.threads() - 1, MOST)
     python = Path(sys.executable or "").stem.startswith("python")
@@ -225,9 +223,9 @@ def expect(runs: Sequence[str]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Compile every `n`-th kernel of some kinds of runs, except those read from standard input: the task of a helper.
+    """Compile every `n`-th kernel of some kinds of runs, as a helper; return the number of failures.
 
-    Return the number of kernels that failed to compile.
+    Kernels whose numbers are read from standard input are skipped.
     """
     n, first, *runs = arguments
     compiled_elsewhere: set[int] = set()

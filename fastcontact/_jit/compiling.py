@@ -1,4 +1,4 @@
-"""Tell the user that kernels are being compiled, which may take a minute."""
+"""Notification of the user that kernels are being compiled, which may take a minute."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def notify() -> None:
 
 
 def tell() -> None:
-    """Notify all listeners, and once per process the log at level INFO, that kernels are being compiled."""
+    """Notify all listeners that kernels are being compiled; log this once per process at level INFO."""
     global _reported
     if not _reported:
         _reported = True
@@ -57,6 +57,6 @@ def _somebody_waits() -> bool:
 
 # Called when a kernel is compiled or waited for, but not when it is read from the disk cache.
 listeners: list[Callable[[], None]] = [tell_who_waits]
-# Called when a kernel has no compiled version, and when a needed kernel may be under compilation in a helper: see `ahead`.
+# Called when a kernel has no compiled version, and when a helper may be compiling a needed kernel: see `ahead`.
 helpers: list[Callable[[], None]] = []
 waiters: list[Callable[[str], bool]] = []

@@ -1,4 +1,4 @@
-"""Decorators of kernels: disk cache, strict floating-point arithmetic; number of threads.
+"""Decorators that compile kernels with a disk cache and strict floating-point arithmetic, and the number of threads.
 
 Kernels are compiled at their first call, never at import. If no folder is writable for the cache, they are compiled
 in every process instead, with one line in the log.
@@ -21,10 +21,10 @@ from fastcontact._jit import cache, compiling, interpreting
 log = logging.getLogger("fastcontact")
 
 # Arithmetic is done as written, without fused multiply-add. A kernel called by others is compiled once by itself and once
-# as a part of each of them, and optimised differently there; which of the copies runs depends on what was compiled or
-# loaded before. All copies give the same bits only if each operation has a unique result.
+# as a part of each of them, and optimised differently there. Which of the copies runs depends on what was compiled or
+# loaded before. Their results are bitwise identical only if each operation has a unique result.
 AS_WRITTEN: set[str] = set()
-# Vectorisation allowed in kernels that neither call nor are called by others, so that only one copy exists.
+# Flags that permit vectorised sums, for kernels that neither call nor are called by others: only one copy exists.
 ANY_ORDER = {"contract", "reassoc"}
 
 _cache_reported = False
@@ -33,7 +33,7 @@ _cache_reported = False
 class _Compilations(event.Listener):  # type: ignore[misc]
     """Listener for compilations of kernels; Numba raises no event for kernels read from the cache.
 
-    Garbage is collected after a kernel, not 60 times within it, which would take a tenth of the compilation time.
+    Garbage is collected once after each kernel. The 60 collections during its compilation took a tenth of the time.
     """
 
     depth = 0  # nesting: a kernel compiles those that it calls
@@ -67,31 +67,31 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 
 def interpretable_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, but small calls run in Python while it is not compiled yet, with bitwise equal results.
+    """Compile `function` like `kernel`, but run small calls in Python until it is compiled, with bitwise identical results.
 
-    It must contain only sums, products, quotients and square roots, since powers and array sums differ in NumPy. It must not
-    be called by other kernels, since it is not a kernel for Numba.
+    The function may contain only sums, products, quotients and square roots, since powers and array sums differ in NumPy.
+    Other kernels cannot call it, since the returned object is not a Numba dispatcher.
     """
     dispatcher = kernel(function)
     return interpreting.Interpretable(dispatcher, cache.files.get(function)) if compiled() else dispatcher
 
 
 def summing_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for long sums of products, vectorised with another order of summation that is the same in every run.
+    """Compile `function` like `kernel`, with long sums of products vectorised in an order that is the same in every run.
 
-    It is for results whose last bits may differ between processors, as in BLAS, and must neither call nor be called by
-    others.
+    The last bits of results may differ between processors, as with BLAS. The function must neither call nor be called by
+    other kernels.
     """
     return _compile(function, fastmath=ANY_ORDER)
 
 
 def inlined_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for parts of hot loops: Numba inlines the code at each call."""
+    """Compile `function` like `kernel`, for parts of hot loops: Numba inlines the code at each call."""
     return _compile(function, inline="always")
 
 
 def innermost_kernel(function: Callable[..., Any]) -> Any:
-    """Like `kernel`, for functions called in innermost loops: LLVM inlines the machine code at each call.
+    """Compile `function` like `kernel`, for innermost loops: LLVM inlines the machine code at each call.
 
     Small arrays then stay in registers, where `inlined_kernel` leaves them in memory.
     """

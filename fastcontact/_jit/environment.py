@@ -8,12 +8,12 @@ from fastcontact.errors import FastcontactError
 
 
 def check() -> None:
-    """Raise FastcontactError without a working folder, or for NUMBA_NUM_THREADS below 1."""
+    """Raise FastcontactError if the working directory no longer exists, or NUMBA_NUM_THREADS is below 1."""
     try:
         os.getcwd()
     except OSError as error:
         raise FastcontactError(
-            f"the working folder is no longer there ({error.strerror}): change to one that exists, such as by 'cd'"
+            f"the working directory no longer exists ({error.strerror}): change to an existing one, for example with 'cd'"
         ) from None
     text = os.environ.get("NUMBA_NUM_THREADS", "1")
     if text.strip().lstrip("+-").isdecimal() and int(text) < 1:

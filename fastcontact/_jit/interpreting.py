@@ -1,9 +1,9 @@
 """Kernels that run in Python while they are not compiled, if that takes less time than their compilation.
 
 A kernel that loops once or twice over a small mesh takes Python some hundredths of a second, and its compilation one or two
-seconds. Python runs it until it has spent about the time of a compilation on it, in this run and earlier ones: for any
-later runs, that takes at most twice the time of the better choice. The arithmetic is bitwise identical: sums,
-products, quotients and square roots of doubles, in the order written.
+seconds. Python runs it until it has spent about the time of a compilation on it, in this run and earlier ones. Whatever
+runs follow, this takes at most twice the time of the better choice. Results are bitwise identical: the arithmetic consists
+of sums, products, quotients and square roots of doubles, in the order written.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ import numpy as np
 from fastcontact._jit import compiling
 from fastcontact._jit.cache import KernelFiles
 
-# Limits for Python: entries of all arguments of a call, and seconds in all calls of a kernel. Python takes 1 to 8
-# microseconds per entry, and Numba 0.2 to 3 seconds per kernel. With earlier runs the limit is the cost of most kernels.
+# Limits for Python: entries of all arguments of a call, seconds in all calls of a kernel in one run, and seconds in all
+# runs, which suffice to compile most kernels. Python takes 1 to 8 microseconds per entry, and Numba 0.2 to 3 seconds per
+# kernel.
 ENTRIES, SECONDS, SECONDS_OF_RUNS = 200_000, 0.5, 1.0
 # File beside the compiled kernels: seconds that Python has spent on uncompiled ones, by version.
 SPENT = "interpreted.json"
@@ -103,7 +104,7 @@ def _spent_before(folder: Path) -> dict[str, float]:
 
 
 def note_spent() -> None:
-    """Add the seconds of this process to those of earlier runs; of runs that end simultaneously one is counted."""
+    """Add the seconds of this process to those of earlier runs; if several runs end simultaneously, only one is counted."""
     spent = [kernel.spent for kernel in _interpreted if kernel.spent is not None]
     for folder in {folder for folder, _, _ in spent}:
         _spent_before.cache_clear()

@@ -19,7 +19,7 @@ from fastcontact.arrays import AnyArray
 Result = TypeVar("Result")
 Part = TypeVar("Part")
 Given = ParamSpec("Given")
-# Up to this work other threads cost more to wake (0.03 ms) than they save; the nodes of a cell where none are given.
+# Work up to which waking other threads (0.03 ms) costs more than they save, and the default number of nodes of a cell.
 WORTHWHILE, NODES = 80_000, 4
 MOST = 255
 
@@ -49,7 +49,7 @@ def shared(work: Callable[[Part], Result], parts: Sequence[Part]) -> list[Result
 def spread(kernel: Any, count: int, work: float, *arguments: Any) -> None:
     """Call ``kernel(low, high, *arguments)`` for ranges that together cover 0 to `count`, each in a thread.
 
-    `work` is that for one of the `count` rows or cells, see `portions`; 0 for rows that must be computed in order.
+    `work` is the work per row or cell, see `portions`; 0 for rows that must be computed in order.
     """
     if count * work <= WORTHWHILE:
         kernel(0, count, *arguments)
@@ -65,9 +65,10 @@ def _libraries() -> Any:
 
 
 def on_one_blas_thread(function: Callable[Given, Result]) -> Callable[Given, Result]:
-    """Limit BLAS to one thread while a function runs: further threads spin between the small calls of a contact iteration.
+    """Limit BLAS to one thread while a function runs.
 
-    Besides, the number of threads determines the order of summation, and thus the last bits of a result.
+    Further threads spin between the small calls of a contact iteration. The number of threads also determines the order of
+    summation, and thus the last bits of a result.
     """
 
     @wraps(function)
@@ -88,7 +89,7 @@ def read_only(numbers: AnyArray) -> AnyArray:
 def portions(count: int, work: float = NODES) -> list[tuple[int, int]]:
     """Return ranges of nearly equal size that cover 0 to `count`: one per thread, or a single one for little work.
 
-    The `work` for each of the `count` cells is counted in nodes of a cell, of some ten nanoseconds each.
+    `work` is the work per cell, counted in nodes; a node takes some ten nanoseconds.
     """
     if count * work <= WORTHWHILE:
         return [(0, count)]

@@ -69,7 +69,7 @@ def check_contents(file: Any, path: PathLike) -> None:
         for raw, kind in links:
             name = f"{where}/{raw.decode('utf-8', 'replace')}"
             if kind == TYPE_SOFT:
-                continue  # it stays in this file
+                continue  # a soft link refers to an object of the same file
             if kind != TYPE_HARD:
                 raise FileError(f"'{path}' refers to another file at '{name}': copy the data into one file")
             item = h5o.open(group, raw)
@@ -77,13 +77,13 @@ def check_contents(file: Any, path: PathLike) -> None:
                 total += _check_dataset(item, f"'{name}' of '{path}'", limit, file_size)
                 if total > limit_in_all:
                     raise FileError(
-                        f"'{path}' declares more than {limit_in_all:.3g} bytes in all, which a file of its size cannot hold: "
-                        "write it anew"
+                        f"'{path}' declares more than {limit_in_all:.3g} bytes in total, which a file of its size cannot "
+                        "hold: write it anew"
                     )
             elif isinstance(item, h5g.GroupID):
                 address = h5o.get_info(item).addr
                 if address in seen or depth >= DEEPEST:
-                    raise FileError(f"'{path}' has groups in a circle or too deep, at '{name[:80]}': write it anew")
+                    raise FileError(f"'{path}' has groups in a cycle or too deep, at '{name[:80]}': write it anew")
                 seen.add(address)
                 waiting.append((item, name, depth + 1))
 
@@ -98,7 +98,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         raise FileError(f"{where} stores its values in another file: copy the data into one file")
     item, count = dataset.get_type().get_size(), dataset.get_space().get_simple_extent_npoints()
     size = count * item
-    # Strings and references become one object each, and take space in the file.
+    # Each string or reference becomes one Python object, and takes space in the file.
     if count > max(FEW_OBJECTS, file_size // 8) and dataset.dtype.hasobject:
         raise FileError(f"{where} declares {count} texts or references, which its file cannot hold: write it anew")
     if layout == h5d.CHUNKED:
@@ -110,7 +110,7 @@ def _check_dataset(dataset: Any, where: str, limit: int, file_size: int) -> int:
         if not set(filters) <= set(built_in):
             raise FileError(f"{where} is packed by the filter {filters[0]}, which HDF5 may lack: use gzip")
         if dataset.get_storage_size() > 2 * (size + chunk) + PLAUSIBLE_BYTES:
-            raise FileError(f"{where} takes more room packed than it can hold: the file is damaged, write it anew")
+            raise FileError(f"{where} is larger compressed than uncompressed: the file is damaged, write it anew")
         size = max(size, chunk)
     if size > limit:
         raise FileError(f"{where} declares {size:.3g} bytes, which a file of its size cannot hold: write it anew")
@@ -138,7 +138,7 @@ def values(group: Any, name: str) -> AnyArray:
 
 
 def attribute(item: Any, name: str, default: Any = None) -> Any:
-    """Return an attribute of a group or a data set, a number or a string of fixed length; FileError if it is another kind."""
+    """Return an attribute of a group or data set, a number or a string of fixed length; FileError for other kinds."""
     if name not in item.attrs and default is not None:
         return default
     if item.attrs.get_id(name).dtype.base.kind not in PLAIN_KINDS:

@@ -35,7 +35,7 @@ class DriverFile:
 
     def _fail(self, error: BaseException) -> None:
         """Store the first error, without its frames, which would keep HDF5 objects open."""
-        error = error.with_traceback(None)  # for later errors, too: they may be the same object
+        error = error.with_traceback(None)  # also for later errors, which may be the same object
         self.failure = self.failure or error
 
     def fileno(self) -> int:
@@ -113,7 +113,7 @@ class DriverFile:
 
 @contextmanager
 def new_hdf5(path: Path) -> Iterator[Any]:
-    """Write an HDF5 file over the existing file at `path`; raises OSError if the operating system fails."""
+    """Write an HDF5 file over the existing file at `path`; OSError if the operating system reports an error."""
     import h5py
 
     driver = DriverFile(path)

@@ -1,4 +1,4 @@
-"""HTML tables, which notebooks show in place of a repr."""
+"""HTML tables, which notebooks show instead of a repr."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nearest points and close pairs of points; importing SciPy's trees takes as long as many a small run."""
+"""Nearest points and close pairs of points; SciPy's trees, whose import takes as long as a small run, serve many points."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fastcontact.arrays import Array, Indices
 
 # Pairs of points up to which all distances are computed.
 FEW = 250_000
-# A direction that is along no axis and no diagonal of a mesh, at most 1 long.
+# A direction of length at most 1 that is parallel to no axis or diagonal of a structured mesh.
 NO_AXIS = np.array([0.46, 0.5718, 0.6789])
 
 
@@ -25,7 +25,7 @@ def nearest(places: Array, positions: Array) -> tuple[Array, Indices]:
 
 
 def close_pairs(points: Array, within: float) -> Indices:
-    """Return the pairs of rows (k, 2) of `points` (n, dim) that are `within` some distance of each other [length]."""
+    """Return the pairs of rows (k, 2) of `points` (n, dim) whose distance is at most `within` [length]."""
     if len(points) ** 2 <= FEW:
         squared = ((points[:, None] - points) ** 2).sum(axis=2)
         return np.argwhere(np.triu(squared <= within**2, 1))

@@ -73,6 +73,6 @@ def _with_arrays(data: Any, raw: memoryview) -> Any:
 def _array(raw: memoryview, offset: int, kind: str, shape: list[int]) -> AnyArray:
     dtype = np.dtype(kind)
     if dtype.kind not in _KINDS:
-        raise ValueError(f"an array of {kind} is not one of ours")
+        raise ValueError(f"an array of {kind} is not a packed array")
     count = int(np.prod(shape, dtype=np.int64))
     return np.frombuffer(raw, dtype, count, offset).reshape(shape).copy()

@@ -29,9 +29,7 @@ def existing_file(path: PathLike) -> Path:
         pass
     except (OSError, ValueError) as error:  # a name too long, a file used as a folder, a null byte
         reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(
-            f"'{str(path)[:200]}' cannot be looked for ({reason}): check its name and the folder"
-        ) from error
+        raise FileError(f"'{str(path)[:200]}' cannot be accessed ({reason}): check its name and the folder") from error
     if file.is_dir():
         raise FileError(f"'{path}' is a folder: name a file in it")
     if not file.exists():

@@ -1,4 +1,4 @@
-"""TOML from any source, parsed in bounded time: the parser takes quadratic time in the number of parts of a key."""
+"""TOML from any source, parsed in bounded time although the parser takes quadratic time in the number of parts of a key."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def written(data: Any) -> str:
-    """Return data as a text that `parsed` turns back into it; raises ValueError for data that TOML cannot express."""
+    """Return data as a text from which `parsed` recovers the data; ValueError for data that TOML cannot express."""
     return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in data.items())
 
 
 def _key(name: Any) -> str:
     if not isinstance(name, str):
-        raise ValueError(f"the key {name!r} is no string")
+        raise ValueError(f"the key {name!r} is not a string")
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
 
 

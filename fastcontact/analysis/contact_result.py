@@ -59,7 +59,7 @@ def contact_result(
     name: str, pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration,
     axis: tuple[Array, Array] | None = None, displacement: Array | None = None,
 ) -> ContactResult:  # fmt: skip
-    """Return the state of one pair at the end of a load step.
+    """Return the result of one pair at the end of a load step.
 
     Parameters
     ----------
@@ -68,8 +68,9 @@ def contact_result(
     constraints : Constraints
         Constraints of the pair in the last pairing.
     solution : Solution
-        Solution of all pairs; this pair has the `rows` of it.
+        Solution of all pairs.
     rows : slice
+        Rows of this pair in the solution.
     at : Configuration
         Configuration of the last pairing of the step.
     axis : (ndarray (dim,), ndarray (dim,)), optional
@@ -185,8 +186,9 @@ def _along_the_surface(
 
 @dataclass(frozen=True, eq=False)
 class _Closed:
-    """Closed nodes, their pressures (m,), and the formulation's pressures of all nodes: as a field (multiplier), and those
-    that belong to the friction at the nodes (own) [pressure].
+    """Closed nodes and their pressures, and the formulation's pressures at all nodes (m,) [pressure].
+
+    `multiplier` is the pressure field over the whole side; `own` is averaged at each node like the frictional tractions.
     """
 
     nodes: Mask
@@ -207,7 +209,7 @@ class _Closed:
 def _closed(
     pair: Formulation, constraints: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
 ) -> _Closed:
-    """Return the closed nodes of a pair, and their pressures: those whose integral is the force."""
+    """Return the closed nodes of a pair, and nodal pressures that integrate to the contact force."""
     assert constraints.nodal is not None
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
     excluded = pair.options.excluded_nodes(pair.secondary)
@@ -335,7 +337,7 @@ def _stretch(contact: ContactResult, displacement: Array, before: Array, after: 
 
 
 def _joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, ContactResult]:
-    """Return the results of contact pairs with one traction for both nodes of a point, closed if one of them is."""
+    """Return contact results in which both nodes of a periodic point have one traction, and are closed if either is."""
     results_of_pairs = dict(results)
     for name, contact in results.items() if problem.model.periodic_interfaces else ():
         pair = problem.pairs[name]
@@ -354,7 +356,7 @@ def _joined(problem: Problem, results: dict[str, ContactResult]) -> dict[str, Co
 
 
 def _rows(problem: Problem, contact: ContactResult, interface: PeriodicInterface) -> tuple[Indices, Indices]:
-    """Return the rows of a contact that belong to the two nodes of one point."""
+    """Return the rows of the first and second nodes of a periodic interface, where both are nodes of a contact."""
     row = np.full(problem.model.mesh.n_points, -1, np.intp)
     row[contact.points] = np.arange(len(contact.points))
     both = (row[interface.first] >= 0) & (row[interface.second] >= 0)

@@ -19,9 +19,9 @@ from fastcontact.errors import ContactError, unknown, warn
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
 
-# A warning is given if nodes do more than the first fraction of the frictional work in the step in which they close, and that
-# work exceeds the second fraction of the strain energy: under a ball that sticks with friction 0.6 it is 2e-4 in long steps
-# and 1e-5 along their path.
+# A warning is given if more than the first fraction of the frictional work is dissipated at nodes in the step in which they
+# close, and the frictional work exceeds the second fraction of the strain energy. Under a sphere that sticks, with a
+# coefficient of 0.6, the latter is 2e-4 in long steps, and 1e-5 if slip counts from first contact.
 WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
 
 
@@ -41,6 +41,11 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
         In the plane about z, in 3D about x, y and z [force times length]. Meaningless in axisymmetry, where the moment
         over the full circle is zero.
 
+    Raises
+    ------
+    ContactError
+        If the point of reference does not have one finite coordinate per dimension.
+
     Examples
     --------
     >>> import fastcontact as fc
@@ -57,7 +62,7 @@ def contact_moment(contact: ContactResult, about: ArrayLike | None = None) -> Ar
     """
     centre = contact.middle if about is None else np.asarray(about, float)
     if centre.shape != (contact.coordinates.shape[1],) or not np.isfinite(centre).all():
-        raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs a point of the space")
+        raise ContactError(f"the moment of contact '{contact.name}' about {about!r} needs one number per dimension")
     arm, force = contact.coordinates - centre, contact.force_vectors
     if arm.shape[1] == 2:
         return np.array([float((arm[:, 0] * force[:, 1] - arm[:, 1] * force[:, 0]).sum())])
@@ -203,6 +208,14 @@ def _resultants(contact: ContactResult, areas: Array, axisymmetric: bool, work: 
 def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDArray[np.void]:
     """Return `contact_resultants` as a table, one row for each load step, for `write_csv` and pandas.
 
+    Parameters
+    ----------
+    model : Model
+    steps : sequence of StepResult
+        Beginning with the first one, so that the work of friction is complete.
+    name : str
+        Name of the contact pair.
+
     Returns
     -------
     structured ndarray (n_steps,)
@@ -242,13 +255,13 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
 
 
 def _warn_of_long_steps(work: Mapping[str, float]) -> None:
-    """Warn where much of the work of friction is that of nodes in the step in which they close; see `StepResult.work`."""
+    """Warn if much of the frictional work is dissipated at nodes in the step in which they close; see `StepResult.work`."""
     done, touching = work.get("friction_work", 0.0), work.get("friction_while_touching", 0.0)
     if touching > WHILE_TOUCHING * done:
         warn(
-            f"{touching / done:.0%} of the work of friction is that of nodes in the load step in which they close: slip "
-            "counts from its beginning, not from first touch. The work is too large, and shear inaccurate: take more load "
-            "steps, or Criteria(friction_while_touching=0.01)"
+            f"{touching / done:.0%} of the frictional work is dissipated at nodes in the load step in which they close, "
+            "where slip counts from the beginning of the step, not from first contact. The work is too large and the "
+            "shear inaccurate: use more load steps, or Criteria(friction_while_touching=0.01)"
         )
 
 
@@ -258,7 +271,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
     ``depth = sum of coefficient * pressure * slip``, with the mean of the pressures at both ends of a step. Slip is the
     tangential displacement of a node relative to the opposite side at the end of the step, zero where it sticks. The
-    geometry is not updated; with the option ``wear`` of the contact pair it is.
+    geometry does not change; use the option ``wear`` of the contact pair to include its change.
 
     Parameters
     ----------
@@ -286,7 +299,7 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
     Examples
     --------
-    Nothing slides here, so nothing is worn off:
+    No node slides in this model, so that the depth is zero:
 
     >>> import fastcontact as fc
     >>> mesh = fc.generate.block_on_block()
@@ -309,8 +322,8 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
         _of_pair(pair, step, name)
         if step.index != number:
             raise ContactError(
-                f"wear adds up over all load steps: step {number} was expected and step {step.index} came; give all from the "
-                "first on, in their order"
+                f"wear accumulates over all load steps: step {number} was expected, but got step {step.index}; pass all "
+                "steps in order, beginning with the first"
             )
         pressure = 0.0 if before is None else before.contact[name].pressure
         depth = depth + worn_in_step(pair, end_of(before, step, name), step.contact[name], pressure, coefficient)

@@ -29,11 +29,11 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     last["nodes"] = _most_moved(problem, change)
     changes = [entry["displacement_change"] for entry in history]
     circles = len(changes) > WINDOW and min(changes[-WINDOW:]) > 0.5 * max(changes[-WINDOW:])
-    more = "More of them do not help, it goes round in circles: use" if circles else (
+    more = "More updates do not help, since they repeat in a cycle: use" if circles else (
         "Allow more (Criteria.max_geometry_updates), use"
     )  # fmt: skip
     return (
-        f"the contact geometry did not settle in {limit} updates: the displacement still changes by "
+        f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {more} more load steps, a "
         f"finer mesh on the primary side, {_smoother(problem)}a fixed number of updates (Criteria.geometry_updates), or "
@@ -46,16 +46,16 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     """Return the message for an active set that did not converge; `nodes` are those nearest to the constraints."""
     if isinstance(solution, FrictionalEquilibrium):
         return (
-            f"contact with friction did not settle in {solution.iterations} Newton iterations from several starts: the "
+            f"contact with friction did not converge in {solution.iterations} Newton iterations from several starts: the "
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
             f"{constraints.coefficients.max():g} there may be no solution: use more load steps or less friction"
         )
     count = int((solution.active != solution.wanted).sum())
     many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"
-    cause = f"{many}, at {named_nodes(problem, nodes)}" if count else "sliding constraints still turn"
+    cause = f"{many}, at {named_nodes(problem, nodes)}" if count else "directions of slip still change"
     other = ", the direct linear solver" if problem.solver.iterative else ""
     return (
-        f"the active set did not settle in {solution.iterations} iterations: {cause}. Use more load steps{other} or more "
+        f"the active set did not converge in {solution.iterations} iterations: {cause}. Use more load steps{other} or more "
         "iterations (max_active_set_iterations)"
     )
 
@@ -63,7 +63,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 def no_contact_stops(bodies: FloatingBodies, work: Array) -> str:
     """Return the message for loads that separate bodies; `work` (k,) is their resultant on each free motion [force]."""
     return (
-        f"the loads pull bodies away, no contact stops them ({'; '.join(bodies.names)}; resultant up to "
+        f"the loads pull bodies away, and no contact stops them ({'; '.join(bodies.names)}; resultant up to "
         f"{np.abs(work).max():.3g}): reverse the loads or add supports"
     )
 
@@ -148,6 +148,6 @@ def _smoother(problem: Problem) -> str:
     options = {
         'normals="averaged"': faceted, 'multipliers="standard"': dual,
         f"facets no longer than the reach of adhesion, {min(reach.values(), default=0.0):.3g},": list(reach),
-        "facets shorter than what is partly torn off": [name for name in laws if name not in reach],
+        "facets shorter than the cohesive zone": [name for name in laws if name not in reach],
     }  # fmt: skip
     return "".join(f"{option} for contact {names[0]!r}, " for option, names in options.items() if names)

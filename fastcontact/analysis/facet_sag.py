@@ -1,9 +1,8 @@
 """Warnings about straight facets on curved surfaces: the estimated error in pressure due to their sag.
 
-If the gap is off by up to the sag h of the chords, strains are off by the order of h / L, and pressures by E h / L with
+An error of the gap of up to the sag h of the chords changes strains by the order of h / L, and pressures by E h / L with
 Young's modulus E, whatever the interference. This estimate is heuristic and calibrated below. L is the length of the
-facets if both sides have facets that do not match, and the length of the contact if the other side is an exact rigid
-shape.
+facets if both sides have non-matching facets, and the length of the contact if the other side is an exact rigid shape.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
 """Newton's method for the contact geometry of a load step, by directional derivatives.
 
 With the pairing at displacements u the contact problem has a solution S(u), and the load step requires u = S(u). Newton's
-method accounts for the variation of the geometry: of the change v of the displacements in
+method solves
 
     v = S(u) - u + S'(u) v
 
-the last term is the response of the solution, with fixed active set, to the variation of forces and gaps with the geometry
-along v, see `contact.linearised_geometry`. It is a third of v or less, so that a few iterations of GMRES solve for v, each at
-the cost of a back substitution. Slips and integrals over facets are linearised at the displacements S(u), the others at u;
-both differ by terms of second order.
+for the change v of the displacements. The last term is the response of the solution, with fixed active set, to the variation
+of forces and gaps with the geometry along v, see `contact.linearised_geometry`. Its norm is usually at most a third of that
+of v, so that a few iterations of GMRES suffice, each at the cost of a back substitution. Slips and integrals over facets are
+linearised at the displacements S(u), all other terms at u; the difference is of second order.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 
-# Relative residual of the change, that over what suffices at the end, and the largest number of iterations.
+# Smallest relative residual of GMRES, its ratio to the requested accuracy, and the largest number of iterations.
 ACCURACY, AT_END, MOST = 1e-6, 0.01, 20
 
 
@@ -41,7 +41,7 @@ def newton_step(
     constraints : StackedConstraints
         Paired at displacements `before` (k,) [length].
     solution : Solution
-        Solution with these constraints, of those of shared nodes with their representatives.
+        Solution with these constraints, where representatives replace the constraints of shared nodes.
     before, image : ndarray (k,)
         Active displacements of the pairing and of the solution [length]; displacements that solutions do not determine are
         taken from the latter.
@@ -81,7 +81,7 @@ def newton_step(
     size = largest(changed) or 1.0
     v, _ = gmres(system, changed / size, rtol=max(ACCURACY, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
     responding = largest_difference(size * v, changed)
-    # Far from the solution a step in which the response adds more than the change itself leads anywhere.
+    # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not responding <= size:
         return None
     mixed, determined = image.copy(), step.dofs.determined

@@ -53,7 +53,7 @@ class ThermalLoads:
     films : csr_array (n_points, n_points)
         Matrix of all films [power / temperature].
     powers, ambient : dict of ramp table to ndarray (n_points,)
-        By history, at multiplier 1: powers of loads, and of films due to the temperature rise of their surroundings [power].
+        By ramp table, at multiplier 1: nodal powers of loads, and of films due to the rise of their surroundings [power].
     """
 
     films: csr_array
@@ -99,7 +99,7 @@ class Heat:
     fixed : ndarray of bool (n_points,)
         Merged nodes with a prescribed temperature.
     prescribed : dict of ramp table to ndarray (n_points,)
-        By history, at multiplier 1: prescribed temperature rises [temperature].
+        By ramp table, at multiplier 1: prescribed temperature rises [temperature].
     linear_solver : str
     linear_tolerance : float
     """
@@ -119,7 +119,7 @@ class Heat:
 
     @property
     def depends_on_contact(self) -> bool:
-        """Whether temperatures depend on the contact, in addition to the contact on temperatures."""
+        """Whether temperatures depend on the contact, so that both problems are coupled."""
         return any({"conductance", "friction_heat"} & set(pair.options) for pair in self.model.contact)
 
     @property
@@ -184,8 +184,8 @@ class Heat:
         residual = float(np.abs(out[free]).max(initial=0.0))
         if residual > max(self.criteria.relative * largest, round_off):
             raise ConvergenceError(
-                f"the heat {residual:.3g} of a node is out of balance, above {self.criteria.relative:g} of the largest, "
-                f"{largest:.3g}: use the direct solver, or look for conductivities that differ by many orders of magnitude",
+                f"heat is out of balance by {residual:.3g} at a node, above {self.criteria.relative:g} of the largest heat "
+                f"flow {largest:.3g}: use the direct solver, or look for conductivities of very different magnitudes",
                 smaller_steps_help=False,
             )
         sums = {"supports": reaction, "loads": loads, "films": given_off, "friction": rubbed}

@@ -20,7 +20,7 @@ from fastcontact.results.step import StepResult
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Indices = NDArray[np.signedinteger]
-# Bodies by their numbers, and nodes on the outside of the first (n,) with their depths (n,) in the second [length].
+# Numbers of two bodies, outer nodes of the first (n,), and the depths of these nodes in the second (n,) [length].
 Inside = tuple[int, int, Indices, Array]
 # Depth beside the facets of a contact above which a warning is given, relative to that of nodes in contact.
 HELD = 2.0
@@ -97,7 +97,7 @@ def _beside_contact(
 
 
 def _held(problem: Problem, last: StepResult, names: Sequence[str]) -> tuple[Mask, Mask]:
-    """Return the points (n_points,) of secondary sides that face the other side, or need not, and those of primary sides."""
+    """Return masks (n_points,) of secondary points that face the other side or are excluded, and of all primary points."""
     held, faced = np.zeros((2, problem.model.mesh.n_points), bool)
     for name in names:
         pair = problem.pairs[name]

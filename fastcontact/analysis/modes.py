@@ -35,7 +35,7 @@ from fastcontact.results.step import StepResult
 # Shift that regularises free bodies, over the eigenvalue of a uniform deformation: below the eigenvalues of all but thin
 # bodies.
 SHIFT = 1e-4
-# A mode shape slides where slip is more than this fraction of the motion; less is round-off.
+# A mode shape slides if its slip is more than this fraction of the motion; smaller slip is round-off.
 SLIDES = 1e-3
 
 
@@ -102,7 +102,7 @@ def modes(
     0.0161
     """
     if n < 1:
-        raise ModelError(f"n = {n} modes: ask for one or more")
+        raise ModelError(f"n = {n} modes: request one or more")
     if step is not None and step.displacement.shape != model.mesh.points.shape:
         raise ModelError(
             f"the step has displacements of shape {step.displacement.shape}, but the mesh points of shape "
@@ -127,8 +127,8 @@ def _diameters(
     if nodal_diameters is None:
         if sectors is not None:
             warn(
-                f"the modes are those of nodal diameter 0 alone, alike in all {sectors.number} sectors: the ring has others, "
-                'which nodal_diameters="all" finds'
+                f"only modes with 0 nodal diameters are computed, which are alike in all {sectors.number} sectors: request "
+                'all modes of the ring with nodal_diameters="all"'
             )
         return None
     if sectors is None:
@@ -152,7 +152,7 @@ class _Vibration:
     contact: list[Conditions]
     supported: Mask
     shift: float
-    with_sliding: list[Conditions]  # conditions that would hold what slides, too; empty where nothing does
+    with_sliding: list[Conditions]  # conditions that hold sliding nodes as well; empty if no node slides
 
     @classmethod
     def of(
@@ -172,7 +172,7 @@ class _Vibration:
         return cls(model, field, K, M, contact, supported, SHIFT * _uniform(model, K, M), further)
 
     def warn_of_slides(self, values: Array, vectors: Array) -> None:
-        """Warn of eigenvalues (n,) next to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
+        """Warn of eigenvalues (n,) close to zero whose shapes (n_dofs, n) slide where friction holds small motions."""
         low = vectors[:, np.abs(values) < self.shift]
         moved = [
             np.abs(held.rows @ low) > SLIDES * (abs(held.rows) @ np.abs(low)).max(initial=0.0)
@@ -180,9 +180,9 @@ class _Vibration:
         ]
         if low.shape[1] and (count := int(np.any([slides.any(axis=0) for slides in moved], axis=0).sum())):
             warn(
-                f"{count} of {len(values)} modes have frequencies next to zero (the lowest {_frequencies(values)[0]:.3g}), "
+                f"{count} of {len(values)} modes have frequencies close to zero (the lowest {_frequencies(values)[0]:.3g}), "
                 "since nodes that slide in this step are free along the surface: hold_sliding=True holds them, as friction "
-                "holds small motions"
+                "does in small motions"
             )
 
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
@@ -201,7 +201,7 @@ class _Vibration:
         touched = np.isin(np.arange(K.shape[0]), contact.rows.indices)
         reduced = Reduced(System(K, supported, relations, massless & touched), M, contact.rows, contact.nodes)
         if n >= int(reduced.free.sum()):
-            raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: ask for fewer")
+            raise ModelError(f"n = {n} modes of {int(reduced.free.sum())} free displacements: request fewer")
         solver = choice.make(linear_solver, dim=model.mesh.dim, n_dofs=K.shape[0], columns=True)
         solver.contrast = self.field.contrast
         soft = np.where(reduced.free[:, None], near, 0.0)

@@ -1,4 +1,4 @@
-"""Newton's method for a load step: the terms of the equilibrium are linearised, contact is solved with its inequalities.
+"""Newton's method for a load step: bodies and loads are linearised, and contact is solved with its inequalities.
 
 This is the Newton method of Josephy (1979) for generalised equations: each iteration solves the contact problem of the
 linearised bodies, including its geometry, so that iterations converge quadratically and few matrices are factorised. Where
@@ -33,15 +33,15 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Largest number of Newton iterations of a load step, and of halvings of one that inverts cells.
+# Largest number of Newton iterations of a load step, and of halvings of an iteration that inverts cells.
 MOST, HALVINGS = 40, 6
-# Trials of a line search, the slope over the initial one that counts as overshooting, and the smallest step length.
+# Trials of a line search, ratio of final to initial slope above which a step overshoots, and smallest step length.
 SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
-# Number of iterations within which the change of the displacement must have decreased at least once by the factor.
+# Number of iterations within which the change of the displacement must have decreased at least once by the factor FALL.
 PATIENCE, FALL = 12, 0.5
-# Stiffness of springs along closed gaps over the largest of the bodies. Motions that contact does not hold, such as gaps
-# between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5, 2e-4, 1e-3, and
-# one under fluid pressure, for which the first is too soft, 13 and 22 with the others.
+# Stiffnesses of springs along closed gaps, over the largest stiffness of the bodies. Motions that contact does not constrain,
+# such as gaps between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5,
+# 2e-4, 1e-3, and an O-ring under fluid pressure, for which the first is too soft, takes 13 and 22 with the others.
 HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
@@ -99,7 +99,7 @@ def newton(
         try:
             return _Newton(problem, begin, load).iterated(origin)
         except ConvergenceError as error:
-            log.info("the step starts anew, not from an expected displacement: %s", error)
+            log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
     return _Newton(problem, begin, load, before).iterated(start.u)
 
@@ -113,7 +113,7 @@ class Regularisation:
     geometric : int
         Part of the geometric stiffness that it includes, see `NonlinearBodies.at`.
     held : float
-        Stiffness of springs along closed gaps, over the largest of the bodies [-].
+        Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
     """
@@ -162,8 +162,8 @@ class _Newton:
             if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
                 break
         raise ConvergenceError(
-            f"Newton's iterations do not converge: after {len(history)} the displacement still changes by {changes[-1]:.1e} "
-            f"of its largest component and forces are out of balance by {balanced.relative:.1e}; take smaller load steps",
+            f"Newton's method does not converge: after {len(history)} iterations displacements change by {changes[-1]:.1e} "
+            f"of the largest one, and forces are out of balance by {balanced.relative:.1e}; use smaller load steps",
             history,
         )
 
@@ -216,7 +216,7 @@ class _Newton:
     def _solve(self, u: Array, changes: list[float]) -> tuple[Array, Array]:
         """Return displacements (n_dofs,) [length] and contact forces (n_dofs,) [force] of terms linearised at u (n_dofs,).
 
-        The contact geometry converges to a fraction of the last of the relative `changes` of the displacement. Where the
+        The contact geometry converges to a fraction of the last relative change of the displacement in `changes`. If the
         tangent is not positive definite, first the springs of floating bodies are stiffened, then springs are added along
         closed gaps, soft ones first: convergence stays quadratic except for motions that contact does not hold. If this does
         not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
@@ -238,7 +238,7 @@ class _Newton:
         if isinstance(failed, ConvergenceError):
             raise failed
         raise ConvergenceError(
-            f"the tangent stiffness of the bodies cannot be factorised ({failed}): they buckle, or the load step is too large"
+            f"the tangent stiffness cannot be factorised ({failed}): the bodies buckle, or the load step is too large"
         )
 
     def _regularisations(self) -> list[Regularisation]:

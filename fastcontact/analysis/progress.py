@@ -14,7 +14,7 @@ WIDTH = 30
 
 
 class StatusLine:
-    """A line of `width` characters on standard error; nothing at all unless `show`."""
+    """A status line of `width` characters on standard error, shown only if `show`."""
 
     def __init__(self, width: int, show: bool) -> None:
         self._width, self._show = width, show
@@ -49,7 +49,7 @@ class StatusLine:
 
 
 class Progress(StatusLine):
-    """Load steps of a run: steps done, nodes in contact, time left; where a step is cut in halves."""
+    """Progress of a run: completed load steps, nodes in contact, remaining time, and bisections of steps."""
 
     def __init__(self, total: int, show: bool, done: int = 0) -> None:
         super().__init__(WIDTH + 54, show)

@@ -1,8 +1,8 @@
 """Restart data, as plain numbers, strings and arrays.
 
-They consist of the state at the end of a step, except for the displacements, which are in the result of the step; the
-snapshot of the linear solver; and the identity of the case. The state includes everything on which the last digits of
-later iterates depend, so that a continued analysis reproduces an uninterrupted one bit for bit.
+They consist of the state at the end of a step without the displacements, which are in the result of the step, of a
+snapshot of the linear solver, and of the identity of the case. The state includes everything on which the last digits of
+later iterates depend, so that the results of a continued and of an uninterrupted analysis are bitwise identical.
 """
 
 from __future__ import annotations
@@ -41,8 +41,8 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
     state = step.restart
     if state is None or state.get("format") != FORMAT:
         raise ModelError(
-            f"step {step.index} does not hold the data to resume from it: take the last step that solve "
-            "returned, or one from a result file of this version of fastcontact; or start anew"
+            f"step {step.index} does not contain restart data: use the last step that solve returned, or the last one of a "
+            "result file of this version of fastcontact, or start anew"
         )
     with _whole(step):
         then, end = state["case"], step.load_factor
@@ -51,7 +51,7 @@ def check(step: StepResult, case: dict[str, Any], model: Model) -> None:
             parts.append(f"the load history up to {end:g}")
     if parts:
         raise ModelError(
-            f"the steps so far belong to another case; changed since: {', '.join(parts)}. Go on with what they "
+            f"the steps so far belong to another case; changed since: {', '.join(parts)}. Continue with the model they "
             f"were computed for, or start anew without resuming{_formulations(then['parts'], case['parts'], model)}"
         )
 

@@ -1,4 +1,4 @@
-"""Warnings about a finished analysis, each with its number; the result file keeps them."""
+"""Warnings about the accuracy and validity of a finished analysis, which result files store."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Ite
     if isinstance(penalty, float) and depth > NOTABLE * size:
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
-            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or leave it out"
+            f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it"
         )
 
 
@@ -96,8 +96,8 @@ def _too_fast(name: str, pair: Formulation, state: State) -> Iterator[str]:
         )
     else:
         yield (
-            f"contact '{name}' wears so much in a load step that pressures may waver from node to node and depths are too "
-            f"large: take {math.ceil(many)} times as many steps, or larger elements"
+            f"contact '{name}' wears so much in a load step that pressures may oscillate from node to node and depths are "
+            f"too large: use {math.ceil(many)} times as many steps, or larger elements"
         )
 
 
@@ -106,10 +106,10 @@ def _unbalanced(state: State) -> Iterator[str]:
     work, round_off = state.work, LENGTH_ROUND_OFF * state.largest_force * float(np.abs(state.u).max(initial=0.0))
     if work is not None and abs(work.imbalance) > IMBALANCE * work.largest and work.largest > round_off:
         yield (
-            f"the works of these load steps do not add up: {work.imbalance:.3g} of the external work {work.external:.4g} is "
-            f"neither strain energy ({work.strain_energy:.4g}), nor work of friction ({work.friction:.4g}), nor in "
-            f"penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of them: take more load steps where works "
-            "matter"
+            f"the energy of these load steps is out of balance: {work.imbalance:.3g} of the external work "
+            f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "
+            f"({work.friction:.4g}), nor energy of penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of "
+            "them: use more load steps if energies matter"
         )
 
 
@@ -119,7 +119,7 @@ def _unsettled(state: State) -> Iterator[str]:
     if change > NOTABLE:
         yield (
             f"the contact geometry had not converged after the {update} updates requested: the last one changed the "
-            f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or leave them out"
+            f"displacement by {change:.1%} of its largest component. Allow more geometry_updates, or omit the option"
         )
 
 
@@ -132,15 +132,15 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
     until_settled = criteria.geometry_updates is None and not criteria.keep_pairing
     if until_settled and change > LOOSE:
         yield (
-            f"the contact geometry counts as settled although the displacement still changed by {change:.1e} of its largest "
-            f"component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
+            f"the contact geometry counts as converged although the displacement still changed by {change:.1e} of its "
+            f"largest component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"
         )
     flipped = next((before for before, after in pairwise(history) if "rounded" in after), None)
     if flipped is not None:
         yield (
-            "nodes flipped between two facets of the primary side, which changed the displacement by "
-            f"{flipped['displacement_change']:.1e} of its largest component, until normals were made to turn from one to "
-            'the other over a tenth of either; normals="averaged" needs no such help'
+            "nodes alternated between two facets of the primary side, which changed the displacement by "
+            f"{flipped['displacement_change']:.1e} of its largest component, until normals were interpolated from one to "
+            'the other over a tenth of either; normals="averaged" does not need this'
         )
     if scatter is not None and scatter["force"] > criteria.relative:
         yield (
@@ -148,7 +148,7 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
             f"displacements by {scatter['displacement']:.1e}: results are no more accurate than that"
         )
     if residual > min(LOOSE, criteria.relative):
-        cause = "by round-off of a stiff body that moves far, in whose place a rigid obstacle may stand, "
+        cause = "by round-off of a stiff body that moves far, for which a rigid obstacle may be substituted; "
         yield (
             f"forces are out of balance by {residual:.1e} of the largest force (Criteria.relative = {criteria.relative:g}): "
             f"{cause if residual > criteria.relative else ''}results are no more accurate than that"
@@ -162,7 +162,7 @@ def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
     if report["relative_to_load"] > problem.criteria.relative:
         yield (
             f"the springs that regularise {'; '.join(report['motions'])} still carry {report['relative_to_load']:.1e} of "
-            "the load: rigid motions are so much larger than deformations that round-off leaves no more"
+            "the load: rigid motions are so much larger than deformations that round-off permits no higher accuracy"
         )
 
 
@@ -252,7 +252,7 @@ def _clearances(problem: Problem, state: State) -> set[str]:
 
 
 def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool) -> Iterator[str]:
-    """Yield a warning where a pair never closed, or is open although the loads are still there."""
+    """Yield a warning if a pair never closed, or is open although loads still act."""
     name, reach, facing = contact.name, pair.options.search_distance, contact.gap[np.isfinite(contact.gap)]
     least = float(facing.min(initial=np.inf))
     gap = f"the smallest gap is {least:.4g}" if len(facing) else "no node faces the other side"
@@ -271,7 +271,7 @@ def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool
             "hold its nodes there; leave these nodes free, or out of the contact as 'excluded'"
         )
     elif not touched:
-        yield f"contact '{name}' never closed: {gap}. Check its sides and which way the loads push"
+        yield f"contact '{name}' never closed: {gap}. Check its sides and the direction of the loads"
     elif loaded:
         yield f"contact '{name}' has opened again at the end: {gap}"
 
@@ -315,7 +315,7 @@ def across(side: Surface, closed: Mask, excluded: Mask) -> int | None:
 
 
 def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
-    """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by much of their mean.
+    """Yield a warning where pressures of nodes whose neighbours are all closed oscillate by a large fraction of their mean.
 
     Sides that never separate, or adhere, carry tension, too: their mean may be zero or round-off, and is not meaningful.
     """

@@ -181,5 +181,5 @@ def _between(contact: MovingContact, kinks: csr_array, off: float) -> str:
     return (
         f"points {named}{more} lie opposite nodes of the other side, between two of its facets: the one-sided derivatives "
         f"differ by a fraction of {off:.1e}. {REMEDY}; or keep the pairing (Criteria(keep_pairing=True)), mesh both sides "
-        "differently, or take the default formulation"
+        "differently, or use the default formulation"
     )

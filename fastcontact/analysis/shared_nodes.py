@@ -1,13 +1,13 @@
-"""Nodes shared by contact pairs, or by both ends of a period or sector: one constraint, whose force is shared.
+"""Nodes shared by contact pairs, or by both ends of a period or sector: one constraint, whose force is distributed.
 
-A node of several pairs behaves like a node of one pair over all their facets. Its conditions are linearly dependent:
-they only determine the sum of their forces, and cannot all be eliminated, so their mean is solved for. The mean has the
-area of all, so that penalties add up, and the mean coefficient of friction. Each pair carries the fraction of the force
-given by its fraction of the area, so that the pressures are equal. Of several clearances at one node only the smallest
-can close. Constraints with a normal compliance or with different clearances are independent.
+A node of several pairs behaves like a node of one pair over all their facets. Its constraints are linearly dependent. They
+determine only the sum of their forces and cannot all be eliminated, so that one constraint replaces them, their mean. It has
+the sum of their areas, so that penalties add up, and their mean coefficient of friction. Each pair carries the fraction of
+the force given by its fraction of the area, so that the pressures are equal. Of several clearances at one node only the
+smallest can close. Constraints with a coupled normal compliance or with different clearances are independent.
 
-Two nodes at the ends of a periodic part are one node, too: its gap, weighted over the facets at both ends, is the
-area-weighted mean of both. Tangents at the second end are rotated to the first one before they are compared.
+Two nodes at the ends of a periodic part also count as one node. Its gap, weighted over the facets at both ends, is the
+area-weighted mean of both gaps. Tangents at the second end are rotated to the first one before they are compared.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class SharedNodes:
     Attributes
     ----------
     place : ndarray of int (m,)
-        The representative of each constraint, which is solved for instead; mostly the constraint itself.
+        The representative that replaces each constraint in the solution; usually the constraint itself.
     behind : ndarray of int (k,)
         Constraints that cannot close, because others have a smaller gap.
     part, along : ndarray (m,)
@@ -69,7 +69,7 @@ class SharedNodes:
         return redundant
 
     def closed(self, active: Mask) -> Mask:
-        """Return the representatives (m,) of which some constraints (m,) are active."""
+        """Return the representatives (m,) with at least one active constraint, for active constraints (m,)."""
         return np.asarray(self.summed(active) > 0)
 
     def summed(self, values: NDArray[np.generic]) -> Array:
@@ -131,9 +131,9 @@ class SharedNodes:
     def gathered(
         self, constraints: Constraints, gap: Array, normal: Array, traction: Array, closing: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Return gaps (m,) [length], normal (m,) and tangential (m, dim) forces of representatives.
+        """Return gaps (m,) [length], forces (m,) and (m, dim) [force], and slips of closing (m, dim) of representatives.
 
-        And the slips (m, dim) of `closing` the gaps [length].
+        The arguments are the same quantities of all constraints.
         """
         tangents = np.stack(constraints.directions, axis=1)
         weighted = (traction, np.ones(len(gap))), (closing, self.along)
@@ -181,7 +181,7 @@ def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterfa
 def _at_periodic_interfaces(
     constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface], behind: Indices
 ) -> Indices:
-    """Return constraints (2, k) of a pair at the two nodes of one point."""
+    """Return the constraints (2, k) at the first and second node of periodic points, both of one pair."""
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
@@ -200,7 +200,10 @@ def _at_periodic_interfaces(
 
 
 def _places(constraints: Constraints, pairs: Indices) -> Indices:
-    """Return the representative (m,) of each constraint, given dependent `pairs` (2, k): one with friction, of low number."""
+    """Return the representative (m,) of each constraint, given linearly dependent `pairs` (2, k).
+
+    It is the first of them with friction, or the first of all if none has friction.
+    """
     m = len(constraints)
     label = connected_components(csr_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(m, m)), directed=False)[1]
     last_to_first = np.lexsort((np.arange(m), constraints.coefficients == 0.0))[::-1]
@@ -217,8 +220,8 @@ def _stiffness(softness: Array) -> Array:
 def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Array, Array]:
     """Return the fractions (m,) of normal and tangential forces that constraints carry [-].
 
-    Normal forces are distributed by stiffness where all are compliant, by area among exact ones. Tangential forces are
-    distributed by friction limit, so that nodes that slide do so in each pair.
+    Normal forces are distributed by stiffness if all constraints of a node are compliant, otherwise by area among the exact
+    ones. Tangential forces are distributed by friction limit, so that a sliding node slides in each pair.
     """
     m = len(representative)
     several = np.bincount(representative, minlength=m)[representative] > 1  # others need not have an area
@@ -252,10 +255,10 @@ def _nodes(constraints: StackedConstraints) -> Indices:
 
 
 def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
-    """Return constraints (k,) of a pair, dependent ones of other pairs (k,), and constraints behind others.
+    """Return constraints (k,), the linearly dependent constraint (k,) of another pair for each, and those behind others.
 
-    The latter face the same point along the same normal with a larger clearance: the constraints in front hold their node,
-    unless these are compliant.
+    The latter face the same point along the same normal with a larger clearance, so that the constraint in front, unless
+    it is compliant, prevents them from closing.
     """
     first, second = _of_one_node(constraints)
     if not len(first):
@@ -273,10 +276,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
 
 
 def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
-    """Return constraints (k,) at nodes with several, and for each another one there with an equal or larger gap.
-
-    The partners of each constraint are in order of their gaps.
-    """
+    """Return the pairs (k,), (k,) of constraints at one node, the second with an equal or larger gap."""
     nodes = _nodes(constraints)
     usable = np.isfinite(_areas(constraints)) & constraints.usable & (nodes >= 0)
     order = np.flatnonzero(usable)

@@ -75,12 +75,10 @@ def support_forces(model: Model, step: StepResult) -> dict[str, Array]:
 
 
 def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[Array]:
-    """Return the forces (m,) of constraints with rows (m, n_dofs) [force].
+    """Return the Lagrange multipliers (m,) of multi-point constraints with rows (m, n_dofs) [force].
 
-    They follow from the balance of forces at components without supports.
-
-    `reaction` (n_dofs,) are the forces of supports and constraints [force]; `held` (n_dofs,) are the components with
-    supports.
+    They follow from the balance of forces at components without supports. `reaction` (n_dofs,) contains the forces of
+    supports and constraints [force], and `held` (n_dofs,) marks the components with supports.
     """
     if not rows:
         return []
@@ -91,13 +89,18 @@ def multipliers(reaction: Array, rows: Sequence[csr_array], held: Mask) -> list[
 
 @typed(ModelError)
 def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
-    """Return the tensions (m,) of the springs by name, such as ``"spring on 'TOP'"`` [force].
+    """Return the tensions of the springs by name, such as ``"spring on 'TOP'"``.
 
     Parameters
     ----------
     model : Model
     step : StepResult
         A result of this model.
+
+    Returns
+    -------
+    dict of str to ndarray (m,)
+        Tensions of the m springs of each name, positive in tension [force].
 
     Raises
     ------
@@ -127,6 +130,10 @@ def spring_forces(model: Model, step: StepResult) -> dict[str, Array]:
 def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
     """Return force and shortening of every pretension section as a table, one row for each load step, for `write_csv`.
 
+    Parameters
+    ----------
+    steps : iterable of StepResult
+
     Returns
     -------
     structured ndarray (n_steps,)
@@ -154,6 +161,6 @@ def pretension_history(steps: Iterable[StepResult]) -> NDArray[np.void]:
 def _check(model: Model, step: StepResult) -> None:
     if step.displacement.shape != model.mesh.points.shape:
         raise ModelError(
-            f"load step {step.index} has {len(step.displacement)} points and the model {model.mesh.n_points}: give the model "
-            "that it was computed for"
+            f"load step {step.index} has {len(step.displacement)} points and the model {model.mesh.n_points}: pass the model "
+            "of this step"
         )

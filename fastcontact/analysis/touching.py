@@ -1,4 +1,4 @@
-"""Load steps in which nodes slide while they close: friction is solved again, along the path of the step."""
+"""Load steps in which nodes slide while they close: friction is solved again in increments along the path of the step."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ MOST = 128
 
 
 def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
-    """Return the contact of a step whose friction is solved in increments, where its nodes slide while they close.
+    """Return the contact of a step, with friction solved in increments if nodes slide while they close.
 
-    Increments are solved with the geometry converged without them. If they do not converge the step is left unchanged.
-    `expected` is that of `settle_geometry`.
+    Increments are solved on the converged geometry of the step without increments. If they do not converge, the step is left
+    unchanged. See `settle_geometry` for `expected`.
     """
     nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
     path = _path(step, settled, nodes)
@@ -57,7 +57,7 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
 
 
 def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None) -> Path | None:
-    """Return the path of a step, None where it has no effect."""
+    """Return the path of a step; None if it has no effect."""
     constraints, solution = settled.constraints, settled.solution
     allowed = step.problem.criteria.friction_while_touching
     if allowed is None or allowed >= 1.0 or not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
@@ -80,14 +80,15 @@ def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None)
     slips = _closing(step, constraints, gap)
     if nodes is not None:
         gap, normal, traction, slips = nodes.gathered(constraints, gap, normal, traction, slips)
-    parts = math.ceil(slid / limit - LENGTH_ROUND_OFF)  # where all closes, a whole number but for rounding
+    parts = math.ceil(slid / limit - LENGTH_ROUND_OFF)  # if all nodes close, the ratio is an integer up to round-off
     return Path(gap, normal, traction, slips, min(parts, MOST))
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:
-    """Return the slips (m, dim) of closing the gaps (m,) between bodies, where normals lean [length].
+    """Return the slips (m, dim) of closing the gaps (m,) between bodies with inclined normals [length].
 
-    The constraints leave out those of the gaps that their own geometry, of the end of the step, has at its beginning.
+    The constraints already contain the slips for the gaps at the beginning of the step in the geometry of its end, which are
+    scaled here to the actual gaps.
     """
     closing = np.zeros_like(constraints.positions)
     for name, rows in constraints.rows().items():
@@ -102,7 +103,7 @@ def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> 
 def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, Array] | None:
     """Return normal (m,) and tangential (m, dim) forces at the beginning of the step [force]; None if unknown.
 
-    Forces of equations are not needed.
+    Forces of equality constraints are not needed.
     """
     normal, traction = np.zeros(len(constraints)), np.zeros_like(constraints.positions)
     for name, rows in constraints.rows().items():

@@ -5,8 +5,8 @@ solution u, the potential energy of the reference is lower than that of the mode
 
     D = u.S u / 2 + max over x of (x.S u - x.(K - S) x / 2),
 
-and D over the elastic energy u.K u / 2 is the additional compliance of the reference under the same forces: the excess of
-stiffness where forces act, and less than the excess where displacements are prescribed. A few conjugate gradient iterations,
+and D over the elastic energy u.K u / 2 is the additional compliance of the reference under the same forces. It equals the
+excess of stiffness where forces act, and is smaller where displacements are prescribed. A few conjugate gradient iterations,
 preconditioned by K^-1, approach the maximum from below. The contact forces are fixed.
 
 The reference uses the projected dilatation of `elasticity.dilatation`; in linear triangles, tetrahedra, wedges and pyramids,
@@ -71,7 +71,7 @@ class Comparison:
         return self._suspicious[numbers] & ((name in AT_NODES) | ~treated)
 
     def force(self, displacement: Array) -> Array:
-        """Return the nodal forces (n_points, dim) [force] of displacements (n_points, dim) [length]."""
+        """Return the forces S u (n_points, dim) [force] for displacements u (n_points, dim) [length]."""
         mesh, kinematics = self._model.mesh, self._model.kinematics
         given = mesh, kinematics, self._moduli, self._material, displacement
         stress = recovery.stress_at_points(*given, self._treatment)

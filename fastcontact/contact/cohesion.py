@@ -16,7 +16,7 @@ import numpy as np
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
 
-# Opening at the largest traction over the opening at break, where no stiffness is given.
+# Default ratio of the opening at the largest traction to the opening at break.
 ELASTIC = 0.01
 
 
@@ -37,11 +37,12 @@ class CohesiveLaw:
     reversible : bool
         Whether the law has no memory, and no resistance to sliding: adhesion.
     initiation : str
-        Criterion of damage initiation in mixed mode: ``"bk"``, interpolated between the modes as the energies are;
-        ``"quadratic"``, the squares of the tractions over their limits sum to one; ``"maximum"``, one of them reaches
-        its limit.
+        Criterion of damage initiation in mixed mode: ``"bk"``, the squares of the limits are interpolated like the
+        energies; ``"quadratic"``, the squares of the tractions over their limits sum to one; ``"maximum"``, one traction
+        reaches its limit.
     mixed_mode : str
-        Fracture energy in mixed mode: ``"bk"``, or ``"power"``: powers of the energies over their limits sum to one.
+        Fracture energy in mixed mode: ``"bk"``, Benzeggagh and Kenane's interpolation; ``"power"``, powers of the energies
+        over their limits sum to one.
     """
 
     strength: float
@@ -88,7 +89,7 @@ class CohesiveLaw:
 
 
 def cohesive_law(strength: float, energy: float, *, reversible: bool = False, **given: Any) -> CohesiveLaw:
-    """Return a law; by default shear is as opening, and the stiffness reaches the strength at a small opening."""
+    """Return a law; by default sliding has the values of opening, and damage begins at a small opening, see `ELASTIC`."""
     stiffness = given.pop("stiffness", strength**2 / (2.0 * ELASTIC * energy))
     shear = {"shear_strength": given.pop("shear_strength", strength), "shear_energy": given.pop("shear_energy", energy)}
     return CohesiveLaw(strength, energy, stiffness, **shear, **given, reversible=reversible)

@@ -1,7 +1,7 @@
-"""A cohesive layer between the sides of a contact pair: equations whose compliance follows its law.
+"""A cohesive layer between the sides of a contact pair: equality constraints whose compliance follows its law.
 
-In each pairing the traction is linearised: by the secant where the layer unloads or reloads, and by a nearly constant
-traction where it softens. Matrices then stay positive definite, and the pairings converge to every state that is stable under
+In each pairing the law is linearised: by the secant where the layer unloads or reloads, and by a nearly constant traction
+where it softens. Matrices then stay positive definite, and the pairings converge to every state that is stable under
 prescribed displacements.
 """
 
@@ -17,28 +17,28 @@ from fastcontact.contact.cohesion import Bond, CohesiveLaw
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 
-# Stiffness of the linearised layer where the traction falls, over that of the intact layer: with less, the iteration
-# for a beam glued by nodes does not converge.
+# Stiffness of the linearised layer where it softens, over that of the intact layer; with a smaller one, the iteration for a
+# beam glued by nodes does not converge.
 LEVEL = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The rows of a cohesive layer: of m openings, then of m slidings along each tangent; see `constraints.Tied`.
+    """The rows of a cohesive layer, m for openings and m for sliding along each tangent; see `constraints.Tied`.
 
     Attributes
     ----------
     law : CohesiveLaw
     directions : tuple of ndarray (m, dim)
-        The tangents [-].
+        Tangents [-].
     areas : ndarray (m,)
-        [area]
+        Tributary areas [area].
     before : Bond
-        At the beginning of the load step.
+        State at the beginning of the load step.
     damage : ndarray (m,)
-        There [-].
+        Damage at which the law is linearised [-].
     separation, rest : ndarray (1 + k, m)
-        Opening and slidings at which the law is linearised, and those at which its lines have no traction [length].
+        Opening and sliding at which the law is linearised, and those of zero traction in the linearised law [length].
     """
 
     law: CohesiveLaw
@@ -71,10 +71,10 @@ class Layer:
 
 
 def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying: Array) -> Constraints:
-    """Return constraints `constraints`, with tangents, as a cohesive layer: equations whose compliance follows its law.
+    """Return `constraints`, which have tangents, as a cohesive layer: equations whose compliance follows its law.
 
-    `lying` (m,) are the gaps of the bodies as they lie [length]: cohesive layers have no traction there, adhesion acts across
-    them. What is broken may close again, with the full stiffness then.
+    `lying` (m,) are the initial gaps [length]. Cohesive layers have no traction there, while adhesion acts across them.
+    Broken constraints may close again, with the full stiffness.
     """
     assert constraints.areas is not None
     m, u, start = len(constraints), at.displacement.ravel(), at.start.ravel()

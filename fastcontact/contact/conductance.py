@@ -28,16 +28,17 @@ TABLES = ("pressure", "gap")
 class Conductance:
     """The heat flow across a contact, per area and temperature difference.
 
-    Raises ContactError for a value that is no conductance.
+    Raises ContactError if `given` is not a valid conductance.
 
     Parameters
     ----------
     name : str
         Name of the contact pair, for messages.
     given : float, callable, sequence or mapping
-        A number, where the sides touch; a function of pressures and gaps (m,), also where they are open; pairs (pressure,
-        conductance), where they touch; or a mapping of ``"pressure"`` to such pairs, ``"gap"`` to pairs (gap, conductance)
-        for what is open, without pressures for all [power / (area temperature)].
+        A number, which applies where the sides touch; a function of pressures and gaps (m,), which also applies where they
+        are open; pairs (pressure, conductance), which apply where they touch; or a mapping of ``"pressure"`` to such pairs
+        and of ``"gap"`` to pairs (gap, conductance), which apply where the sides are open, or everywhere if there are no
+        pairs for pressure [power / (area temperature)].
     """
 
     def __init__(self, name: str, given: Any) -> None:
@@ -70,13 +71,13 @@ class Conductance:
     def _no_table(self) -> ContactError:
         return ContactError(
             f"the conductance of contact '{self.name}' must be a number, a function of pressures and gaps, or tables of "
-            "pairs that ascend, none of them negative: [(0.0, 100.0), (10.0, 5000.0)] by pressure, or "
+            "nonnegative, ascending pairs: [(0.0, 100.0), (10.0, 5000.0)] by pressure, or "
             '{"pressure": [...], "gap": [...]}'
         )
 
     @property
     def sampled(self) -> Any:
-        """Values that identify the conductance: the number or tables as given, sampled values of a function."""
+        """Values that identify the conductance: the number or tables as given, or sampled values of a function."""
         if not callable(self.given):
             return self.given
         scale = np.concatenate([[0.0], np.logspace(-9, 9, 37)])
@@ -85,7 +86,7 @@ class Conductance:
     def __call__(self, pressure: Array, gap: Array) -> Array:
         """Return conductances (m,) at pressures (m,) [pressure] and gaps (m,), zero where the sides touch [length].
 
-        Raises ContactError if a function returns anything else.
+        Raises ContactError if a function fails or does not return nonnegative numbers of this shape.
         """
         touching = gap == 0.0
         if self._number is not None:
@@ -122,7 +123,7 @@ class Crossing:
     secondary, primary : csr_array (m, n_points)
         Weights of the temperatures on both sides of each constraint, which sum to one [-].
     area : ndarray (m,)
-        Area of each constraint, zero where it faces nothing [area].
+        Area of each constraint, zero where the other side is not faced [area].
     """
 
     secondary: csr_array

@@ -45,10 +45,10 @@ class ContactMiddle:
     direction : ndarray (dim,), optional
         Direction of the line from which distances are measured [-].
     ignored : tuple of int
-        Coordinates along which the model represents an infinite one.
+        Coordinates along which the model represents an infinite surface.
     tangent : ndarray (dim,), optional
-        Direction along which half-widths are measured, both ways [-]; without one (in axisymmetry, in 3D, and on a ring
-        in contact all round) half-widths are measured by coordinates.
+        Direction along which half-widths are measured [-]. If None, as in axisymmetry, in 3D, and on a ring in contact all
+        round, half-widths are measured by the distances of `places`.
     """
 
     position: Array
@@ -106,7 +106,7 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
 
 
 def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], mean: Array) -> ContactMiddle:
-    """Return the centre on a surface in 3D; parallel planes of symmetry at both ends represent an infinite one."""
+    """Return the centre on a surface in 3D; parallel planes of symmetry at both ends represent an infinite surface."""
     centre = weight @ points
     ends: dict[int, list[float]] = {}
     for axis, nodes in planes:
@@ -129,7 +129,7 @@ def _meets_axis(points: Array) -> bool:
 def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:
     """Return the planes of symmetry at the ends of a surface: their axis, and the nodes of the surface on them.
 
-    `coordinates` (n_points, dim) are those of all points; without supports there is not a plane.
+    `coordinates` (n_points, dim) are those of all points; without supports there are no planes.
     """
     if motions is None:
         return []
@@ -150,7 +150,7 @@ def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions |
 
 
 def _weights(force: Array, gap: Array) -> Array:
-    """Return the weights (n_nodes,) of the nodes in the centre of pressure [-], which sum to 1."""
+    """Return the weights (n_nodes,) of the nodes in the centre of pressure, with sum 1 [-]."""
     weight, total = force, float(force.sum())
     if total <= 1e-6 * float(np.abs(force).sum()):  # no force, or tension of equal magnitude
         weight = np.abs(force)

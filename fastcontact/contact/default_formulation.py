@@ -1,17 +1,17 @@
 """Default formulation of a contact pair: between bodies, mortar with dual Lagrange multipliers.
 
 It is the only choice that is accurate on any two surfaces (``bench/defaults.py``, docs/reference/accuracy.md).
-Node-to-segment contact takes the normal of one of two facets where two nodes face each other, and nodes that face each other
-at first no longer do once the bodies slide; even with averaged normals it does not transmit a uniform pressure between
+Where two nodes face each other, node-to-segment contact uses the normal of one of two facets, and nodes that coincide
+initially no longer do when the bodies slide. Even with averaged normals it does not transmit a uniform pressure between
 non-matching meshes. Quadrature over whole facets is inaccurate where the other side ends or bends. Standard multipliers gain
-one digit on smooth quadratic facets in two dimensions, but each of their gaps involves the neighbouring nodes: with multigrid
-every closed constraint costs a linear solution.
+one digit on smooth quadratic facets in two dimensions, but each of their gaps involves the neighbouring nodes, so that with
+multigrid every closed constraint costs a linear solution.
 
 Against rigid obstacles the default is the continuous formulation, which also enforces contact between nodes, with two
-exceptions. Linear triangles, and in 3D all facets whose nodes all carry pressure, corners included, take node-to-segment:
-triangles and tetrahedra cannot satisfy all conditions of the continuous formulation, and its pressures oscillate by up to
-40 %; in 3D each of its integration points costs a linear solution. The other facets in 3D, which are quadratic, take
-mortar where there is friction, because points with friction cannot be eliminated.
+exceptions. Node-to-segment is used on linear triangles and tetrahedra, and in 3D on all facets whose nodes all carry
+pressure, corners included. Triangles and tetrahedra cannot satisfy all conditions of the continuous formulation, and its
+pressures oscillate by up to 40 %; in 3D each of its integration points costs a linear solution. On the other facets in 3D,
+which are quadratic, mortar is used with friction, because integration points with friction cannot be eliminated.
 """
 
 from __future__ import annotations

@@ -151,7 +151,7 @@ class Facing:
 def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing:
     """Return the points at which facets face another body; see `find_contacts` for `distance` [length] and `angle` [degrees].
 
-    A third body between two bodies hides them from each other: only the closest facet of all counts.
+    A third body between two bodies hides them from each other, since only the closest facet of all other bodies counts.
     """
     everywhere = np.ones(len(outside.body), bool)
     near = _search(outside, distance, angle, everywhere)
@@ -168,7 +168,7 @@ def facing(outside: OuterFacets, distance: float | None, angle: float) -> Facing
 
 
 def _search(outside: OuterFacets, distance: float | None, angle: float, among: Mask) -> Facing:
-    """Return the facets that the points of the facets `among` (n,) face."""
+    """Return the facets of other bodies that the sample points of the facets `among` (n,) face."""
     facing_of_bodies = [_faced_by(outside, body, distance, angle, among) for body in np.unique(outside.body)]
     return Facing(*(np.concatenate(of_bodies) for of_bodies in zip(*facing_of_bodies, strict=True)))
 

@@ -25,7 +25,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import weighted_area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Mean gaps next to the edge of the contact, where some places between nodes are closed, may be negative by up to this
+# Mean gaps next to the edge of the contact, where some points between nodes are closed, may be negative by up to this
 # fraction of the facet length.
 EDGE = 0.01
 
@@ -41,7 +41,7 @@ class Wetted:
     pressure : ndarray (n_nodes,)
         Fluid pressure at the secondary nodes [pressure].
     spread : csr_array (n_points, n_nodes)
-        Forces on points, opposite to the `areas` of the secondary nodes [force].
+        Forces on points per area vector of the secondary nodes, in the opposite direction [force].
     areas : AreaVectors
     """
 
@@ -65,7 +65,7 @@ class Wetted:
 class AreaVectors:
     """Outward area vectors of the deformed secondary side at its nodes, per reference area (Nanson's formula).
 
-    Means over the facets around a node, with the squares of its shape function as weights, which are positive.
+    They are means over the facets around a node, weighted with the square of its shape function, which is positive.
     """
 
     side: Surface
@@ -100,10 +100,10 @@ class AreaVectors:
 
 
 def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, source: Mask) -> Constraints:
-    """Return constraints `constraints` under the fluid pressure of a configuration.
+    """Return `constraints` under the fluid pressure of a configuration.
 
     The fluid comes from the nodes `source` (n_nodes,) of the secondary side. Contact pressures are those of the last
-    pairing; before the first one, closed nodes are tight.
+    pairing; before the first one, closed nodes are impermeable.
     """
     if not at.fluid_pressure > 0.0:
         return constraints
@@ -117,14 +117,14 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
     if at.pressure is None:
         passable = nodal > LENGTH_ROUND_OFF * size
     else:
-        # A node under contact pressure is tight, even if the closed points lie beside it.
+        # A node under contact pressure is impermeable, even if its closed points lie beside it.
         # Contact pressures are forces per reference area.
         nominal = at.fluid_pressure * (1.0 if at.linearised is None else np.linalg.norm(vectors, axis=1))
         facet = size / side.n_facets ** (1.0 / (points.shape[1] - 1))
         passable = (nodal > -EDGE * facet) & (at.pressure <= (1.0 + LENGTH_ROUND_OFF) * nominal)
     nodes = reached(side, source, passable)
     rows = nodes[node] & constraints.usable
-    # A force that does not depend on the gap is represented by a line of small slope, which vanishes far beyond the side.
+    # A force independent of the gap is represented by a linear law of small slope, whose zero lies far beyond the side.
     far = size / SINGLE_PRECISION
     none = np.zeros(len(constraints))
     B, weights = _along(constraints.B, rows, side, vectors[node])

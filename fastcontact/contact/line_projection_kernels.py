@@ -19,7 +19,7 @@ def _shape(count, s, values, slopes):
 
 @kernel
 def _newton(x, y, corners, normals, f, count, s, values, slopes):
-    """Return s where (x, y) lies along the normal of facet f, extended beyond its ends, and whether it was found."""
+    """Return s where (x, y) lies on the normal of facet f, extended beyond its ends, and whether the iteration converged."""
     for _ in range(MAX_ITERATIONS):
         _shape(count, s, values, slopes)
         px, py, tx, ty, nx, ny, mx, my = x, y, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -48,7 +48,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
 
 @interpretable_kernel
 def along_normals(points, corners, normals, counts, neighbour, facet, xi, overhang, values, slopes):
-    """Move projections (facet, xi) to where the points lie along the interpolated normals.
+    """Replace closest-point projections (facet, xi) by projections along the interpolated normals.
 
     Parameters
     ----------

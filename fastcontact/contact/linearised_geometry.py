@@ -46,12 +46,12 @@ class Linearised(Protocol):
     """Contact forces, gaps and slips of one pair, linearised at its pairing, and at multipliers and displacements."""
 
     def along(self, du: Array) -> tuple[Array, Array]:
-        """Return how nodal forces (n_points, dim) [force], gaps and slips (1 + k, m) [length] vary with displacements du."""
+        """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
         ...
 
 
-# A function of the multipliers (m,) and the tangential forces (m, k) [force], and of the displacements (n_points, dim) of
-# the solution [length].
+# A function of the multipliers (m,) and tangential forces (m, k) [force] and the displacements (n_points, dim) [length] of
+# the solution.
 Geometry = Callable[[Array, Array, Array], Linearised]
 
 
@@ -123,7 +123,7 @@ class InterpolatedNormals:
         Nodes of the points, as positions on the side.
     shape : ndarray (n, k)
     at_nodes : ndarray (n, k, dim), optional
-        Normals at these nodes, where they are not those of `nodal`: at corners.
+        Normals at these nodes, which differ from those of `nodal` at corners.
 
     Attributes
     ----------
@@ -177,11 +177,11 @@ class _SurfacePoints:
         Rows of the points in `candidates`.
     primary : Surface
     coordinates : ndarray (n_points, dim)
-        [length]
+        Coordinates of the pairing [length].
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
     closest : bool
-        Whether the points face their closest points, instead of those along the normals; for facet normals both are the same.
+        Whether the points face their closest points, instead of those along the normals; both coincide for facet normals.
     """
 
     def __init__(
@@ -207,7 +207,7 @@ class _SurfacePoints:
             self.normal, self._bend = self.averaged.normal, self.averaged.bend(at.gradient)
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
-        # The component along the direction d of the projection is left out of ``a_i dxi_i + g dd = dv``.
+        # The component along the direction d of the projection is eliminated from ``a_i dxi_i + g dd = dv``.
         along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
         frame = np.stack(tangents(along), axis=1)
         self._closest, self._bent, self._gap = (
@@ -272,7 +272,7 @@ class _ObstaclePoints:
         Weights of the nodes.
     obstacle : RigidSide
     coordinates : ndarray (n_points, dim)
-        [length]
+        Coordinates of the pairing [length].
     pose : Pose
     """
 
@@ -307,7 +307,7 @@ Points = _SurfacePoints | _ObstaclePoints
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """The part q m of a relative motion that closes a gap, ``q = a . o / a . m``, see `Slips`.
+    """Correction q m for the part of a relative motion that closes a gap, ``q = a . o / a . m``, see `Slips`.
 
     Attributes
     ----------
@@ -367,9 +367,9 @@ class Slips:
     .. math:: s = r + q m, \qquad q = \frac{a \cdot o}{a \cdot m}, \qquad
               \delta (t \cdot s) = t \cdot \delta s - (t \cdot \delta n) (n \cdot s)
 
-    with the relative motion r of the step and, where slip is symmetric, minus its part that closes the distance o of the
-    beginning. Both vary as points face other primary points: :math:`\delta r = - \sum_k N_{k, \alpha} \Delta u_k
-    \delta \xi^\alpha`, and o likewise with the positions at the beginning instead of the increments of displacements.
+    with the relative motion r of the step. If slip is symmetric, adding q m removes the part of the motion that closes the
+    initial distance o. Both r and o vary as points face other primary points: :math:`\delta r = - \sum_k N_{k, \alpha}
+    \Delta u_k \delta \xi^\alpha`, and o in the same way with the initial positions instead of the displacement increments.
 
     Attributes
     ----------
@@ -382,7 +382,7 @@ class Slips:
         Increments of displacements in the step and positions at its beginning, of all nodes [length].
     closing : Closing, optional
     turning : ndarray (dim, dim), optional
-        By how much the motion that points share with a turning obstacle varies with their displacements.
+        Derivative of the motion that points share with a rotating obstacle with respect to their displacements [-].
     """
 
     tangents: Array
@@ -407,12 +407,12 @@ class Slips:
         Parameters
         ----------
         du : ndarray (n_points, dim)
-            [length].
+            Variation of the displacements [length].
         varied : Variation
-            That of `points`.
+            Variation of `points`.
         points : Points
         weights : csr_array (n, n_points), optional
-            Of the points in the slips; each has its own by default.
+            Weights of the points in the slips; by default each slip belongs to one point.
         normal : (ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, and how they vary.
         primary : ndarray (n, dim), optional
@@ -436,7 +436,7 @@ class Slips:
 
 
 def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: Array) -> Array:
-    """Return how forces (n, dim) vary whose normals do by `varied` (n, dim)."""
+    """Return the variation (n, dim) of forces due to the variation `varied` (n, dim) of their normals."""
     change = multiplier[:, None] * varied
     if tangential is not None:
         change -= np.einsum("nd,nd->n", tangential, varied)[:, None] * normal
@@ -490,7 +490,7 @@ class WeightedForces:
         Normals of the constraints.
     multiplier : ndarray (m,)
     nodal : NodalNormals or Points, optional
-        Source of the normals of the constraints, where they are no means over the points.
+        Source of the normals of the constraints if they are not means over the points.
     slips : Slips, optional
     """
 
@@ -524,7 +524,7 @@ class WeightedForces:
 
     @cached_property
     def _length(self) -> Array:
-        """Lengths (m, 1) of the means that normals are parallel to."""
+        """Lengths (m, 1) of the mean vectors whose directions are the normals."""
         length = np.linalg.norm(self._mean(self.points.normal), axis=1, keepdims=True)
         return np.where(length > 0.0, length, 1.0)
 

@@ -31,7 +31,7 @@ class OverclosureLaw(ABC):
 class TabularLaw(OverclosureLaw):
     """A piecewise linear pressure, zero up to the first overclosure, and extrapolated linearly beyond the last.
 
-    Raises ContactError for a table that does not ascend.
+    Raises ContactError for an invalid table.
 
     Parameters
     ----------

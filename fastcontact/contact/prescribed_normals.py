@@ -26,8 +26,8 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
     Raises
     ------
     ContactError
-        If it is neither, the vector points into the body behind `primary`, or a rigid obstacle, which has normals of its
-        own, is to take others.
+        If `normals` is neither, if the vector points into the body behind `primary`, or if `primary` is a rigid obstacle,
+        which has its own normals.
     """
     dim = points.shape[1]
     if isinstance(normals, str):
@@ -42,7 +42,7 @@ def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSid
         checked = tuple((vector / length).tolist())
         if isinstance(primary, Surface) and (nodal_normals(primary, points) @ vector).mean() <= FACING * length:
             raise ContactError(
-                f"normals = {normals!r} must point out of the body of '{primary.group}', the primary side: turn the vector"
+                f"normals = {normals!r} must point out of the body of '{primary.group}', the primary side: reverse the vector"
             )
     if isinstance(primary, RigidSide) and checked not in ("facet", "averaged"):
         raise ContactError(f"normals = {normals!r} are for contact between bodies: a rigid obstacle has its own")

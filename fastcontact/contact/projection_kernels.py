@@ -50,7 +50,7 @@ def angles(nodes, beside, begin, end, out):
 
 @interpretable_kernel
 def coefficients(values, to_terms, first, begin, end, out):
-    """Fill rows `first` + `begin` to ``first + end - 1`` of `out` (n_facets, width, 3): the terms of `values` (n, m, 3).
+    """Fill rows ``first + begin`` to ``first + end - 1`` of `out` (n_facets, width, 3) with the terms of `values` (n, m, 3).
 
     `to_terms` (m, m) are those of `facet_tables.Tables`.
     """
@@ -83,7 +83,7 @@ def _newton(point, terms, directions, f, s, t, height):
         p, q = along(along_s, turn_s, height), along(along_t, turn_t, height)
         across = cross(q, normal)
         volume = dot(p, across)
-        # Columns of a Jacobian are dependent if they span next to none of the volume of a box.
+        # The columns of the Jacobian are linearly dependent if the volume they span is negligible.
         if not abs(volume) > LENGTH_ROUND_OFF * np.sqrt(dot(p, p) * dot(q, q) * dot(normal, normal)):
             return s, t, False
         ds, dt = dot(residual, across) / volume, dot(residual, cross(normal, p)) / volume

@@ -20,7 +20,7 @@ SAMPLE = 200
 def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, excluded: Mask | None = None) -> None:
     """Raise ContactError for sides of contact `name` that share nodes or cannot face each other.
 
-    They may share nodes that carry no contact, `excluded` (n_points,).
+    They may share nodes that are excluded from contact, `excluded` (n_points,).
     """
     if secondary.group == primary.group:
         raise ContactError(
@@ -61,7 +61,7 @@ def check_obstacle(mesh: Mesh, name: str, secondary: Surface, obstacle: RigidSid
     if len(along) and (along >= 0).all():
         raise ContactError(
             f"the rigid obstacle of contact '{name}' faces in the same direction as '{secondary.group}', so that they cannot "
-            "touch: turn its normal or its facets round, or name another face of the body"
+            "touch: reverse its normal or its facets, or name another face of the body"
         )
 
 
@@ -73,7 +73,7 @@ def _check_normals(mesh: Mesh, name: str, side: Surface) -> None:
         point = side.points[without[0]]
         raise ContactError(
             f"the facets of '{side.group}' in contact '{name}' meet back to back at point {point}, {mesh.points[point]}: "
-            "they have no normal there; bodies that touch at a point, which merge_points may have made one, need a point each"
+            "they have no normal there; bodies that touch at a point need separate points, which merge_points may have merged"
         )
 
 

@@ -6,11 +6,11 @@ polynomial of twice the order of the facet are fitted to the nodes of the facet 
 Jiao and Zha, 2008). The height of this smooth surface P above the facet is its interpolation error on the facet,
 :math:`h = P - \sum_a N_a P(x_a)`. It vanishes at nodes, on flat sides, and where facets follow the surface.
 
-Only the curvature that both sides share is corrected for: facets of a ball on a flat are flat in the contact, as the ball is.
-With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are multiplied by
-:math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, K its own. Fits do not reach across corners, and where the curvature changes
-from one facet to the next, heights are multiplied by the limiter of van Albada, van Leer and Roberts (1982),
-:math:`2 K : K' / (K : K + K' : K')`, so that a flat beside a fillet stays flat.
+Only the curvature that both sides share is corrected for: a sphere pressed on a plane is flat within the contact, as its
+facets are. With the curvature tensors :math:`K_s` and :math:`K_p` of facets that face each other, heights of one side are
+multiplied by :math:`\min(\max(-K_s : K_p / K : K, 0), 1)`, with the tensor K of that side. Fits do not extend across
+corners. Where the curvature changes from one facet to the next, heights are multiplied by the limiter of van Albada, van
+Leer and Roberts (1982), :math:`2 K : K' / (K : K + K' : K')`, so that a plane beside a fillet stays plane.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Smoothing:
     def shared(self, secondary: Indices, primary: Indices, frames: Sequence[Array]) -> Array:
         """Return the factors (n, 2) of the heights of secondary and primary facets, both (n,), that face each other.
 
-        `frames` are those of all facets where they are now.
+        `frames` are the current tangents of all facets, see the function `frames`.
         """
         a = self.secondary.curvature[secondary]
         b = _in_plane_of(frames[0][secondary], frames[1][primary], self.primary.curvature[primary])
@@ -165,10 +165,10 @@ def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
 
 
 def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]:
-    """Return which facets share a node without a corner between them, and the nodes of all these for each facet.
+    """Return which facets share a node without a corner between them, and the nodes of all these facets for each facet.
 
-    A matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the side, and which of
-    these entries are filled.
+    The results are a matrix (n_facets, n_facets), including the diagonal, positions (n_facets, most) in the points of the
+    side, and a mask of the entries of the latter that are filled.
     """
     size = [block.local.shape[1] for block in side.blocks for _ in block.local]
     nodes = np.concatenate([block.local.ravel() for block in side.blocks])
@@ -220,15 +220,15 @@ class _Fit:
         return local[..., :-1], local[..., -1]
 
     def fitted(self, points: Array, valid: Mask) -> _Fit:
-        """Return this one with polynomials fitted to those `points` (n, m, dim) that are `valid` (n, m)."""
+        """Return the surfaces with polynomials fitted to those `points` (n, m, dim) that are `valid` (n, m)."""
         (plane, height), (i, j) = self.in_planes(points), self.powers
         powers = [math.comb(*pair) for pair in zip(i + j, i)]
-        lower = LOWER ** (i + j) * np.sqrt(powers)  # no direction counts more than others (Bombieri's norm)
+        lower = LOWER ** (i + j) * np.sqrt(powers)  # Bombieri's norm is invariant under rotation
         columns = np.where(valid[..., None], lower * _terms(plane, i, j), 0.0)
         rest = np.where(valid, height - _conic(self.curvature, plane), 0.0)
         size = LOWER ** (i + j).max() * np.sqrt(DAMPING * (columns**2).sum(axis=(1, 2)))
         damping = size[:, None, None] * np.eye(len(i), len(i) + 1)
-        # By QR: from normal equations the terms that the damping determines would be accurate to 1e-3 only.
+        # With normal equations instead of QR, terms determined by the damping would be accurate to only 1e-3.
         rows = np.concatenate([np.concatenate([columns, rest[..., None]], axis=2), damping], axis=1)
         R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
         return replace(self, polynomial=lower * np.linalg.solve(R[:, : len(i), :-1], R[:, : len(i), -1:])[..., 0])
@@ -342,9 +342,9 @@ def _limiter(near: csr_array, curvature: Array, axes: Array) -> Array:
 
 
 def _in_plane_of(axes: Array, other: Array, tensor: Array) -> Array:
-    """Return tensors (n, d, d) along the `other` axes (n, d, dim) along `axes`, one plane turned to the other."""
+    """Return tensors (n, d, d), given along the `other` axes (n, d, dim), along `axes`, after rotating plane into plane."""
     turn = np.einsum("nid,njd->nij", axes, other)
-    if turn.shape[1] == 2:  # the rotation or reflection next to it
+    if turn.shape[1] == 2:  # the closest rotation or reflection
         cofactors = turn[:, ::-1, ::-1] * [[1.0, -1.0], [-1.0, 1.0]]
         turn = turn + np.sign(np.linalg.det(turn))[:, None, None] * cofactors
     turn = turn / (np.abs(np.linalg.det(turn)) ** (1.0 / turn.shape[1]))[:, None, None]

@@ -1,19 +1,19 @@
 """Tied contact: no opening and no slip, as linear equations that hold from the beginning.
 
 The sides are paired once, in the undeformed configuration; the relative displacement of points that face each other stays
-zero in every direction. The test functions are the formulation's multipliers: one set of equations per node where forces
-are nodal; moments with the functions of the multiplier field where forces act at integration points, which is the mortar
-method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
+zero in every direction. The test functions are the formulation's multipliers. If forces are nodal, there is one set of
+equations per node. If forces act at integration points, the equations are moments with the functions of the multiplier
+field, which is the mortar method (Bernardi, Maday and Patera, 1994), so that complementarity parameters have no influence.
 
 At nodes that supports hold on both sides, the secondary side has one displacement less than the multipliers, which then are
-not determined: multipliers that alternate from node to node and die out along the surface do no work. They are reduced as at
-the ends of mortar lines (section 3 there): in a direction that is held on both sides, the multiplier of a node is the mean of
-its neighbours', so that uniform tractions remain among them (`reduction`).
+not determined: multipliers that alternate from node to node and decay along the surface do no work. They are reduced as at
+the ends of mortar lines (Bernardi et al., section 3): in a direction that is held on both sides, the multiplier of a node is
+the mean of those of its neighbours, so that uniform tractions remain possible (`reduction`).
 
 Equal displacements across a gap would resist rigid rotations: the forces of both sides would have different lines of action,
-and the moment of the shear would be lost. A rigid arm across the gap therefore rotates with the primary facet (`with_arms`):
-the relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
-derivative along t on the primary facet; it vanishes in any small rotation of both sides.
+and the moment of the shear would be lost. A rigid arm across the gap therefore rotates with the primary facet (`with_arms`).
+The relative displacement along a tangent t is ``t . (u_s - u_p) + g n . du_p/dt`` with the gap g, the normal n and the
+derivative along t on the primary facet. It vanishes in any small rotation of both sides.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ class TiedPair:
     rows : tuple of csr_array (q, n_dofs)
         Relative displacement along the normal and each tangent.
     directions : tuple of ndarray (m, dim)
-        The tangents.
+        Tangents [-].
     positions : ndarray (q, dim)
         Approximate positions of the equations on the reference surface [length].
     nodal : NodalField
         Nodal interpretation of the forces at the constraint points.
     nodes : ndarray of int (q,), optional
-        The secondary nodes that the gaps belong to, see `Constraints`.
+        Secondary nodes of the gaps, see `Constraints`.
     areas : ndarray (q,), optional
-        Integrals of the functions that the equations are tested with [area].
+        Integrals of the test functions of the equations [area].
     reduction : csr_array (q dim, q dim), optional
-        All multipliers by those that are left where supports hold both sides, see `reduction`.
+        Matrix from the remaining multipliers to all multipliers where supports hold both sides, see `reduction`.
     """
 
     moments: csr_array
@@ -98,10 +98,7 @@ def tied(constraints: Constraints, moments: csr_array, areas: Array | None, redu
 
 
 def moments_of(constraints: Constraints) -> tuple[csr_array, Array | None]:
-    """Return the matrix (q, m) whose rows are the basis functions of the multipliers.
-
-    The second result are the integrals (q,) of these functions, if known [area].
-    """
+    """Return the basis functions of the multipliers as rows (q, m), and their integrals (q,) if known [area]."""
     if not isinstance(constraints.compliance, Projection):
         return csr_array(eye_array(len(constraints.gap0), format="csr")), constraints.areas
     P, areas = constraints.compliance.P, constraints.compliance.areas
@@ -120,22 +117,22 @@ def _cleaned(rows: csr_array) -> csr_array:
 
 
 def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: csr_array) -> csr_array:
-    """Return the matrix (q dim, q dim) of the multipliers of all equations by those that are left, others being empty.
+    """Return the matrix (q dim, q dim) from the remaining to all multipliers; columns of removed multipliers are empty.
 
-    Multipliers are forces, component by component along the frames.
+    Multipliers are forces, ordered by their components along the frames.
 
     Parameters
     ----------
     frames : ndarray (q, dim, dim)
         Unit vectors along which the equations of the nodes hold, the normal and then tangents [-].
     held : ndarray (q, dim, dim)
-        Projectors on the directions in which both sides are held [-].
+        Projectors on the directions in which supports hold both sides [-].
     nodes : ndarray of int (q,)
         Secondary nodes of the equations.
     areas : ndarray (q,)
-        Integrals of their test functions, zero where they hold nothing [area].
+        Integrals of their test functions, zero for empty equations [area].
     beside : csr_array (n_nodes, n_nodes)
-        Which nodes lie in one facet.
+        Incidence of nodes with a common facet.
     """
     q, dim = held.shape[:2]
     taken = np.trace(held, axis1=1, axis2=2).round().astype(np.intp)
@@ -162,7 +159,7 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
 
 
 def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, points: Array) -> Constraints:
-    """Return constraints whose tangential rows are zero in small rotations of both sides, also across a gap.
+    """Return constraints whose tangential rows vanish in small rigid rotations of both sides, also across a gap.
 
     Parameters
     ----------
@@ -184,7 +181,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
     left = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)
     moved = np.stack([np.abs(tangent @ translations).max(axis=1) for tangent in constraints.tangents], axis=1)
-    # A tensor, because one length per tangent would depend on the choice of tangents where the gap is not along the normal.
+    # The length is a tensor: one length per tangent would depend on the choice of tangents if the gap is not normal.
     lengths = left @ np.linalg.pinv(arms)
     lengths[(np.abs(lengths) <= LENGTH_ROUND_OFF * size) | (moved > LENGTH_ROUND_OFF)[:, :, None]] = 0.0
     tangents = [
@@ -195,7 +192,7 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
 
 
 def _rotations(points: Array) -> Array:
-    """Return the displacements (n_dofs, 1), in 3D (n_dofs, 3) of unit rotations about the middle [length]."""
+    """Return the displacements (n_dofs, 1), in 3D (n_dofs, 3), of unit rotations about the mean point [length]."""
     x = points - points.mean(axis=0)
     if points.shape[1] == 2:
         return np.column_stack([-x[:, 1], x[:, 0]]).reshape(-1, 1)

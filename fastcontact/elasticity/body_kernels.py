@@ -93,7 +93,7 @@ def _dilatation(F, finite, G):
 
 @kernel
 def _add_volumetric(F, G, pressure, turning, bulk, tangent, P, A):
-    """Add the volumetric part: `pressure` dJ/dF to P; if `tangent`, `bulk` dJ/dF dJ/dF plus `turning` d2J/dF2 to A."""
+    """Add the volumetric parts `pressure` dJ/dF to P and, if `tangent`, `bulk` dJ/dF dJ/dF + `turning` d2J/dF2 to A."""
     along = G.reshape(9)
     for row in range(9):
         P[row // 3, row % 3] += pressure * along[row]

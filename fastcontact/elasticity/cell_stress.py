@@ -75,8 +75,8 @@ class CellStress:
     def fill(self, name: str, xi: Array, cells: Numbers, material: Numbers, out: Array, rows: Indices) -> None:
         """Fill `out` (n_cells, n, n_components) [pressure] in place, in parallel.
 
-        At points `xi` (n, dim) [-] of `cells` (n_cells, n_nodes) of int of an element; `material` (n_cells,) or
-        (n_cells, n_q) and `rows` (n_cells,) of int, as for `at`.
+        The points `xi` (n, dim) [-], the `cells` (n_cells, n_nodes) of int, `material` (n_cells,) of int or (n_cells, n_q),
+        and the numbers `rows` (n_cells,) of int of the cells are as for `at`.
         """
         element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
@@ -171,7 +171,7 @@ class CellStress:
     def _add_offset(
         self, offset: StressOffset, at: tuple[str, Array, Indices], cells: Numbers, material: Numbers, out: Array
     ) -> None:
-        """Add initial stresses and subtract those of stress-free strains, whose dilatation is projected like others."""
+        """Add initial stresses and subtract those of stress-free strains, whose dilatation is projected as well."""
         name, xi, rows = at
         stress = offset.initial("stress", name, rows, elements.get(name).shape(xi))
         if stress is not None:
@@ -180,7 +180,7 @@ class CellStress:
         split = dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if material.ndim == 1:
-            out -= strain @ moduli[material]  # which are symmetric
+            out -= strain @ moduli[material]  # moduli are symmetric
         else:
             local = np.einsum("nq,cqij->cnij", beside(name, xi), moduli[material], optimize=True)
             out -= np.einsum("cnij,cnj->cni", local, strain)

@@ -4,9 +4,9 @@
 Shared arguments: ``F`` (3, 3) is the deformation gradient [-], ``P`` (3, 3) the first Piola-Kirchhoff stress [pressure] and
 ``A`` (9, 9) its derivative dP/dF, of which components iJ have the number 3 i + J. Laws for small strains take the symmetric
 part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin with the number of the law, see
-`nonlinear_materials`; `old` and `new` (9,) are the history at the beginning and the end of the load step: the plastic strain
-(xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume], and in plane
-stress F_zz - 1. The volumetric part of a law with a bulk modulus, U(J) = K (J - 1)^2 / 2, is added by the element loop.
+`nonlinear_materials`. `old` and `new` (9,) are the history at the beginning and the end of the load step. It consists of the
+plastic strain (xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume],
+and in plane stress F_zz - 1. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of laws with a bulk modulus.
 """
 
 import numpy as np
@@ -90,7 +90,7 @@ def _hooke(D, strain, stress):
 
 @kernel
 def _linear(D, F, everywhere, P, A):
-    """Hooke's law for small strains, by moduli D (6, 6); return the energy density."""
+    """Apply Hooke's law for small strains with moduli D (6, 6); return the energy density."""
     strain = 0.5 * (F + F.T)
     for i in range(3):
         strain[i, i] -= 1.0
@@ -114,9 +114,9 @@ def _yield_stress(constants, p):
 
 @kernel
 def _plastic(constants, F, everywhere, old, new, P, A):
-    """Von Mises plasticity with the radial return (Simo and Hughes, 1998, boxes 3.1 and 3.2); return the elastic energy.
+    """Apply von Mises plasticity by radial return (Simo and Hughes, 1998, boxes 3.1, 3.2); return the elastic energy.
 
-    Deviatoric part with tabulated isotropic hardening and linear kinematic hardening (Prager).
+    This is the deviatoric part, with tabulated isotropic hardening and linear kinematic hardening (Prager).
     """
     mu, kinematic, xi = constants[1], constants[3], np.empty(9)
     third, square = (F[0, 0] + F[1, 1] + F[2, 2]) / 3.0, 0.0
@@ -209,7 +209,7 @@ def _bend(x, y, z):
 
 @kernel
 def _logarithmic(constants, F, old, new, P, A):
-    """Plasticity in the space of logarithmic strains (Miehe, Apel and Lambrecht, 2002); return the elastic energy.
+    """Apply plasticity in the space of logarithmic strains (Miehe, Apel and Lambrecht, 2002); return the elastic energy.
 
     `_plastic` relates the strain ln(F^T F) / 2 and its conjugate stress T. Derivatives of the strain in principal axes are
     divided differences (Daleckii and Krein).
@@ -243,7 +243,7 @@ def _logarithmic(constants, F, old, new, P, A):
 
 @kernel
 def _saint_venant(D, F, P, A):
-    """Hooke's law between Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
+    """Apply Hooke's law to Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
     strain, S, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
     _right_cauchy_green(F, strain)
     strain *= 0.5
@@ -280,10 +280,10 @@ def _add_isochoric(value, first, power, F, J, G, slope, bend, P, A):
 
 @kernel
 def _invariants(constants, F, J, G, P, A):
-    """C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3) of isochoric invariants; return the energy density.
+    """Apply a polynomial law of the isochoric invariants; return the energy density.
 
-    See Rivlin and Saunders (1951) and Yeoh (1993). `_add_isochoric` is called with half the invariants, whose derivative
-    is F.
+    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3); see Rivlin and Saunders (1951) and Yeoh
+    (1993). `_add_isochoric` is called with half of each invariant; the derivative of I1 / 2 is F.
     """
     C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
     P[:], A[:], I1 = 0.0, 0.0, 0.0
@@ -322,9 +322,10 @@ def _second_invariant(C01, I1, F, J, G, P, A):
 
 @kernel
 def _ogden(constants, F, P, A):
-    """Sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) of isochoric stretches (Ogden, 1972); return the energy.
+    """Apply Ogden's law of the isochoric stretches; return the energy density.
 
-    Moduli in principal axes by Simo and Taylor (1991, equation 2.28).
+    The energy is the sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) (Ogden, 1972); the moduli in principal axes
+    are those of Simo and Taylor (1991, equation 2.28).
     """
     n = int(constants[3])
     C = np.empty((3, 3))

@@ -106,7 +106,7 @@ class ConstrainedMotion:
         wrong = np.flatnonzero(off > CONFLICT * scale)
         if len(wrong):
             raise ModelError(
-                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or relations stated "
+                f"{self._name(int(self._elimination.origin[wrong[0]]))} contradicts the supports, or constraints stated "
                 f"before it, by {off[wrong[0]]:.3g}: remove one of them"
             )
         lift: Array = self._elimination.T @ known + self._elimination.S @ values
@@ -180,7 +180,7 @@ class System(ConstrainedMotion):
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
             diagonal = diagonal_of(transformed)
-            # The terms of the transformed diagonal, without those between different components, which may cancel them.
+            # The transformed diagonal without the terms between different components, which may cancel.
             uncancelled = self.T.multiply(self.T).T @ diagonal_of_K
             # Excludes points without stiffness that constraints couple only with each other.
             self.free &= (uncancelled > 0.0) | self._without_stiffness
@@ -238,8 +238,8 @@ class System(ConstrainedMotion):
     def balance(self, out: Array, round_off: Array | None = None) -> tuple[Array, float]:
         """Return the forces (n,) of supports and constraints, and the residual, the largest force on an unknown.
 
-        `out` (n,) are the internal minus all other forces [force]. Up to its `round_off` (n,) it does not count as
-        residual.
+        `out` (n,) are the internal minus all other forces [force]. Forces up to the `round_off` (n,) of `out` do not count
+        as residual.
         """
         residual = self.reduced(out)
         if round_off is not None:

@@ -3,9 +3,9 @@
 The dilatation, the trace of the strain, is projected on polynomials of low degree in each cell: its mean in linear elements
 (the B-bar method: Hughes, Int. J. Numer. Meth. Engng 15, 1980), a linear function in quadratic ones. The rest of the
 strain is unchanged. Quadratic triangles, tetrahedra, wedges and pyramids would still be over-constrained by a linear
-dilatation: only its mean has the full bulk modulus; the remainder has that of a material with nu = 0.3 and the same
-shear modulus, without which single cells in 3D and in axisymmetry would have mechanisms (conformal maps, whose
-deviatoric strain is zero).
+dilatation. There, only the mean dilatation has the full bulk modulus; the remainder has the bulk modulus of a material with
+nu = 0.3 and the same shear modulus, without which single cells in 3D and in axisymmetry would have mechanisms (conformal
+maps, whose deviatoric strain is zero).
 
 The element loops use moduli without the bulk modulus, and the loops of `dilatation_kernels` add the contribution of the
 projected dilatation.

@@ -102,7 +102,7 @@ def add_products(factors, g, slots, c, inside, row, data):
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
     """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    Arguments as for the element loops of the stiffness; Jacobians are known to be positive.
+    Arguments are as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
@@ -124,7 +124,7 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
 def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, at, out):
     """Add the moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
 
-    `displacement` (n_points, dim); `at` (n_out, m): the polynomials at the points of `out`.
+    `displacement` (n_points, dim) are the displacements, and `at` (n_out, m) the polynomials at the points of `out`.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]

@@ -76,8 +76,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
     """Add element stiffness blocks to `data` (n_blocks, 2, 2), in the rows of nodes with ``owner[node] == part``.
 
     `data` is written in place at `slots`. Threads share the nodes; each adds to its rows in the order of the cells.
-    Returns the number of the first cell with a Jacobian that is not positive, or -1. `isotropic` has no effect here: the
-    loops of both dimensions have the same arguments.
+    Returns the number of the first cell with a Jacobian that is not positive, or -1. `isotropic` is an argument only because
+    the loops of both dimensions have the same arguments.
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
@@ -108,8 +108,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 4) with the stress xx, yy, zz, xy at the points of the tables N, dN.
 
-    Positions and displacements are differentiated in reference coordinates, and the derivatives divided: gradients of shape
-    functions are not computed.
+    Positions and displacements are differentiated in reference coordinates, and their derivatives combined, without gradients
+    of shape functions.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, u = transposed(dN), np.empty((2, n_nodes)), np.empty((2, n_nodes))
@@ -139,9 +139,9 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
 
 @interpretable_kernel
 def largest_rotation(points, cells, N, dN, displacement):
-    """Return the square of the largest rotation [radian^2] of a cell at the first point of the tables N, dN, and its number.
+    """Return the square of the largest rotation [radian^2] at the first point of the tables N, dN, and the cell's number.
 
-    Half the curl of the displacement (n_points, 2); the number is -1 where no cell rotates.
+    The rotation is half the curl of the displacement (n_points, 2); the number is -1 if no cell rotates.
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))

@@ -3,8 +3,8 @@
 
 Shared arguments: ``points`` (n_points, 3) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, 3), ``weights`` (n_q,) of the reference element; ``moduli`` (n_materials, 6, 6) [pressure], symmetric, for strains
-(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect here: the loops of both dimensions
-have the same arguments.
+(xx, yy, zz, 2xy, 2yz, 2xz); ``material`` (n_cells,). `N` and `axisymmetric` have no effect; the loops of both dimensions have
+the same arguments.
 """
 
 import numpy as np
@@ -54,7 +54,7 @@ def _tensor(D, tensor):
 def _integrate_products(x, slopes, weights, gradient, g):
     """Fill `g` (6, n_nodes, n_nodes) with the integrals of dN_a/dx_i dN_b/dx_j for ij = 00, 01, 02, 11, 12, 22.
 
-    Returns whether the Jacobian is positive everywhere. One short loop for each ij, which the compiler vectorises.
+    Returns whether the Jacobian is positive everywhere. There is one short loop for each ij, which the compiler vectorises.
     """
     n_nodes = x.shape[1]
     g[:] = 0.0
@@ -135,7 +135,7 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
 
 @kernel
 def _add_tetrahedron(points, cells, c, volume, coupling, shear, slots, inside, gradient, flat):
-    """Add the blocks of a linear tetrahedron for Lamé's constants: its gradients (4, 3) are constant.
+    """Add the blocks of a linear tetrahedron, whose gradients (4, 3) are constant, for Lamé's constants.
 
     `volume` is that of the reference cell. Returns whether the Jacobian is positive. Loops over exactly four nodes
     take half the time of `_integrate_products` and `_add_isotropic`.
@@ -206,8 +206,8 @@ def add_stiffness(points, cells, N, dN, weights, moduli, isotropic, material, ax
 def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, out):
     """Fill `out` (n_cells, n_q, 6) with the stress xx, yy, zz, xy, yz, xz at the points of the table dN.
 
-    Positions and displacements are differentiated together in reference coordinates: gradients of shape functions are not
-    computed.
+    Positions and displacements are differentiated in reference coordinates, and their derivatives combined, without gradients
+    of shape functions.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, u = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
@@ -235,9 +235,9 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
 
 @interpretable_kernel
 def largest_rotation(points, cells, N, dN, displacement):
-    """Return the square of the largest rotation [radian^2] of a cell at the first point of the table dN, and its number.
+    """Return the square of the largest rotation [radian^2] at the first point of the table dN, and the cell's number.
 
-    Half the curl of the displacement (n_points, 3); the number is -1 where no cell rotates.
+    The rotation is half the curl of the displacement (n_points, 3); the number is -1 if no cell rotates.
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))

@@ -10,12 +10,12 @@ from fastcontact.mesh.elements import Element
 
 
 def elastic_energy(stress: Array, compliance: Array) -> Array:
-    """Return stress : strain (n_cells, n) [pressure] at points of cells.
+    """Return ``stress : strain``, twice the energy density, at points of cells (n_cells, n) [pressure].
 
     Parameters
     ----------
     stress : ndarray (n_cells, n, n_components)
-        [pressure].
+        Stress [pressure].
     compliance : ndarray (n_cells, m, n_components, n_components)
         Compliance of whole cells, m = 1, or of their points, m = n, see `Material.compliance_at` [1 / pressure].
     """
@@ -25,8 +25,8 @@ def elastic_energy(stress: Array, compliance: Array) -> Array:
 def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Array:
     """Return the volume (n_cells, n_q) [length^dim] per unit of the reference cell; in axisymmetry of the full circle.
 
-    From the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], shape functions `N` (n_q, n_nodes) [-] and their
-    derivatives `dN` (n_q, n_nodes, dim) [-].
+    The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], the shape functions
+    `N` (n_q, n_nodes) [-], and their derivatives `dN` (n_q, n_nodes, dim) [-].
     """
     n_q, n_nodes, dim = dN.shape
     slopes = corners.transpose(0, 2, 1) @ dN.transpose(1, 0, 2).reshape(n_nodes, -1)
@@ -39,12 +39,13 @@ def cell_volumes(corners: Array, N: Array, dN: Array, axisymmetric: bool) -> Arr
 def gradients_at(corners: Array, dN: Array) -> tuple[Array, Array]:
     """Return the gradients (n_cells, n_q, n_nodes, dim) of shape functions [1 / length], and det J (n_cells, n_q).
 
-    From the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and derivatives `dN` (n_q, n_nodes, dim) [-].
+    The arguments are the nodes of the cells, `corners` (n_cells, n_nodes, dim) [length], and the derivatives of the shape
+    functions `dN` (n_q, n_nodes, dim) [-].
     """
     slopes = np.einsum("qak,cad->cqdk", dN, corners, optimize=True)
     return np.einsum("qak,cqkd->cqad", dN, np.linalg.inv(slopes), optimize=True), np.linalg.det(slopes)
 
 
 def integration_rule(element: Element, n_points: int | None = None) -> quadrature.Rule:
-    """Return a product rule on the reference cell, by default with three points more along each direction than its order."""
+    """Return a product rule on the reference cell, by default with order + 3 points in each direction."""
     return quadrature.product_rule(element.linear, element.order + 3 if n_points is None else n_points)

@@ -41,8 +41,8 @@ class FollowingPressure:
     def at(self, displacement: Array) -> tuple[Array, csr_array]:
         """Return nodal forces (n_points, dim) [force] at a `displacement` (n_points, dim) [length], and the load stiffness.
 
-        The latter is minus the symmetric part (n_dofs, n_dofs) of their derivative [force / length], which is the full
-        derivative where the facets enclose a volume or end at supports.
+        The load stiffness (n_dofs, n_dofs) is minus the symmetric part of the derivative of the forces [force / length],
+        which is the full derivative if the facets enclose a volume or end at supports.
         """
         moved = self._mesh.points + displacement
         forces, entries, dim = np.zeros_like(moved), Entries(), moved.shape[1]

@@ -51,7 +51,7 @@ def tables(name: str) -> Tables:
 
 
 def asked(name: str, treatment: AnyArray | None) -> Mask | None:
-    """Return which moduli (n_moduli,) have modes in an element; None where none has."""
+    """Return which moduli (n_moduli,) have modes in an element; None if none has."""
     if treatment is None or name not in BENDING:
         return None
     bends = (np.asarray(treatment).astype(np.uint8) & MODES) > 0

@@ -7,8 +7,8 @@ cell; ``pairs`` (dim, dim), the component of stress of two directions; ``moduli`
 [pressure]; ``bends`` (n_moduli,) of bool, which of them have modes; ``material`` (n_cells, 1 or n_q), numbers of the cells,
 or of their quadrature points. dim is 2 or 3, with 4 or 13 modes.
 
-With the strains M of unit modes and B of unit displacements of the nodes, own = sum w M^T D M = L L^T and mixed = sum w M^T D
-B: static condensation eliminates the modes by a = -own^-1 mixed u, and subtracts (L^-1 mixed)^T (L^-1 mixed) from the
+With the strains M of unit modes and B of unit nodal displacements, let modal = sum w M^T D M = L L^T and mixed = sum w M^T D
+B. Static condensation eliminates the modes by a = -modal^-1 mixed u, and subtracts (L^-1 mixed)^T (L^-1 mixed) from the
 stiffness.
 """
 
@@ -79,7 +79,7 @@ def subtract_stiffness(
 ):
     """Subtract the condensed modes from `data` (n_blocks, dim, dim), in the rows of a part's nodes.
 
-    `slots`, `owner` and `part` as for the element loops of the stiffness; Jacobians are known to be positive.
+    `slots`, `owner` and `part` are as for the element loops of the stiffness; Jacobians are known to be positive.
     """
     n_cells, n_nodes = cells.shape
     dim = points.shape[1]
@@ -101,9 +101,9 @@ def add_stress(
 ):
     """Add the stresses of modes to `out` (n_cells, n_out, n_components), in place.
 
-    `displacement` (n_points, dim); `lost` (n_cells or 0, n_q, n_components), the stresses subtracted for temperature and
-    initial states; `at` (n_out, dim) and `slopes` (n_out, n_nodes, dim): the points of `out` and shape derivatives there;
-    `beside` (n_out, n_q): interpolation weights from the quadrature points to the points of `out`.
+    `displacement` (n_points, dim) are the displacements, `lost` (n_cells or 0, n_q, n_components) the stresses subtracted for
+    temperature and initial states, `at` (n_out, dim) the points of `out`, `slopes` (n_out, n_nodes, dim) shape derivatives
+    there, and `beside` (n_out, n_q) the interpolation weights from the quadrature points to the points of `out`.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], moduli.shape[1]

@@ -91,7 +91,7 @@ class Gravity(InertiaLoad):
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         super()._check_place(mesh, kinematics)
         if kinematics == "axisymmetric" and 0 in self.components:
-            raise ModelError(f"{self.name} has a radial component x: in axisymmetry it acts along the axis, y, alone")
+            raise ModelError(f"{self.name} has a radial component x: in axisymmetry it can act only along the axis, y")
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
         """Return the same vector (..., dim) [length / time^2] at all positions `x` (..., dim) [length]."""
@@ -114,7 +114,7 @@ class Centrifugal(InertiaLoad):
     origin, direction : (float, float, float)
         A point of the axis [length], and a vector along it [-].
     ramp : tuple, optional
-        History of the force, that is of the square of the speed.
+        Ramp of the force, which is proportional to the square of the speed.
     """
 
     KIND = "the centrifugal force"
@@ -135,13 +135,13 @@ class Centrifugal(InertiaLoad):
         if not direction.any():
             raise ModelError(f"the axis of {self.name} has no length: give a direction such as (0, 0, 1)")
         if kinematics == "axisymmetric" and (direction[[0, 2]].any() or origin[[0, 2]].any()):
-            raise ModelError(f"the axis of {self.name} is not that of the axisymmetry: its direction is (0, 1, 0)")
+            raise ModelError(f"the axis of {self.name} must be the axis of symmetry: its direction is (0, 1, 0)")
         if mesh.dim == 2 and direction[2] and direction[:2].any():
             raise ModelError(
-                f"the axis of {self.name} is oblique to the plane: it lies in the plane or is normal to it"
+                f"the axis of {self.name} is oblique to the plane: it must lie in the plane or be normal to it"
             )
         if mesh.dim == 2 and origin[2]:
-            raise ModelError(f"the axis of {self.name} has the origin z = {origin[2]:g} beside the plane of the mesh")
+            raise ModelError(f"the axis of {self.name} has the origin z = {origin[2]:g} outside the plane of the mesh")
 
     def acceleration(self, x: Array, kinematics: str) -> Array:
         """Return speed^2 times the arm from the axis (..., dim) [length / time^2] at positions `x` (..., dim) [length]."""

@@ -46,23 +46,23 @@ def mass(mesh: Mesh, kinematics: str, density: DensityField) -> bsr_array:
             "body without mass"
         )
     if not matrix.data.any():
-        raise ModelError("all densities are zero, and what has no mass has no modes: give the materials density=...")
+        raise ModelError("all densities are zero, and a massless model has no modes: give the materials density=...")
     return matrix
 
 
 def stress_stiffness(mesh: Mesh, stresses: CellStress, material: Mapping[str, Any], axisymmetric: bool) -> bsr_array:
-    """Return the matrix (n_dofs, n_dofs) of the work of stresses on rotations of the material [force / length].
+    """Return the geometric or initial-stress stiffness (n_dofs, n_dofs) [force / length].
 
-    It is the geometric or initial-stress stiffness (Bathe, Finite Element Procedures, 2014, section 6.2.3): the integrals of
-    ``grad(N_a) . stress . grad(N_b)`` for every component, plus the hoop stress term of radial components in
-    axisymmetry, at the quadrature points of the stiffness.
+    It consists of the integrals of ``grad(N_a) . stress . grad(N_b)`` for every component, plus the hoop stress term of
+    radial components in axisymmetry, with the quadrature of the stiffness (Bathe, Finite Element Procedures, 2014, section
+    6.2.3).
 
     Parameters
     ----------
     mesh : Mesh
     stresses : CellStress
     material : mapping of str to ndarray of int (n_cells,) or (n_cells, n_q)
-        As for `stiffness`.
+        See `stiffness.stiffness`.
     axisymmetric : bool
     """
 
@@ -95,7 +95,7 @@ def _block_diagonal(mesh: Mesh, local: Callable[[str, Indices], Array]) -> bsr_a
 
 
 def assembled(mesh: Mesh, local: Callable[[str, Indices], Array]) -> tuple[Sparsity, Array]:
-    """Return the node pairs of a mesh, and their sums (n_pairs, k) of local matrices (n_cells, n_nodes, n_nodes, k)."""
+    """Return the node pairs of a mesh, and the sums (n_pairs, k) of local matrices (n_cells, n_nodes, n_nodes, k)."""
     pattern = sparsity(mesh)
     total = np.zeros((len(pattern.indices), 1))
     for name, rows in portions(mesh):

@@ -25,8 +25,9 @@ class Places:
     Attributes
     ----------
     material : int
+        Number of the material.
     first : int
-        Number of the first of them in `MaterialField.moduli`.
+        Row of the first of these points in `MaterialField.moduli`.
     points : ndarray (n, dim)
         Points at which axes are evaluated: the middles of cells, or their quadrature points [length].
     constants : SimpleNamespace
@@ -40,7 +41,7 @@ class Places:
 
     @property
     def rows(self) -> slice:
-        """The numbers of the moduli."""
+        """Rows of these points in `MaterialField.moduli`."""
         return slice(self.first, self.first + len(self.points))
 
 
@@ -74,7 +75,7 @@ class MaterialField:
 
     @property
     def loops(self) -> dict[str, Numbers]:
-        """Rows of moduli for the element loops, by solid element: `inside` if materials vary inside cells, else `rows`."""
+        """Rows of moduli for the element loops, by solid element: `inside` if materials vary in cells, otherwise `rows`."""
         return {**self.rows, **self.inside}
 
     @property
@@ -103,9 +104,9 @@ class MaterialField:
 
     @cached_property
     def contrast(self) -> float:
-        """Largest excess of a material's stiffness over that in its softest direction, over the latter, at least 1 [-].
+        """A third of the largest relative excess of a material's stiffest over its softest normal modulus, at least 1 [-].
 
-        For isotropic materials it is ``nu / (1 - 2 nu)``, which grows towards incompressibility: the eigenvalues of the
+        For isotropic materials it is ``nu / (1 - 2 nu)``, which grows towards incompressibility, since the eigenvalues of the
         moduli for normal strains are ``3 lambda + 2 mu`` and ``2 mu``.
         """
         normal = 2 if self.kinematics == "plane_stress" else 3
@@ -140,7 +141,7 @@ class MaterialField:
     def offset(
         self, rise: Array | None, states: Sequence[tuple[float, InitialState]] = (), n_points: int = 0
     ) -> StressOffset | None:
-        """Return the stress in addition to that of the displacements; None without any.
+        """Return the stress due to temperatures and initial states; None if there are none.
 
         Parameters
         ----------

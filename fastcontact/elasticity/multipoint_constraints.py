@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, diags_array, vstack
 from fastcontact.arrays import Array, Indices, Mask
 
 Table = tuple[tuple[float, float], ...]
-# Coefficients below this fraction of the largest of their row are round-off of a cancellation.
+# Coefficients below this fraction of the largest one of their row are round-off from cancellation.
 ZERO = 1e-10
 Row = dict[int, float]
 
@@ -29,7 +29,7 @@ class MultiPointConstraint:
     value : float or ndarray (m,)
         Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     ramp : tuple of (float, float), optional
-        Points (instant, multiplier) of its history; None: that of the analysis.
+        Points (instant, multiplier) of its ramp; None: the ramp of the analysis.
     """
 
     name: str
@@ -49,12 +49,12 @@ class TemporaryConstraint(MultiPointConstraint):
     rows : csr_array (m, n_dofs)
         Coefficients [unit of the caller].
     value : float or ndarray (m,)
-        At multiplier 1 of the ramp [length times the unit of the coefficients].
+        Right-hand sides at multiplier 1 of the ramp [length times the unit of the coefficients].
     begins, ends : float
         Instants at ends of load steps [-].
     keeps : bool
-        Whether it keeps the initial values, ignoring `value` and `ramp`; otherwise it proceeds from there to the next
-        point of its history.
+        Whether the constraint keeps its initial values, ignoring `value` and `ramp`; otherwise it proceeds from them to
+        the next point of its ramp.
     """
 
     begins: float = -np.inf
@@ -66,7 +66,7 @@ class TemporaryConstraint(MultiPointConstraint):
         return self.begins <= begin < self.ends
 
     def after(self, reached: Array) -> list[MultiPointConstraint]:
-        """Return the constraints that continue from ``rows @ u``, `reached` (m,) [length] at the beginning."""
+        """Return the constraints that continue from `reached` (m,) [length], the values of ``rows @ u`` at the beginning."""
         if self.keeps:
             return [MultiPointConstraint(self.name, self.rows, reached, ((0.0, 1.0),))]
         value, table = np.broadcast_to(self.value, reached.shape), self.ramp or ()
@@ -134,7 +134,7 @@ def eliminate(R: csr_array, known: Mask) -> Elimination:
         if not unknown:
             conditions[k] = row
             continue
-        # The component in the fewest constraints: those on which many others depend are kept.
+        # The pivot is the component in the fewest constraints, so that few expressions depend on it.
         pivot = min(unknown, key=lambda key: (uses[key], -abs(row[key]), key))
         coefficient = row.pop(pivot)
         _express(pivot, {key: -c / coefficient for key, c in row.items()}, expressed, users)

@@ -127,10 +127,10 @@ class NonlinearBodies:
         """Return the bodies at `displacement` (n_points, dim) [length], with the history `before` the load step.
 
         They expand by a temperature `rise` (n_points,) over the reference [temperature].
-        `geometric` selects the full tangent, or the tangent without the rotation of the mean pressure (1), or without
-        initial-stress stiffness (0): it is then positive definite farther from the solution, and where only contact
-        prevents the rotation of a body under load. Without `tangent` it is computed at its first use only: half the time
-        if it is never used, and one and a half times the time if it is.
+        `geometric` selects the full tangent (2), the tangent without the rotation of the mean pressure (1), or also without
+        initial-stress stiffness (0). The last one is positive definite farther from the solution, and where only contact
+        prevents the rotation of a body under load. Without `tangent`, K is computed only at its first use, which takes half
+        the time if K is never used, and one and a half times the time if it is.
 
         Raises
         ------
@@ -197,7 +197,7 @@ class NonlinearBodies:
         measure = np.linalg.det(self._deformation(name, displacement, slice(cell, cell + 1))[0]).min()
         failure = f"turns inside out (J = {measure:.3g})"
         if status != body_kernels.INVERTED:
-            failure = "finds no strain across its plane stress"
+            failure = "has no out-of-plane strain of zero stress"
         return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
@@ -220,7 +220,7 @@ class NonlinearBodies:
     def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
         """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells.
 
-        The stress that yields is the Kirchhoff stress: J (n_cells, n_q) times the Cauchy stress.
+        The yield condition applies to the Kirchhoff stress, J (n_cells, n_q) times the Cauchy stress.
         """
         history, owner = bodies.history[name], self._owner[self._cells[name]]
         strain = history[..., PLASTIC_STRAIN]
@@ -278,15 +278,15 @@ def nonlinear_bodies(mesh: Mesh, kinematics: str, strain: str, field: MaterialFi
 def check_law(law: Material, strain: str) -> None:
     """Raise ModelError if a material does not support these strains."""
     if isinstance(law, NonlinearElastic) and strain not in law.strains:
-        raise ModelError(f"{type(law).__name__} is for finite strains: take Model(..., strain='finite')")
+        raise ModelError(f"{type(law).__name__} requires finite strains: use Model(..., strain='finite')")
     if strain == "finite" and isinstance(law, ElasticPlastic) and law.kinematic:
-        raise ModelError("kinematic hardening is for small strains: leave kinematic out, or strain='finite'")
+        raise ModelError("kinematic hardening requires small strains: omit kinematic, or strain='finite'")
     if law.incompatible_modes and (strain == "finite" or isinstance(law, NonlinearElastic)):
-        raise ModelError("incompatible modes are available for linear bodies only: leave incompatible_modes out")
+        raise ModelError("incompatible modes are available only for linear bodies: omit incompatible_modes")
     if strain == "finite" and not isinstance(law, NonlinearElastic) and law.averaged:
         example = "NeoHookean(E=..., nu=...)" if isinstance(law, LinearElastic) else "a hyperelastic law"
         raise ModelError(
-            f"a nearly incompressible material ({law.described}) locks in elements of finite strains: take {example}"
+            f"a nearly incompressible material ({law.described}) locks in elements of finite strains: use {example}"
         )
 
 

@@ -1,4 +1,4 @@
-"""Stresses from displacements: at quadrature points, at element nodes, averaged at nodes; equivalent stresses."""
+"""Stresses from displacements, at quadrature points, at element nodes and averaged at nodes, and equivalent stresses."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def stress_at_points(
 ) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points.
 
-    Components xx, yy, zz, xy, in 3D also yz, xz; axisymmetric: rr, yy, hoop, ry.
+    Components are xx, yy, zz, xy, in 3D also yz, xz, and in axisymmetry rr, yy, hoop, ry.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def nodal_stress(
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
     Arguments are as for `stress_at_points`. Stresses at points are computed for a few cells at a time, which takes less
-    memory. With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
+    memory. With `sides` the average is over the cells of one material, (n_places, n_components) in the order of the places.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     places = mesh.cells if sides is None else sides.cells
@@ -95,7 +95,7 @@ def nodal_stress(
 
 
 class NodalAverage:
-    """The plain average, at each node, of the stresses of its cells there."""
+    """The plain average, at each node, of the stresses of the adjacent cells."""
 
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
@@ -108,11 +108,11 @@ class NodalAverage:
         """
         arguments = parallel.read_only(cells), extrapolation, values
         into = self._total, self._count
-        # For any dimension and number of components.
+        # The 2D kernel serves any dimension and number of components.
         parallel.shared(lambda portion: element_2d_kernels.add_nodal(*arguments, *portion, *into), self._parts(cells))
 
     def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
-        """Return ranges of nodes with about equal numbers of cells: each thread adds at its own nodes."""
+        """Return ranges of nodes with about equal numbers of cells; each thread adds at its own nodes."""
         some = np.sort(cells[::SAMPLED, 0])
         count = len(parallel.portions(*cells.shape)) if len(some) else 1
         ends = [0, *(int(some[k * len(some) // count]) for k in range(1, count)), len(self._count)]
@@ -128,7 +128,8 @@ class NodalAverage:
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
 
-    By `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO of code_aster.
+    They are extrapolated by `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO
+    of code_aster.
     """
     return {
         name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
@@ -139,8 +140,9 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
 def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides | None = None) -> Array:
     """Return the stress (n_points, n_components) [pressure] at the nodes: the plain average over the cells at each node.
 
-    From `at_points` (n_cells, n_q, n_components) [pressure], as SIEF_NOEU of code_aster; zero at points without solid cell.
-    With `sides` the average is over the cells of one material, (n_places, n_components) in their order.
+    The cells have the stresses `at_points` (n_cells, n_q, n_components) [pressure], as for SIEF_NOEU of code_aster. Points
+    without a solid cell have zero stress. With `sides` the average is over the cells of one material, (n_places,
+    n_components) in the order of the places.
     """
     cells, count = (mesh.cells, mesh.n_points) if sides is None else (sides.cells, len(sides.node))
     average = NodalAverage(count, next(iter(at_points.values())).shape[2])
@@ -167,7 +169,7 @@ def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> 
 def von_mises(stress: Array) -> Array:
     """Return the equivalent stress (...) [pressure] of `stress` (..., n_components) [pressure] (von Mises, 1913).
 
-    Components xx, yy, zz, xy, in 3D also yz, xz.
+    Components are xx, yy, zz, xy, in 3D also yz, xz.
     """
     stress = _with_components(stress)
     xx, yy, zz = stress[..., 0], stress[..., 1], stress[..., 2]
@@ -176,7 +178,7 @@ def von_mises(stress: Array) -> Array:
 
 
 def _with_components(stress: Array) -> Array:
-    """Return stresses or strains (..., n_components) as an array; ModelError where there are no four or six components."""
+    """Return stresses or strains (..., n_components) as an array; ModelError unless there are four or six components."""
     stress = np.asarray(stress, float)
     if stress.shape[-1:] not in ((4,), (6,)):
         raise ModelError(
@@ -187,9 +189,9 @@ def _with_components(stress: Array) -> Array:
 
 @typed(ModelError)
 def equivalent_strain(strain: Array) -> Array:
-    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-], the von Mises stress over 3 G if isotropic.
+    """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-].
 
-    Components xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
+    In isotropic materials it is the von Mises stress divided by 3 G. Components are xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
     """
     strain = _with_components(strain)
     tensor = strain * np.array([1.0] * 3 + [0.5] * (strain.shape[-1] - 3))
@@ -200,7 +202,7 @@ def equivalent_strain(strain: Array) -> Array:
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
 
-    Of `stress` (..., n_components) [pressure]; `equivalent` (...) [pressure] is its von Mises stress, where known already.
+    The von Mises stress of `stress` (..., n_components) [pressure] is `equivalent` (...) [pressure], if known.
     """
     stress = _with_components(stress)
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]

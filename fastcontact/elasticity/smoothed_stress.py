@@ -2,9 +2,9 @@
 
 At the centres of linear cells, and at the reduced Gauss points of quadratic ones, stresses are more accurate than elsewhere
 (Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.
-Polynomials fitted to patches of cells (Zienkiewicz and Zhu, 1992) are worse near the edge of a contact, where the pressure
-falls like a square root: they smear the fall over two cells, and the error of quadratic cells is overestimated two to four
-times.
+Polynomials fitted to patches of cells (Zienkiewicz and Zhu, 1992) are less accurate near the edge of a contact, where the
+pressure decreases like a square root: they smooth the decrease over two cells, and overestimate the error of quadratic cells
+two to four times.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def smoothed_stress(
 ) -> dict[str, Array]:
     """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each solid cell, by element type.
 
-    It is the same at a node for all cells of one material.
+    At a node all cells of one material have the same stress.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ class Springs:
     rows : csr_array (m, n_dofs)
         Rows that yield the elongation of each spring from the displacements [-].
     stiffness : ndarray (m,)
-        [force / length]; in axisymmetry over the full circle.
+        Stiffness [force / length]; in axisymmetry over the full circle.
     grounded : bool
         Whether the springs connect nodes to the ground, not to other nodes.
     """
@@ -78,9 +78,9 @@ def joined(
     """Return springs between pairs of the `points` (n_points, dim) [length].
 
     `ends` (n,) of int each are the first and the second points. Springs act along every axis in `stiffness`
-    [force / length]; those of the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along and
-    across the line of a pair, or the unit vector `direction` (dim,) [-]. ModelError if the two points of a pair are the same
-    point, or are at the same place, so that no line connects them.
+    [force / length]; those with the stiffnesses ``along["axial"]`` and ``along["transverse"]`` [force / length] act along
+    and across the line of a pair, or the unit vector `direction` (dim,) [-]. Raises ModelError if both points of a pair are
+    the same point, or if they coincide where the line between them is needed.
     """
     rows, values = [], []
     for first, second in np.transpose(ends).tolist():
@@ -103,8 +103,8 @@ def _line(name: str, points: Array, first: int, second: int) -> Array:
     length = float(np.linalg.norm(line))
     if length <= ROUND_OFF * np.abs(points).max():
         raise ModelError(
-            f"{name}: points {first} and {second} are at the same place and have no line between them: give x, y or "
-            "z instead of axial, or a direction"
+            f"{name}: points {first} and {second} coincide, and have no line between them: give x, y or z instead of "
+            "axial, or a direction"
         )
     return np.asarray(line / length)
 
@@ -174,7 +174,7 @@ def too_stiff(K: bsr_array, springs: Sequence[Springs]) -> list[str]:
             continue
         text = f"{spring.name} is {ratio:.1e} times as stiff as the body at one of its ends ({body:.3g})"
         softer = 0.1 * WARNING_RATIO * body
-        instead = f"take {softer:.0e} or less, or a relation (relate, relate_groups), which is rigid and exact"
+        instead = f"use {softer:.0e} or less, or a multi-point constraint (relate, relate_groups), which is exact"
         lost = round(math.log10(ratio))
         if ratio > ERROR_RATIO:
             left = "no digit" if lost >= DIGITS else f"{DIGITS - lost} of {DIGITS} digits"

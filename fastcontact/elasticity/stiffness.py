@@ -1,4 +1,4 @@
-"""Stiffness matrix of a mesh: its sparsity, computed once, and its values; rigid-body modes."""
+"""Stiffness matrix of a mesh, whose sparsity is computed once, and rigid-body modes."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def is_isotropic(moduli: Array) -> Mask:
     Parameters
     ----------
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
-        [pressure]
+        Moduli [pressure].
     """
     shear, size = moduli[:, 3, 3, None], moduli.shape[1]
     isotropic = np.zeros_like(moduli)
@@ -162,9 +162,9 @@ def is_isotropic(moduli: Array) -> Mask:
 
 
 def of_cells(material: Numbers) -> Numbers:
-    """Return one material number for each cell (n_cells,) of int, unique if nothing varies inside the cell.
+    """Return one material number for each cell (n_cells,) of int, that of its first quadrature point.
 
-    The argument `material` (n_cells,) of int may also be (n_cells, n_q).
+    The argument `material` (n_cells,) of int may also be given at quadrature points (n_cells, n_q).
     """
     return material if material.ndim == 1 else np.ascontiguousarray(material[:, 0])
 
@@ -241,8 +241,8 @@ def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indic
 def rigid_modes(points: Array, kinematics: str) -> Array:
     """Return the rigid-body modes (n_points * dim, n_modes) [-], displacements of `points` (n_points, dim) [length].
 
-    Columns: axisymmetric, the translation along the axis; plane, two translations and the rotation; 3D, three translations
-    and three rotations [length]. Rotations turn about the mean point.
+    The columns are the translation along the axis in axisymmetry, two translations and the rotation in the plane, and three
+    translations and three rotations in 3D [length]. Rotations are about the mean point.
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]

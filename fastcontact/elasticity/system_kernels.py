@@ -28,10 +28,11 @@ def take_out(indptr, indices, data, supported, supported_nodes, pivots, low, hig
     low, high : int
         Block rows `low` to ``high - 1`` are processed.
     start : (n + 1,)
-        Row offsets; unless the kernel `moves` numbers, it fills ``start[row + 1]`` with the number of entries.
+        Row offsets; unless `moves`, ``start[row + 1]`` is filled with the number of entries.
     columns, removed : (n_removed,)
-        Filled if it `moves` numbers.
+        Filled if `moves`.
     moves : bool
+        Whether to move numbers, instead of counting them.
     """
     size = data.shape[1]
     for i in range(low, high):

@@ -39,9 +39,9 @@ class Temperature:
     ramp : tuple, optional
         Ramp of the temperature rise over the reference.
     times : tuple of float
-        Instants of the history to which it belongs, if any.
+        Instants of the history to which the temperature belongs, if any.
     place : int
-        Index of its own instant in `times`.
+        Index of the instant of this temperature in `times`.
     """
 
     groups: tuple[str, ...] | None
@@ -59,7 +59,7 @@ class Temperature:
 
     @property
     def places(self) -> tuple[str, ...]:
-        """Names of its groups."""
+        """Names of the groups."""
         return (EVERYWHERE,) if self.groups is None else self.groups
 
     def check(self, mesh: Mesh) -> None:
@@ -101,9 +101,9 @@ def histories(
     ----------
     groups : tuple of str or None
     values : ndarray (n_instants, n_points)
-        [temperature]
+        Temperatures [temperature].
     reference : float
-        [temperature]
+        Temperature without thermal strain [temperature].
     times : sequence of float
         Ascending load factors of the instants.
 

@@ -53,14 +53,15 @@ class TemporaryHeat(Load):
         """Raise MeshError or ModelError if the load cannot act on this mesh."""
         super().check(mesh, kinematics)
         if not self.begins < self.ends:
-            raise ModelError(f"{self.name} begins at {self.begins:g} and ends at {self.ends:g}: it must begin before")
+            raise ModelError(f"{self.name} begins at {self.begins:g} and ends at {self.ends:g}: it must begin earlier")
 
 
 @dataclass(frozen=True)
 class FixedTemperature(TemporaryHeat):
     """A prescribed temperature of the nodes of a group [temperature]; histories multiply its rise above the reference.
 
-    One that begins later starts from the current rise, `reached` (n_points,), and leads to the next point of its history.
+    A temperature that begins later starts from the current rise, `reached` (n_points,), and proceeds to the next point of
+    its ramp.
     """
 
     KIND = "the temperature"
@@ -76,12 +77,12 @@ class FixedTemperature(TemporaryHeat):
         super().check(mesh, kinematics)
         if self.begins > -np.inf and self.ramp is None:
             raise ModelError(
-                f"{self.name} begins at {self.begins:g} without a ramp: give it one; it starts from the temperature "
-                "found then, and goes on to the next point of the ramp"
+                f"{self.name} begins at {self.begins:g} without a ramp: give it a ramp; it starts from the current "
+                "temperature and proceeds to the next point of the ramp"
             )
 
     def history(self) -> tuple[Table | None, Table]:
-        """Return the histories of the value and of the initial rise, which fades out as the value fades in."""
+        """Return the ramps of the value and of the initial rise, which decreases to zero while the value sets in."""
         later = [point for point in self.ramp or () if point[0] > self.begins]
         if self.reached is None or not later:
             return self.ramp, ()
@@ -137,7 +138,7 @@ class NodalHeat(Heating):
         check_points(mesh, self.group, "nothing can heat it")
 
     def power(self, mesh: Mesh, kinematics: str, deformed: Mesh) -> Array:
-        """As for other heat loads."""
+        """Return the powers, as for other heat loads."""
         total, nodes = np.zeros(mesh.n_points), mesh.points_of(self.group)
         total[nodes] = evaluated(self.value, mesh.points[nodes], self.name)
         return total
@@ -151,7 +152,7 @@ class Film(TemporaryHeat):
     ----------
     group : str
     coefficient : float or callable
-        [power / (area temperature)].
+        Film coefficient [power / (area temperature)].
     ambient : float or callable
         Temperature of the surroundings [temperature]; histories multiply its rise above the reference.
     """

@@ -46,7 +46,7 @@ def weighted_area_vectors(
     Returns
     -------
     vectors : ndarray (n, k, dim)
-        [area]
+        Integrals [area].
     derivative : ndarray (n, k, dim, k, dim)
         Derivative with respect to the nodes, whose indices come last [length].
     """

@@ -20,7 +20,7 @@ def transposed(dN):
 
 @innermost_kernel
 def jacobian_2d(x, slopes, q):
-    """Return the four entries of J, row by row, of the nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
+    """Return the four entries of J, row by row, for nodes x (2, n_nodes) at point q of the slopes (n_q, 2, n_nodes)."""
     j00 = j01 = j10 = j11 = 0.0
     for a in range(x.shape[1]):
         r, s = slopes[q, 0, a], slopes[q, 1, a]

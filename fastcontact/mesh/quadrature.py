@@ -16,49 +16,49 @@ Rule = tuple[Array, Array]
 
 @cache  # used in every pairing of mortar in two dimensions
 def gauss_line(n: int) -> Rule:
-    """Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
+    """Return the Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)
     return points.reshape(-1, 1), weights
 
 
 def simpson_line() -> Rule:
-    """Simpson's rule on [-1, 1], exact to degree 3."""
+    """Return Simpson's rule on [-1, 1], exact to degree 3."""
     return np.array([[-1.0], [1.0], [0.0]]), np.array([1.0, 1.0, 4.0]) / 3.0
 
 
 def gauss_square(n: int) -> Rule:
-    """Tensor Gauss rule with n x n points on [-1, 1]^2."""
+    """Return the tensor Gauss rule with n x n points on [-1, 1]^2."""
     return square(gauss_line(n))
 
 
 def triangle_1() -> Rule:
-    """Centroid rule on the triangle (0,0) (1,0) (0,1), exact to degree 1."""
+    """Return the centroid rule on the triangle (0, 0), (1, 0), (0, 1), exact to degree 1."""
     return np.array([[1.0, 1.0]]) / 3.0, np.array([0.5])
 
 
 def triangle_3() -> Rule:
-    """Three interior points, exact to degree 2 (Strang and Fix, 1973)."""
+    """Return the rule of three interior points of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
     return np.array([[1.0, 1.0], [4.0, 1.0], [1.0, 4.0]]) / 6.0, np.full(3, 1.0 / 6.0)
 
 
 def triangle_6() -> Rule:
-    """Six interior points, exact to degree 4 (Dunavant, 1985)."""
+    """Return the rule of six interior points of the triangle, exact to degree 4 (Dunavant, 1985)."""
     return _symmetric([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
 
 
 def triangle_3_sides() -> Rule:
-    """Middles of the three sides, exact to degree 2 (Strang and Fix, 1973)."""
+    """Return the rule of the middles of the sides of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
     return np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]]) / 2.0, np.full(3, 1.0 / 6.0)
 
 
 def triangle_7() -> Rule:
-    """Seven interior points, exact to degree 5 (Radon, 1948)."""
+    """Return the rule of seven interior points of the triangle, exact to degree 5 (Radon, 1948)."""
     roots = np.sqrt(15.0) * np.array([1.0, -1.0])
     return _symmetric([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
 
 
 def triangle_12() -> Rule:
-    """Twelve interior points, exact to degree 6 (Dunavant, 1985)."""
+    """Return the rule of twelve interior points of the triangle, exact to degree 6 (Dunavant, 1985)."""
     return _symmetric(
         [],
         [(0.1167862757263978, 0.2492867451708992), (0.05084490637020978, 0.06308901449150417)],
@@ -67,7 +67,7 @@ def triangle_12() -> Rule:
 
 
 def triangle_16() -> Rule:
-    """Sixteen interior points, exact to degree 8 (Dunavant, 1985)."""
+    """Return the rule of sixteen interior points of the triangle, exact to degree 8 (Dunavant, 1985)."""
     return _symmetric(
         [0.144315607677777],
         [
@@ -98,7 +98,10 @@ def triangle(degree: int) -> Rule:
 
 
 def triangle_7_closed() -> Rule:
-    """Corners, middles of the sides and centre, exact to degree 3, all weights positive (Hammer and Stroud, 1956)."""
+    """Return the rule of the corners, the middles of the sides and the centre of the triangle.
+
+    It is exact to degree 3, and all weights are positive (Hammer and Stroud, 1956).
+    """
     points = np.array([[0, 0], [6, 0], [0, 6], [3, 0], [3, 3], [0, 3], [2, 2]]) / 6.0
     return points, np.array([3.0, 3.0, 3.0, 8.0, 8.0, 8.0, 27.0]) / 120.0
 
@@ -127,36 +130,40 @@ def _merged(points: Array, weights: Array) -> Rule:
 
 
 def gauss_cube(n: int) -> Rule:
-    """Tensor Gauss rule with n x n x n points on [-1, 1]^3."""
+    """Return the tensor Gauss rule with n x n x n points on [-1, 1]^3."""
     x, w = np.polynomial.legendre.leggauss(n)
     X, Y, Z = np.meshgrid(x, x, x, indexing="ij")
     return np.column_stack([X.ravel(), Y.ravel(), Z.ravel()]), np.einsum("i,j,k->ijk", w, w, w).ravel()
 
 
 def tetrahedron_1() -> Rule:
-    """Centroid rule on the tetrahedron (0,0,0) (1,0,0) (0,1,0) (0,0,1), exact to degree 1."""
+    """Return the centroid rule on the tetrahedron (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), exact to degree 1."""
     return np.full((1, 3), 0.25), np.array([1.0 / 6.0])
 
 
 def tetrahedron_5() -> Rule:
-    """Five points, exact to degree 3; the weight of the centroid is negative (Hammer, Marlowe and Stroud, 1956)."""
+    """Return the rule of five points of the tetrahedron, exact to degree 3 (Hammer, Marlowe and Stroud, 1956).
+
+    The weight of the centroid is negative.
+    """
     a, b = 1.0 / 6.0, 0.5
     points = [[0.25, 0.25, 0.25], [a, a, a], [a, a, b], [a, b, a], [b, a, a]]
     return np.array(points), np.array([-2.0 / 15.0] + [3.0 / 40.0] * 4)
 
 
 def prism(triangle: Rule, line: Rule) -> Rule:
-    """Product of a rule on the triangle, in x and y, with a rule on the line [-1, 1], in z."""
+    """Return the product of a rule on the triangle, in x and y, with a rule on the line [-1, 1], in z."""
     (xy, w), (z, v) = triangle, line
     points = np.column_stack([np.tile(xy, (len(z), 1)), np.repeat(z[:, 0], len(xy))])
     return points, np.outer(v, w).ravel()
 
 
 def pyramid_5() -> Rule:
-    """Five points on the pyramid with the base [-1, 1]^2 at z = 0 and the apex (0, 0, 1), exact to degree 2.
+    """Return the rule of five points of the pyramid with base [-1, 1]^2 at z = 0 and apex (0, 0, 1), exact to degree 2.
 
-    Four points over the half diagonals of the base and one on the axis, equal weights; the two heights h, k solve
-    4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, which makes 1, z and z^2 exact. code_aster has the same rule in PYRAM5.
+    Four points lie above the middles of the half diagonals of the base and one on the axis, with equal weights. The heights h
+    and k solve 4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, so that 1, z and z^2 are integrated exactly. code_aster has the same rule
+    in PYRAM5.
     """
     h, k = (10.0 - np.sqrt(15.0)) / 40.0, 0.25 + np.sqrt(15.0) / 10.0
     points = [[0.5, 0.5, h], [-0.5, 0.5, h], [-0.5, -0.5, h], [0.5, -0.5, h], [0.0, 0.0, k]]
@@ -164,10 +171,11 @@ def pyramid_5() -> Rule:
 
 
 def conical_pyramid(n: int) -> Rule:
-    """Conical product rule with n x n x n points on the pyramid of `pyramid_5`, exact to degree 2n - 1.
+    """Return the conical product rule with n x n x n points on the pyramid of `pyramid_5`, exact to degree 2n - 1.
 
-    Gauss-Legendre in x / (1 - z) and y / (1 - z), Gauss-Jacobi with the weight (1 - z)^2 in z (Stroud, 1971, section
-    2.5). Rational shape functions of pyramids are polynomials in those coordinates, so it is exact for them too.
+    It is a Gauss-Legendre rule in x / (1 - z) and y / (1 - z), and a Gauss-Jacobi rule with the weight (1 - z)^2 in z
+    (Stroud, 1971, section 2.5). It is also exact for the rational shape functions of pyramids, which are polynomials in these
+    coordinates.
     """
     x, w = np.polynomial.legendre.leggauss(n)
     z, v = _gauss_squared_complement(n)
@@ -177,9 +185,9 @@ def conical_pyramid(n: int) -> Rule:
 
 
 def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
-    """Gauss rule with `n` points on [0, 1] for the weight (1 - z)^2 (Golub and Welsch, 1969).
+    """Return the Gauss rule with `n` points on [0, 1] for the weight (1 - z)^2 (Golub and Welsch, 1969).
 
-    Eigenvalues of the recurrence of the Jacobi polynomials with exponents 2 and 0.
+    Its points follow from the eigenvalues of the recurrence matrix of the Jacobi polynomials with exponents 2 and 0.
     """
     k = np.arange(n)
     diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
@@ -192,7 +200,7 @@ def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
 def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
     """Return a product rule with `n` points along each direction on the reference cell of a linear element.
 
-    Along the Cartesian directions of squares, cubes and prisms, `straight` points if given.
+    The Cartesian directions of squares, cubes and prisms have `straight` points instead, if given.
     """
     m = n if straight is None else straight
     return {
@@ -215,9 +223,9 @@ def subdivided(rule: Rule, count: int) -> Rule:
 
 
 def collapsed_triangle(n: int) -> Rule:
-    """Product rule with n x n points on the triangle (0,0) (1,0) (0,1), exact to degree 2n - 2.
+    """Return the product rule with n x n points on the triangle (0, 0), (1, 0), (0, 1), exact to degree 2n - 2.
 
-    Gauss-Legendre in x and in y / (1 - x) (Stroud, 1971, section 2.4).
+    It is a Gauss-Legendre rule in x and in y / (1 - x) (Stroud, 1971, section 2.4).
     """
     s, w = np.polynomial.legendre.leggauss(n)
     s, w = (1.0 + s) / 2.0, w / 2.0
@@ -226,9 +234,9 @@ def collapsed_triangle(n: int) -> Rule:
 
 
 def collapsed_tetrahedron(n: int) -> Rule:
-    """Product rule with n x n x n points on the tetrahedron of `tetrahedron_1`, exact to degree 2n - 3.
+    """Return the product rule with n x n x n points on the tetrahedron of `tetrahedron_1`, exact to degree 2n - 3.
 
-    The triangle's rule once more (Stroud, 1971, section 2.4).
+    It extends `collapsed_triangle` in the same way by one dimension (Stroud, 1971, section 2.4).
     """
     s, w = np.polynomial.legendre.leggauss(n)
     s, w = (1.0 + s) / 2.0, w / 2.0

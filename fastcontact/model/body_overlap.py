@@ -21,7 +21,7 @@ ON_SURFACE = 1e-10
 def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[int, int, float, Array]]:
     """Return (body, other, depth, where) for each pair of bodies of which the first has nodes inside the second.
 
-    Depth is the largest of `depths` [length].
+    `depth` is the largest of the depths of the pair in `depths` [length], and `where` (dim,) its position [length].
     """
     overlaps = []
     for number, other, points, depth in depths(mesh, kinematics, coordinates):
@@ -34,10 +34,10 @@ def penetration(mesh: Mesh, kinematics: str, coordinates: Array) -> list[tuple[i
 def depths(mesh: Mesh, kinematics: str, coordinates: Array) -> Iterator[tuple[int, int, Indices, Array]]:
     """Yield (body, other, points (n,), depth (n,)) for each pair of bodies that may overlap.
 
-    Depths are distances of points on the outside of the first body to the outside of the second, zero where they do not lie
-    in it [length]. The axis of an axisymmetric body is not part of its outside. Facets are treated as curved. Two meshes of a
-    smooth curved surface deviate from it, each by less than the square of the rise of a facet over its length: within this
-    tolerance bodies touch and do not overlap.
+    Depths are the distances of points on the outside of the first body to the outside of the second, and zero for points that
+    do not lie in the second body [length]. The axis of an axisymmetric body is not part of its outside. Facets are treated as
+    curved. Each of two meshes of a smooth curved surface deviates from it by less than the square of the rise of a facet over
+    its length; within this tolerance bodies touch and do not overlap.
     """
     count, body = bodies(mesh)
     if count < 2:

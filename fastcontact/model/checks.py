@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
-    """Raise ModelError if bodies, or parts of them at hinges, can move without deforming, naming bodies and motions."""
+    """Raise ModelError, with names of bodies and motions, if bodies or their parts at hinges have rigid-body motions."""
     if not len(motions):
         return
     total = len(motions)
@@ -59,7 +59,7 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
 def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
     """Raise ModelError if `forces` (n_points, dim) [force] act on points without solid cell.
 
-    Points with multi-point constraints, `related` (n_points,) of bool, are left out.
+    Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
     """
     lost = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
     if len(lost):
@@ -80,7 +80,7 @@ def _carried(mesh: Mesh, related: Mask) -> Mask:
 def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mask) -> None:
     """Raise ModelError if all points of a support (name, group) are without solid cell.
 
-    Points with multi-point constraints, `related` (n_points,) of bool, are left out.
+    Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
     """
     carried = _carried(mesh, related)
     for name, group in supports:
@@ -95,7 +95,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
 def check_penetration(name: str, pair: Formulation) -> None:
     """Raise ContactError if the sides of contact pair `name` penetrate by more than an element before any load.
 
-    An intended interference is smaller, or given as a clearance.
+    An intended interference is smaller, or is given by the option `clearance`.
     """
     gap, _ = initial_gaps(pair)
     size = facet_lengths(pair)
@@ -119,9 +119,9 @@ def facet_lengths(pair: Formulation) -> Array:
 
 
 def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
-    """Return gaps (n_nodes,) before any load, clearances counting where they open them [length], and normals (n_nodes, dim).
+    """Return gaps (n_nodes,) before any load, with clearances that increase them [length], and normals (n_nodes, dim).
 
-    Infinite at nodes that face nothing or are excluded, and where penetration is admissible: in tied pairs and gap_only.
+    Gaps are infinite at nodes that face nothing or are excluded, and in pairs that admit penetration: tied and gap_only.
     """
     if pair.options.tied or pair.options.gap_only:
         shape = len(pair.secondary.points), pair.points.shape[1]

@@ -1,4 +1,4 @@
-"""A contact pair as a user describes it."""
+"""The user's description of a contact pair."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Driving = tuple[float | None, ...]
 
 @dataclass(frozen=True)
 class FluidPressure:
-    """Fluid of a `pressure` at multiplier 1 [pressure] from the group `source`, with its history or None."""
+    """Fluid of a `pressure` at multiplier 1 [pressure] from the group `source`, with its ramp or None."""
 
     pressure: float
     source: str
@@ -26,12 +26,12 @@ class FluidPressure:
 
 @dataclass(frozen=True)
 class ContactPair:
-    """Two groups of facets that may touch, or one and a rigid obstacle, with a formulation and its options.
+    """Two groups of facets that may touch, or a group and a rigid obstacle, with a formulation and its options.
 
     With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp` its
-    history or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. It rotates by
-    `rotation`, with the history `rotation_ramp`, by default `ramp`. An automatically detected pair has the smallest gap at
-    detection, `found_gap` [length].
+    ramp or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. The obstacle rotates by
+    `rotation` along `rotation_ramp`, by default `ramp`. For automatically detected pairs, `found_gap` is the smallest gap at
+    detection [length].
     """
 
     name: str
@@ -55,12 +55,12 @@ class ContactPair:
 
     @property
     def clearance_ramp(self) -> Table | None:
-        """History of the clearance; None if it is constant."""
+        """Ramp of the clearance; None if it is constant."""
         return clearance_ramp(self.name, self.options)
 
     @property
     def friction_ramp(self) -> Table | None:
-        """History of the coefficient of friction; None if it is constant."""
+        """Ramp of the coefficient of friction; None if it is constant."""
         return friction_ramp(self.name, self.options)
 
     @property

@@ -1,8 +1,8 @@
 """Reference points coupled with groups, and forces and moments distributed over groups.
 
-In a rigid coupling all nodes follow the reference point, in a distributing one it follows their mean motion. A reference
-point has no cells. Its rotation, for small angles, is the displacement of a second point at the same position [radian]:
-about x, y and z in three dimensions, about z as the first component in two.
+In a rigid coupling all nodes follow the reference point; in a distributing coupling the reference point follows their mean
+motion. A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same
+position [radian]: about x, y and z in three dimensions, about z as the first component in two.
 """
 
 from __future__ import annotations
@@ -40,11 +40,11 @@ class Spread:
     Attributes
     ----------
     place : tuple of float (dim,)
-        [length]
+        Point from which distances count [length].
     weighting : str
         ``"uniform"``, ``"linear"``, ``"quadratic"`` or ``"cubic"``.
     radius : float or None
-        Distance beyond which weights are zero [length]; None: that of the farthest node.
+        Distance beyond which weights are zero [length]; None: the distance of the farthest node.
     """
 
     place: tuple[float, ...]
@@ -52,9 +52,9 @@ class Spread:
     radius: float | None = None
 
     def check(self, name: str, dim: int) -> None:
-        """Raise ModelError, with the `name` of the load, if it is not admissible."""
+        """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(f"{name}: the place {self.place} it is spread about must be {dim} numbers")
+            raise ModelError(f"{name}: the point {self.place} about which it is distributed must be {dim} numbers")
         for number in self.place:
             check_number(f"a coordinate of the place of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
@@ -74,7 +74,7 @@ def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: 
     if point is None:
         if weighting != "uniform" or radius is not None:
             raise ModelError(
-                f"{name} has a weighting or a radius, but no place from which distances count: give at=..."
+                f"{name} has a weighting or a radius, but no point from which distances count: give at=..."
             )
         return None
     return Spread(tuple(float(v) for v in point), weighting, radius)
@@ -83,8 +83,8 @@ def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: 
 def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Indices, Array]:
     """Return the points (n,) of a group, and their shares (n,) of a distributed load [-].
 
-    Shares are proportional to area, if the group has facets, times the weights of `spread`. Raises ModelError if nothing lies
-    inside its radius.
+    Shares are proportional to area, if the group has facets, times the weights of `spread`. Raises ModelError if no part of
+    the group lies within its radius.
     """
     points, radius = mesh.points_of(group).astype(np.intp), 0.0
     if spread is not None and len(points):
@@ -101,7 +101,7 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
     total = float(shares.sum())
     if len(points) and not total > 0.0:
         raise ModelError(
-            f"no part of '{group}' lies within the radius it is spread over: take a larger radius, or another place"
+            f"no part of '{group}' lies within the radius of the distribution: use a larger radius, or another point"
         )
     return points, shares / total if len(points) else shares
 
@@ -109,14 +109,14 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
 def mean_rotation(weight: Array, arms: Array) -> Array:
     """Return the coefficients (n_rotations, n, dim) of the displacements of n points in their mean rotation [1 / length].
 
-    The points have `weight` (n,) [-] and `arms` (n, dim) from their centroid [length]. Products with moments are forces
-    at the points with this moment, and no resultant.
+    The points have `weight` (n,) [-] and `arms` (n, dim) from their centroid [length]. Products of the coefficients with
+    moments are forces at the points that have these moments and no resultant.
     """
     motion = by_rotation(arms)
     inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)
     if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
         raise ModelError(
-            "the points lie in one line or place, so they have no mean rotation about it: take a wider group"
+            "the points are collinear or coincide, so that they have no mean rotation about that line: use a wider group"
         )
     return np.einsum("kl,ndl,n->knd", np.linalg.inv(inertia), motion, weight)
 
@@ -149,7 +149,7 @@ class SpreadForce(Load):
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
-            raise ModelError(f"{self.name}: in axisymmetry no force acts through a place: give a traction that varies")
+            raise ModelError(f"{self.name}: in axisymmetry a force cannot act at a point: use a varying traction")
         if not len(mesh.points_of(self.group)):
             raise MeshError(f"{self.name}: the group is empty")
         self.spread.check(self.name, mesh.dim)
@@ -175,7 +175,7 @@ class SpreadForce(Load):
 
 @dataclass(frozen=True)
 class Moment(Load):
-    """Components of a moment [force times length] by the axis they turn about, on a reference point or over a group."""
+    """Components of a moment [force times length] about the axes, on a reference point or distributed over a group."""
 
     KIND = "the moment"
     CONSTANT = True
@@ -185,7 +185,7 @@ class Moment(Load):
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
-            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model, over the circle it is zero")
+            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model (zero over the circle)")
         if not len(mesh.points_of(self.group)):
             raise MeshError(f"{self.name}: the group is empty")
 
@@ -216,7 +216,7 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
     """Return a reference point by the name of its group; ModelError if there is none of that name."""
     if name + ROTATION not in mesh.point_groups:
         raise ModelError(
-            f"'{name}' is not a reference point: make the model of "
+            f"'{name}' is not a reference point: build the model on "
             f"fc.generate.with_reference_points(mesh, {{'{name}': (...)}})"
         )
     point = mesh.point(name)
@@ -263,7 +263,7 @@ def distributing_rows(
 ) -> csr_array:
     """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
-    The rotation is that of least squares, ``J theta = sum of w r x u`` with r from the middle of the points.
+    The rotation is determined by least squares, ``J theta = sum of w r x u`` with r from the weighted mean of the points.
 
     Parameters
     ----------
@@ -315,7 +315,7 @@ def coupling(
     check_known("kind of coupling", kind, KINDS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
-            f"{name}: in axisymmetry nothing can rotate; use couple('{names[1]}', 'y') to move a group as one"
+            f"{name}: in axisymmetry there are no rotations; use couple('{names[1]}', 'y') to move a group as a whole"
         )
     if kind == "distributing" and len(axes) < mesh.dim:
         raise ModelError(f"{name}: a distributing coupling has all components of the displacement")
@@ -323,7 +323,7 @@ def coupling(
     spread = None
     if weighting != ("uniform", None):
         if kind == "rigid":
-            raise ModelError(f"{name}: in a rigid coupling all nodes follow alike, without weighting or radius")
+            raise ModelError(f"{name}: a rigid coupling has no weighting or radius, since all nodes follow the point")
         spread = Spread(reference.place, *weighting)
         spread.check(name, mesh.dim)
     points, weight = shares_of(mesh, kinematics, names[1], spread)

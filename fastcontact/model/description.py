@@ -110,7 +110,7 @@ def _value(value: Any) -> str:
 
 
 def _history(ramp: Any) -> str:
-    return "" if ramp is None else ", with a history of its own"
+    return "" if ramp is None else ", with a separate history"
 
 
 def _contact(model: Any, pair: ContactPair) -> str:

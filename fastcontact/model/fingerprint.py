@@ -1,8 +1,8 @@
 """Fingerprints of models: short digests of each part. Models with equal fingerprints have equal results.
 
-Numbers are compared bit for bit, functions by their values at the points on which they act. Names of groups are included; the
-order in which loads and supports were added is not, nor is anything that may change when an analysis is resumed: titles, the
-linear solver, tolerances and limits.
+Numbers must be bitwise identical; functions are compared by their values at the points on which they act. Names of groups
+are included. The order in which loads and supports were added is not included, nor is anything that may change when an
+analysis is resumed: titles, the linear solver, tolerances and limits.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
 
 
 def formulation_behind(model: Model, name: str, digest: str | None) -> str | None:
-    """Return the formulation with which a pair has an earlier `digest`, if this is the only difference, else None.
+    """Return the formulation with which a pair has an earlier `digest`; None if the pair differs in anything else.
 
     Pairs without a formulation had other defaults in earlier versions.
     """
@@ -149,10 +149,10 @@ def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: A
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
         _take(_called(value, points), add, mesh, points)
-    if is_material:  # a density or expansion that is not given counts as little as in older files
+    if is_material:  # constants that are not given do not count, as in older files
         fields = [field for field in fields if getattr(value, field.name) is not None]
         fields = [field for field in fields if field.name != "incompatible_modes"]
-    if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # likewise
+    if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # as in older files
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, TemporaryHeat):
         fields = [field for field in fields if field.name not in ("begins", "ends", "reached") or value.temporary]

@@ -1,9 +1,10 @@
-"""Rigid obstacles moved by forces: each is a body of one additional point, without stiffness, that only contact holds.
+"""Rigid obstacles moved by forces: each is an additional point without stiffness that is held only by contact.
 
-The points of the mesh are followed by one for each such obstacle; its displacement is that of the obstacle. Components
-under a force are free rigid motions like those of a floating body, and get weak springs like these (see
-`analysis.floating_bodies`); the others are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``, with q the
-displacement of the obstacle: the row of the obstacle is minus the sum of the gap's row over all points.
+The points of the mesh are followed by one point for each such obstacle, whose displacement is that of the obstacle.
+Components under a force are rigid-body motions like those of a floating body, and are regularised by the same weak springs
+(see `analysis.floating_bodies`); the other components are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``,
+with q the displacement of the obstacle, so that the entries of the obstacle are minus the sum of the gap's row over all
+points.
 """
 
 from __future__ import annotations
@@ -90,11 +91,11 @@ class ForceDrivenObstacles:
         return np.vstack([fixed, np.array(held, bool).reshape(-1, self.shape[1])])
 
     def prescribed(self, by_ramp: dict[PartHistory, Array]) -> dict[PartHistory, Array]:
-        """Return the displacements (n_points + n, dim) at multiplier 1 by history, including those of the obstacles."""
+        """Return the displacements (n_points + n, dim) at multiplier 1 by ramp, including those of the obstacles [length]."""
         return self._with(by_ramp, [pair.motion for pair in self.pairs])
 
     def forces(self, by_ramp: Mapping[Table | None, Array]) -> dict[PartHistory, Array]:
-        """Return the forces (n_points + n, dim) at multiplier 1 by history, including those on the obstacles."""
+        """Return the forces (n_points + n, dim) at multiplier 1 by ramp, including those on the obstacles [force]."""
         return self._with(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
 
     def _with(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
@@ -135,7 +136,7 @@ class ForceDrivenObstacles:
         """Return the constraints of pair `name`, computed with its obstacle at `position` (dim,), with the obstacle free.
 
         Rows then have columns for all obstacles, and slip includes the motion of the obstacle. If the obstacle also rotates,
-        `moved` (dim,) is its motion in the step that `constraints` already includes as slip [length].
+        `moved` (dim,) is the motion in the step that `constraints` already includes as slip [length].
         """
         if not self.pairs:
             return constraints

@@ -1,6 +1,6 @@
-"""Hanging nodes: nodes that lie on facets of their own body without belonging to them, where the body is torn.
+"""Hanging nodes: nodes that lie on facets of their own body without belonging to them.
 
-Where a coarse and a fine mesh meet, only common nodes are connected; the others hang, and gaps or overlaps arise.
+Where a coarse and a fine mesh meet, only common nodes are connected. The other nodes hang, so that gaps or overlaps arise.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from fastcontact.model.rigid_motions import node_at
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Nodes nearer to a facet than this, in facet lengths, lie on it; nodes as near to its nodes coincide with these. Fine
-# facets of an arc deviate more from a coarse one; there the facets at all corners of the coarse one show that it is no slit.
+# Nodes nearer to a facet than this, in facet lengths, lie on it; nodes as near to one of its nodes coincide with that node.
+# Fine facets of an arc deviate more from a coarse facet; there the facets at all corners of the coarse one exclude a slit.
 NEAR, ON_ARC = 0.02, 0.1
 # Largest number of facets that face a node at such a distance.
 MOST = 8
@@ -34,9 +34,10 @@ MOST = 8
 
 @dataclass(frozen=True, eq=False)
 class OuterFacets:
-    """Outer facets of all bodies, treated as flat: nodes (n, k), -1 for none; the other arrays (n, ...) [length], [-].
+    """Outer facets of all bodies, treated as flat.
 
-    `rise` is the distance of nodes between the corners from the plane, `size` the diagonal of the box around the corners;
+    `nodes` (n, k) are -1 where there are none, `corners` (n, 2 or 4) repeat the last corner of triangles. `rise` (n,) is the
+    distance of nodes between the corners from the plane, and `size` (n,) the diagonal of the box around the corners [length].
     `kind` (n,) is the index in `elements`.
     """
 
@@ -135,8 +136,8 @@ def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> A
 def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
     """Return whether nodes (m,) belong to the cells behind facets (m,), or to their neighbours.
 
-    This is the case on the far side of a thin sheet, but not where meshes meet: their cells have no common facet, except
-    for one whose middle nodes belong to only one of them.
+    This is the case on the far side of a thin sheet, but not where meshes meet, whose cells have no common facet except one
+    whose middle nodes belong to only one cell.
     """
     corners = outer.corners[facet]
     involved = np.zeros(mesh.n_points, bool)

@@ -11,9 +11,10 @@ from fastcontact.contact.search.box_tree_kernels import DEPTH, square_to_box
 def facing_facets(points, nodes, outward, facets, centre, normal, reach, tree, order, facing):
     """Fill `facing` (m, k) with the facets that each of `nodes` (m,) faces at a distance below their `reach`, -1 for none.
 
-    A node faces a facet (n, n_nodes; -1 for no node) that it does not belong to, in whose box it lies, and whose `normal`
-    (n, dim) is at more than 120 degrees to that of the node, `outward` (n_points, dim). Distances are those from the plane
-    through the `centre` (n, dim). The leaves of the tree are the boxes of the facets in their `order` (n,).
+    A node faces a facet (n, n_nodes; -1 for no node) if it does not belong to the facet but lies in its box, and if the
+    angle between the `normal` (n, dim) of the facet and the normal `outward` (n_points, dim) of the node exceeds 120 degrees.
+    Distances are measured from the plane through the `centre` (n, dim). The leaves of the tree are the boxes of the facets in
+    their `order` (n,).
     """
     stack, leaves = np.empty(DEPTH, np.int64), len(tree.low) // 2
     for i in range(len(nodes)):

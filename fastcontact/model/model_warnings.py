@@ -1,6 +1,6 @@
-"""Warnings about a model before it is solved, each with its number: units, poor cells, inexact integrals.
+"""Warnings about a model before it is solved, with the quantities that cause them: units, poor cells, inexact integrals.
 
-They are sentences for the screen and the result file. The model may still be correct, so they do not stop an analysis.
+They are sentences for the screen and the result file. The model may still be correct, so that they do not stop an analysis.
 """
 
 from __future__ import annotations
@@ -37,17 +37,18 @@ MODULI = 3e5
 # A prescribed displacement beyond this multiple of the size of the model, and strains by the loads outside these bounds, are
 # probably mistakes.
 DISPLACED, STRAINED, UNSTRAINED = 1.0, 1.0, 1e-12
-# Young's moduli of solids, from aerogel to diamond [Pa]. Only here the user's units matter, and only if they are named.
+# Young's moduli of solids, from aerogel to diamond [Pa]. This is the only check that depends on the user's units, if named.
 SOLIDS = (1e2, 2e12)
 # Number of cells by which integrals are assessed.
 SOME = 1000
 # Relative error of the integral of a load, and of the stiffness (1.6 % on regular pyramids), above which a warning is given.
 INTEGRAL, STIFFNESS = 1e-3, 5e-2
-# Nodes nearer to each other than this fraction of the edges there, and than single precision, are probably meant to coincide.
+# Nodes nearer to each other than this fraction of the edges there, and than single precision, probably should coincide.
 NEAR = 1e-2
-# Penetration over the facet length that is no overlap: straight facets of a circle of eight penetrate a round side by less.
+# Largest penetration over the facet length that does not count as overlap: eight straight facets of a circle penetrate a
+# round side by less.
 SAG = 0.1
-# Largest plausible coefficient of friction: rubber on rough ground has 1 to 2.
+# Largest plausible coefficient of friction; for rubber on rough ground it is 1 to 2.
 RUBBING = 3.0
 
 
@@ -87,7 +88,7 @@ def _lost_loads(model: Model) -> Iterator[str]:
         if total > 0.0 and float(np.abs(forces[~fixed]).sum()) <= ROUND_OFF * total:
             yield (
                 f"{load.name} acts on {int(forces.any(axis=1).sum())} points whose displacement is prescribed in its "
-                "direction: all of it goes into the supports. Load other points, or leave out the support"
+                "direction: the supports carry all of it. Load other points, or omit the support"
             )
 
 
@@ -140,14 +141,15 @@ def _proportions(model: Model, moved: float) -> Iterator[str]:
 
 
 def _pushed(supports: Supports) -> Array:
-    """Return the largest prescribed displacements (dim,), by their history or as they are given without one [length]."""
-    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}  # not what turns
+    """Return the largest prescribed displacements (dim,) along their ramps, or as given without a ramp [length]."""
+    # Rotations are left out.
+    straight = {ramp: at for ramp, at in supports.by_ramp.items() if not isinstance(ramp, Harmonic)}
     peaks = [_peak(ramp) * np.abs(values).max(axis=0) for ramp, values in straight.items() if len(values)]
     return np.max([np.zeros(supports.fixed.shape[1]), *peaks], axis=0)
 
 
 def _peak(ramp: Table | None) -> float:
-    """Return the largest multiplier of a history by magnitude [-]."""
+    """Return the largest magnitude of the multipliers of a ramp [-]."""
     return 1.0 if ramp is None else max(abs(value) for _, value in ramp)
 
 
@@ -190,8 +192,8 @@ def _wetted_twice(model: Model) -> list[str]:
         for one, other in itertools.combinations(wet, 2)
     }
     return [
-        f"the fluids of contacts '{one}' and '{other}' both press on {count} secondary facets, and each runs round where the "
-        "other contact seals: give each pair facets of its own"
+        f"the fluids of contacts '{one}' and '{other}' both act on {count} secondary facets, and each bypasses the seal of "
+        "the other contact: give each pair separate facets"
         for (one, other), count in shared.items()
         if count
     ]
@@ -201,14 +203,14 @@ def _friction(model: Model) -> list[str]:
     """Return a warning for each implausible coefficient of friction."""
     return [
         f"the friction of contact '{pair.name}' is {friction:g}, more than the {RUBBING:g} that surfaces have at most: is it "
-        "in percent? Where nothing is to slide, take kind='tied'"
+        "in percent? To exclude sliding, use kind='tied'"
         for pair in model.contact
         if (friction := pair.options.get("friction") or 0.0) > RUBBING
     ]
 
 
 def _penetrating(model: Model, pairs: Pairs, pushed: Array) -> Iterator[str]:
-    """Return a warning for each contact whose sides penetrate by more than motions (dim,) push before they do [length]."""
+    """Return a warning for each contact whose initial penetration exceeds the prescribed motions (dim,) [length]."""
     for pair, bound in pairs:
         motion = pushed if not any(pair.motion) else np.maximum(pushed, _peak(pair.ramp) * np.abs(pair.motion))
         if not motion.any():
@@ -265,8 +267,8 @@ def _stiffness(mesh: Mesh) -> str:
     if off <= STIFFNESS * total:
         return ""
     return (
-        f"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by {off / total:.2%} of the "
-        "whole; use smaller cells, or better shaped ones"
+        f"the quadrature of the stiffness is not exact on curved or distorted cells: its error is {off / total:.2%} of the "
+        "total; use smaller or better-shaped cells"
     )
 
 
@@ -293,8 +295,8 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
             off, total = off + float(np.abs(coarse - fine).sum()), total + float(np.abs(fine).sum())
     if off > INTEGRAL * total:
         yield (
-            f"{load.name} varies within single elements, so that its quadrature is not exact: it is off by {off / total:.2%} "
-            "of the whole; refine the mesh there"
+            f"{load.name} varies within single elements, so that its quadrature is not exact: its error is {off / total:.2%} "
+            "of the total; refine the mesh there"
         )
 
 

@@ -1,4 +1,4 @@
-"""Rotations of rigid obstacles and supports given by a user: checks and histories."""
+"""Rotations of rigid obstacles and supports given by a user: checks and ramps."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
 KEYS = ("angle", "centre", "axis", "ramp")
-# Largest rotation in a step with sliding [radian]: the path of a point is then approximated by an arc.
+# Largest rotation in a step with sliding, in which the path of a point is approximated by an arc [radian].
 LARGEST_TURN = 1.0
 
 
 def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
-    """Return a rotation, called `caption` in messages, None without one; and its history, None for that of the motion.
+    """Return a rotation, called `caption` in messages, and its ramp; None without a rotation or without a separate ramp.
 
     Raises ModelError if they are not admissible.
     """
@@ -29,8 +29,8 @@ def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) 
         check_known(f"key of {caption}", key, KEYS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
-            f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: make a "
-            "model in three dimensions"
+            f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: use a "
+            "three-dimensional model"
         )
     dim = 3 if kinematics == "3d" else 2
     for key in ("angle", "centre", "axis")[:dim]:
@@ -73,6 +73,6 @@ def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
             if turn > LARGEST_TURN:
                 raise ModelError(
                     f"obstacle '{pair.name}' turns by {turn:.3g} radian in the step to {instant:g}, more than "
-                    f"{LARGEST_TURN:g}: with friction take at least {math.ceil(turn / LARGEST_TURN)} steps instead"
+                    f"{LARGEST_TURN:g}: with friction use at least {math.ceil(turn / LARGEST_TURN)} steps instead"
                 )
             before = angle

@@ -1,4 +1,4 @@
-"""The options of a contact pair: their types, and the conversion and checks of those of all formulations."""
+"""Options of contact pairs: their types, and checks and conversion of the options of all formulations."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fastcontact.model.ramp import History, Table, table_of
 
 
 class FormulationOptions(TypedDict, total=False):
-    """Options of formulations: those of all first, then those of single ones."""
+    """Options of formulations: first those of all formulations, then those of single ones."""
 
     friction: float | None
     surface_smoothing: bool | None
@@ -173,7 +173,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
 
 
 def _positive(name: str, option: str, options: Mapping[str, Any], without: str) -> float | None:
-    """Return the positive number of an option, None if not given; `without` is the effect of leaving it out."""
+    """Return the positive number of an option, None if not given; `without` is the effect of omitting the option."""
     value = options.get(option)
     if value is None:
         return None
@@ -184,7 +184,7 @@ def _positive(name: str, option: str, options: Mapping[str, Any], without: str) 
 
 
 def _check_obstacle_temperature(name: str, options: Mapping[str, Any], against_obstacle: bool) -> None:
-    """Refuse heat flow to an obstacle of unknown temperature, and a temperature without an obstacle."""
+    """Raise ContactError for heat flow to an obstacle of unknown temperature, or a temperature without an obstacle."""
     temperature = options.get("obstacle_temperature")
     if temperature is None:
         if against_obstacle and {"conductance", "friction_heat"} & set(options):
@@ -205,10 +205,10 @@ def _friction_heat(name: str, options: Mapping[str, Any]) -> float:
     check_number(f"the friction_heat of contact '{name}'", fraction)
     if not 0.0 <= fraction <= 1.0:
         raise ContactError(
-            f"friction_heat = {fraction} of contact '{name}' must be a part of the work, between 0 and 1"
+            f"friction_heat = {fraction} of contact '{name}' must be a fraction of the work, between 0 and 1"
         )
     if fraction and not options.get("friction"):
-        raise ContactError(f"contact '{name}' has a friction_heat, but no friction that could make it")
+        raise ContactError(f"contact '{name}' has a friction_heat, but no friction that could generate it")
     return float(fraction)
 
 
@@ -257,7 +257,7 @@ def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
 
 
 def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
-    """Refuse a history of friction without a coefficient of friction, and negative multipliers."""
+    """Raise ContactError for a ramp of friction without a coefficient of friction, or with negative multipliers."""
     table = friction_ramp(name, options)
     if table is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_ramp, but no friction that it could multiply")

@@ -1,4 +1,4 @@
-"""Periodic cells and cyclic sectors: their two ends are tied node by node."""
+"""Periodic cells and cyclic sectors, whose two ends are tied."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import less_first, matched
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Largest distance of nodes from the facets of the other end, and beyond their ends, in facet sizes: sag of curved ends.
+# Largest distance of nodes from the facets of the other end, and beyond their ends, in facet sizes, for the sag of curved
+# ends.
 BESIDE = 0.02
 
 
 class PeriodicInterface(NamedTuple):
-    """Coincident nodes of two ends of a periodic part: each (m,).
+    """Coincident nodes of the two ends of a periodic part, `first` (m,) and `second` (m,).
 
-    At the ends of one of several `sectors`, vectors at the second node are those at the first one times `turn` (dim, dim), a
-    `rotation`, by the constraint `relation`; None without a rotation.
+    For a sector of a ring of several `sectors`, vectors at the second node are those at the first node times `turn`
+    (dim, dim), the matrix of a `rotation`, by the constraint `relation`. These are None without a rotation.
     """
 
     first: Indices
@@ -67,11 +68,11 @@ def periodic(
     jump : mapping of int to float
         Displacement of the second end relative to the first at multiplier 1, by component [length].
     free : sequence of int
-        Components in which it is equal for all nodes, but unknown.
+        Components in which the jump is equal for all nodes, but unknown.
     translation : sequence of float (dim,), optional
-        Vector from the first end to the second; by default between their centroids [length].
+        Vector from the first end to the second; by default between the centres of their bounding boxes [length].
     ramp : Table, optional
-        History of the jump.
+        Ramp of the jump.
 
     Raises
     ------
@@ -99,7 +100,7 @@ def periodic(
 def cyclic(
     mesh: Mesh, ends: tuple[str, str], sectors: int, origin: Sequence[float], direction: Sequence[float]
 ) -> tuple[list[MultiPointConstraint], PeriodicInterface | None]:
-    """Return the constraints of the two ends of a sector, and the nodes that they tie, None if nodes follow facets.
+    """Return the constraints of the two ends of a sector, and the nodes that they tie; None if nodes are tied to facets.
 
     Parameters
     ----------
@@ -143,7 +144,7 @@ def cyclic(
 def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr_array:
     """Return the rows (m, n_dofs) of ``u_second = phase Q u_first`` along the axes of the mesh, Q that of an interface.
 
-    On the axis, the component along it has no row without a phase.
+    Without a phase, the axial component of points on the axis has no row.
     """
     assert interface.turn is not None
     back = -phase * interface.turn.T
@@ -170,7 +171,7 @@ def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign
 
 
 def _without_zeros(rows: csr_array) -> csr_array:
-    """Return rows without round-off entries, and without rows that only consist of these, as on the axis along it."""
+    """Return rows without entries of round-off, and without rows that consist of such entries, as on the axis."""
     rows.sum_duplicates()
     rows.data[np.abs(rows.data) < ROUND_OFF] = 0.0
     rows.eliminate_zeros()
@@ -186,8 +187,10 @@ def _turned(
 
 
 def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) -> csr_array:
-    """Return rows (m, n_dofs): second nodes along the first column of `directions` (dim, 1 or 2), plus first nodes along the
-    second; with one column, minus first nodes along it.
+    """Return the rows (m, n_dofs) of differences between the displacements of second and first nodes.
+
+    They are the displacements of second nodes along the first column of `directions` (dim, 1 or 2), plus those of first nodes
+    along the second column; with a single column, minus those of first nodes along it.
     """
     direction = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
     nodes = np.column_stack([interface.second, interface.first])

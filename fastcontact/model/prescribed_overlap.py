@@ -1,4 +1,4 @@
-"""Contact nodes that supports prescribe to penetrate, or to separate where tied, which no contact force can prevent."""
+"""Contact nodes whose prescribed displacements cause penetration, or separation if tied, against which contact cannot act."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ Pairs = Sequence[tuple[ContactPair, Formulation]]
 STILL = 1e-6
 # Depths below this fraction of the largest prescribed displacement are admissible.
 SMALL = 1e-3
-# Number of instants of a history that are checked.
+# Number of instants of a ramp that are checked.
 SOME = 20
 
 
 @dataclass(frozen=True, eq=False)
 class Supports:
-    """Prescribed displacements: components (n_points, dim), values at multiplier 1 by history [length], and the ramp."""
+    """Prescribed displacements: components (n_points, dim), values at multiplier 1 by ramp [length], and the global ramp."""
 
     fixed: Mask
     by_ramp: Mapping[PartHistory, Array]
@@ -93,7 +93,7 @@ def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, F
         nodes = usable[supports.fixed[usable].any(axis=1)]
         if not len(nodes) or contact.force or formulation.options.penalty is not None:
             continue
-        # The other nodes count as facing the other side.
+        # Nodes without supports count as facing the other side.
         others = len(usable) - len(nodes)
         candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
         before, _, _ = _gaps(formulation, candidates, Configuration.undeformed(formulation.points), bare=True)
@@ -129,9 +129,10 @@ def _at(
 def _depth(
     formulation: Formulation, candidates: Candidates, before: Array, at: Configuration, fixed: Mask
 ) -> tuple[Array, Mask]:
-    """Return the depths of nodes (m,) in the other side due to supports [length], and which nodes face it.
+    """Return the penetration depths of nodes (m,) due to supports [length], and which nodes face the other side.
 
-    Zero where the gap depends on unsupported components. Initial overlaps, by gaps `before` (m,), are subtracted.
+    Depths are zero where the gap depends on unsupported components. Initial overlaps, given by the gaps `before` (m,), are
+    subtracted.
     """
     gap, rows, paired = _gaps(formulation, candidates, at)
     if formulation.options.always_closed:

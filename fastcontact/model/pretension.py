@@ -1,4 +1,4 @@
-"""Pretension sections: a force closes a cut through a bolt until its shortening is locked."""
+"""Pretension sections: a force pulls the sides of a cut through a bolt together until the shortening is locked."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ALONG = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Pretension:
-    """A pretension section: its sides move against each other only along its normal, all nodes by the same.
+    """A pretension section, whose sides move relative to each other only along its normal, equally at all nodes.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Pretension:
     locked_from : float or None
         Instant from which the shortening is kept.
     ramp : tuple, optional
-        History of force or shortening.
+        Ramp of the force or shortening.
     """
 
     label: str
@@ -105,12 +105,12 @@ class PretensionForce(Load):
 
     @property
     def name(self) -> str:
-        """Where it acts, for messages."""
+        """Description for messages."""
         return f"the force of {self.section.name}"
 
     @property
     def places(self) -> tuple[str, ...]:
-        """None: it is between two sides."""
+        """No groups, since the force acts between two sides."""
         return ()
 
     @property
@@ -120,7 +120,7 @@ class PretensionForce(Load):
 
     @property
     def ramp(self) -> Table | None:  # type: ignore[override]
-        """Its history."""
+        """Ramp of the force."""
         return self.section.ramp
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
@@ -143,7 +143,7 @@ def pretension(
     ----------
     mesh : Mesh
     label, section, opposite, normal
-        As of `Model.add_pretension`.
+        See `Model.add_pretension`.
     amounts : (float or None, float or None, float or None)
         Force [force], shortening [length], instant from which it is locked.
     ramp : tuple, optional
@@ -151,7 +151,7 @@ def pretension(
     Raises
     ------
     MeshError, ModelError
-        If the sides do not fit, or the amounts do not.
+        If the sides do not match, or the amounts are inconsistent.
     """
     force, shortening, locked_from = amounts
     name = f"pretension '{label}'"
@@ -173,15 +173,13 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
     nodes = mesh.points_of(section).astype(np.intp)
     if opposite is None and other not in mesh.group_names:
         raise ModelError(
-            f"{name}: the mesh is not cut along '{section}', there is no group '{other}': make the model of "
+            f"{name}: the mesh is not cut along '{section}', there is no group '{other}': build the model on "
             f"fc.generate.cut(mesh, '{section}'), or name the opposite side"
         )
     facing = mesh.points_of(other).astype(np.intp)
     shared = np.intersect1d(nodes, facing)
     if len(shared):
-        raise ModelError(
-            f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need nodes of their own"
-        )
+        raise ModelError(f"{name}: '{section}' and '{other}' share point {shared[0]}: both sides need separate nodes")
     match = matched(mesh, (section, nodes), (other, facing), [0.0] * mesh.dim)
     return nodes, facing[match]
 
@@ -210,13 +208,13 @@ def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
     if abs(cosine) < ALONG:
         angle = np.degrees(np.arccos(min(abs(cosine), 1.0)))
         raise ModelError(
-            f"the normal of {name} is {angle:.0f} degrees off that of '{section}': leave it out, or cut the bolt across"
+            f"the normal of {name} deviates by {angle:.0f} degrees from that of '{section}': omit it, or cut the bolt across"
         )
     return direction if cosine > 0.0 else -direction
 
 
 def _across(normal: Array) -> Array:
-    """Return the unit vectors (dim - 1, dim) across a normal, parallel to axes where it is."""
+    """Return the unit vectors (dim - 1, dim) perpendicular to a normal, parallel to the axes if the normal is."""
     axis = int(np.argmax(np.abs(normal)))
     directions = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
     basis = np.linalg.qr(np.column_stack([normal, *directions]))[0][:, 1:].T

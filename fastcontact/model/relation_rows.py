@@ -24,7 +24,7 @@ NORMAL = "normal"
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
     """Return the nodes (m,) of a group of outer facets, and the means (m, dim) of the facets' unit normals there.
 
-    Errors as for a pressure on the group.
+    Raises the errors of a pressure on the group.
     """
     facets = {name: outward(mesh, group, name, block) for name, block in facets_of(mesh, group).items()}
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
@@ -53,7 +53,7 @@ def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
 
 
 def less_first(rows: csr_array) -> csr_array:
-    """Return the differences of all rows (m, n) except the first and the first one."""
+    """Return the differences (m - 1, n) between the rows (m, n) after the first and the first row."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
@@ -62,7 +62,7 @@ def matched(
 ) -> Indices:
     """Return, for each node of the first group, the index of the coincident node of the second after `translation`.
 
-    By default the centroid of the first group is moved to that of the second.
+    By default the centre of the bounding box of the first group is moved to that of the second.
 
     Raises
     ------
@@ -88,6 +88,6 @@ def matched(
     if distance[far] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
         raise ModelError(
             f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
-            "groups are joined nodes upon nodes; give the translation that brings them there, or another mesh"
+            "groups are joined node by node; give the translation between them, or use another mesh"
         )
     return match

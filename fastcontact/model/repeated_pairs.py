@@ -1,4 +1,4 @@
-"""Facets and nodes that belong to two contact pairs, whose force split is undetermined."""
+"""Facets and nodes that belong to two contact pairs, between which the split of the force is undetermined."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bo
 
 
 def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Compare the obstacles where the two sides share facets; at a corner between two obstacles they differ."""
+    """Compare the obstacles where the two sides share facets; two obstacles that form a corner differ."""
     if pair.obstacle is None or other.obstacle is None or _moved(pair) != _moved(other):
         return
     nodes = shared_facets(mesh, pair.secondary, other.secondary)
@@ -82,9 +82,9 @@ def _moved(pair: ContactPair) -> tuple[Any, ...]:
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
     """Yield a warning for each two pairs whose sides continue each other at common nodes, on both bodies.
 
-    Each pair has its own pressure at such a node, but only the sum of both follows from the gap: its division, also over the
-    neighbours, is arbitrary. Node-to-segment contact divides the force of a node by areas, which is correct if both
-    pairs have the same primary side; if that is divided, too, each pair faces a part of it only.
+    Each pair has its own pressure at such a node, but the gap only determines the sum of both, so that its division, also
+    over the neighbours, is arbitrary. Node-to-segment contact divides the force of a node by areas, which is correct if both
+    pairs have the same primary side. If the primary side is divided as well, each pair faces only a part of it.
     """
     for (one, ours), (other, theirs) in combinations(pairs, 2):
         if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):

@@ -1,6 +1,6 @@
 """Rigid-body modes left free by supports and multi-point constraints, and whether contact can stop them.
 
-A body in contact is in equilibrium if the loads do no positive work on motions that open gaps or leave them unchanged: the
+A body in contact is in equilibrium if the loads do no positive work on motions that open gaps or leave them unchanged. The
 loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).
 """
 
@@ -42,9 +42,9 @@ MANY = 1500
 class FreeMotions:
     """Independent rigid-body motions that supports and constraints allow.
 
-    The `displacement` (n_dofs, k) of all points has about 1 as largest entry of a column; `parts` (p, k) are the same motions
-    as combinations of elementary ones, and `labels` body and name of each of those. `hinges` (m,) are the nodes that connect
-    parts of bodies, one or several in line.
+    The largest entry of each column of the `displacement` (n_dofs, k) of all points is about 1. `parts` (p, k) are the same
+    motions as combinations of elementary ones, and `labels` are the body and the name of each elementary motion. `hinges`
+    (m,) are nodes that connect parts of bodies, single or collinear.
     """
 
     displacement: Array
@@ -80,13 +80,13 @@ class FreeMotions:
 
 
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
-    """Return a name for a body, given that of each point: a cell group whose solid cells are all of it, or its number."""
+    """Return a name for a body, given the `body` of each point: the cell group of exactly its solid cells, or its number."""
     members = np.flatnonzero(body == number)
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
 
 
 def _group_of(mesh: Mesh, members: Indices) -> str:
-    """Return the name of the cell group whose solid cells have the nodes `members`, empty if there is none."""
+    """Return the name of the cell group whose solid cells have exactly the nodes `members`, empty if there is none."""
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=mesh.dim)
         if blocks and np.array_equal(np.unique(np.concatenate([block.ravel() for block in blocks.values()])), members):
@@ -145,7 +145,7 @@ def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
     """Return the rigid parts: bodies, or parts of them between hinges."""
     if kinematics != "axisymmetric":
         return rigid_parts(mesh)
-    # Rings only move along the axis, and one common node transmits this motion.
+    # Rings move only along the axis, and a single common node transmits this motion.
     count, body = bodies(mesh)
     return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
 
@@ -157,7 +157,7 @@ def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Ar
         return np.eye(width)
     if width > MANY:
         raise ModelError(
-            f"the mesh falls into {rigid.count} parts that hang together at single nodes or along lines only (first: "
+            f"the mesh consists of {rigid.count} parts that are connected only at single nodes or along lines (first: "
             f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
         )
     ends = np.cumsum([0] + [motion.shape[2] for _, motion in moving])
@@ -223,7 +223,7 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
 def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
     """Return the work (k,) that nodal forces (n_dofs,) do on each motion; round-off counts as zero [force].
 
-    That of these forces, or of the `largest` works before, of which they may be what is left.
+    Round-off is estimated from these forces, and from the `largest` earlier works, of which they may be the remainder.
     """
     work = motions.displacement.T @ force
     scale = np.maximum(np.abs(motions.displacement).T @ np.abs(force), largest)
@@ -235,8 +235,8 @@ def unstopped(gaps: Array, works: Array) -> Array:
     """Return motions (k, j) that neither contact nor contact and loads together can stop.
 
     `gaps` (m, k) are the changes of the gaps and `works` (l, k) the works of the loads for each motion, whose largest
-    displacement is about 1. A motion is stopped if it changes some gap, and closes one or is driven by some load. Whether the
-    load drives it towards the contact, or away from it, is decided by the solution.
+    displacement is about 1. A motion is stopped if it changes a gap, and closes a gap or is driven by a load. The solution
+    decides whether the load drives it towards the contact or away from it.
     """
     k = gaps.shape[1]
     gaps = np.where(np.abs(gaps) > ZERO, gaps, 0.0)
@@ -256,8 +256,8 @@ def unstopped(gaps: Array, works: Array) -> Array:
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
     """Return the amplitudes (k,) at which rigid bodies under the loads come to rest in contact, None if they never do.
 
-    `gaps` (m, k) are the changes of the gaps for each motion, `gap` (m,) the current gaps, of which penetration counts
-    as closed [length], `work` (k,) the work of the loads on each motion, and `size` that of the model [length].
+    `gaps` (m, k) are the changes of the gaps for each motion, `gap` (m,) the current gaps, where penetration counts as
+    closed [length], `work` (k,) the work of the loads on each motion, and `size` the size of the model [length].
     """
     if not work.any():
         return np.zeros(len(work))
@@ -272,7 +272,8 @@ def needed_friction(
 ) -> tuple[float, float] | None:
     """Return the coefficient of friction that would stop rigid bodies, and the largest given one [-]; None if none would.
 
-    `motions` (n_dofs, k) are those of the bodies, `u` (n_dofs,) displacements [length]; `work` and `size` as in `stopped_at`.
+    `motions` (n_dofs, k) are the rigid-body motions, `u` (n_dofs,) displacements [length]; `work` and `size` are as in
+    `stopped_at`.
     """
     if not constraints.coefficients.any():
         return None

@@ -35,7 +35,7 @@ def read_temperatures(
         values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
         if len(files) > 1 and len(values) > 1:
             raise ModelError(
-                f"'{path}' has {len(values)} instants: one of several files has one, or give one file alone"
+                f"'{path}' has {len(values)} instants: each of several files must have one, or give a single file"
             )
         fields.append(values)
         times.append(field_of_file.times)

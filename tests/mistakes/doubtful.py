@@ -106,7 +106,7 @@ DOUBTS = [
         lambda: generate.half_spheres("tri3", size=5.0),
         of(STEEL, SPHERES, "[solve]\ngeometry_updates = 1\n", kinematics="axisymmetric"),
         (
-            r"the contact geometry had not converged after the 1 updates requested: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or leave them out",
+            r"the contact geometry had not converged after the 1 updates requested: the last one changed the displacement by \d\.\d% of its largest component\. Allow more geometry_updates, or omit the option",
         ),
     ),
     Doubt(
@@ -118,7 +118,7 @@ DOUBTS = [
         (r"contact 'pair' has opened again at the end: the smallest gap is 0\.01",),
     ),
     Doubt("contact is never reached", lambda: raised(1.0), of(STEEL, BLOCKS, PAIR),
-          (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push",)),
+          (r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and the direction of the loads",)),
     Doubt(
         "bodies interpenetrate where no contact is defined",
         lambda: raised(0.001),
@@ -152,7 +152,7 @@ DOUBTS = [
             PAIR,
         ),
         (
-            r"the springs that regularise body 'UPPER': translation along y still carry \d\.\de-\d\d of the load: rigid motions are so much larger than deformations that round-off leaves no more",
+            r"the springs that regularise body 'UPPER': translation along y still carry \d\.\de-\d\d of the load: rigid motions are so much larger than deformations that round-off permits no higher accuracy",
             r"the loads strain the model by about .*: are loads, lengths and E in",
         ),
     ),
@@ -166,7 +166,7 @@ DOUBTS = [
         bent,
         of(STEEL, held("ALL", x=0.0, y=0.0)),
         (
-            r"the quadrature of the stiffness is not exact on curved or distorted cells: it is off by \d+\.\d+% of the whole; use smaller cells, or better shaped ones",
+            r"the quadrature of the stiffness is not exact on curved or distorted cells: its error is \d+\.\d+% of the total; use smaller or better-shaped cells",
         ),
     ),
     Doubt(
@@ -225,7 +225,7 @@ DOUBTS = [
         block_on_block,
         of(STEEL, BLOCKS, PAIR, "penalty = 1000.0\n"),
         (
-            r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or leave it out",
+            r"contact 'pair' penetrates by 0\.\d+, which is \d+\.\d% of the largest displacement: raise its penalty from 1000 to about \S+, or omit it",
         ),
     ),
     Doubt(
@@ -233,7 +233,7 @@ DOUBTS = [
         lambda: block_on_block(divisions_upper=(8, 4)),
         of(STEEL, BLOCKS, '[[spring]]\ngroup = "CONT_UPPER"\nto = "CONT_LOWER"\ny = 1e10\n'),
         (
-            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; take 6e\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact",
+            r"the spring between 'CONT_UPPER' and 'CONT_LOWER' is 1\.7e\+07 times as stiff as the body at one of its ends \(577\): results lose up to 7 of 16 digits, and with contact its force is accurate only to this ratio times the convergence criteria; use 6e\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is exact",
         ),
     ),
     Doubt(
@@ -285,7 +285,7 @@ DOUBTS = [
         block_on_block,
         of(STEEL, BLOCKS, PAIR, "friction = 30.0\n"),
         (
-            r"the friction of contact 'pair' is 30, more than the 3 that surfaces have at most: is it in percent\? Where nothing is to slide, take kind='tied'",
+            r"the friction of contact 'pair' is 30, more than the 3 that surfaces have at most: is it in percent\? To exclude sliding, use kind='tied'",
         ),
     ),
     Doubt(

@@ -320,7 +320,7 @@ SUPPORTS = [
     Mistake("supports that contradict each other", lambda: solved(contradicting()), fc.ModelError,
             r"'UPPER_TOP' prescribes y = 0\.5 at point \d+, but 'UPPER_TOP' prescribes -0\.01 there: remove one of the two"),
     Mistake("a support without a component", lambda: blocks().fix("LOWER_LEFT", ""), fc.ModelError,
-            r"fix\('LOWER_LEFT', \.\.\.\) names no component: give for example 'x' or 'xy'"),
+            r"fix\('LOWER_LEFT', \.\.\.\) has no component: give for example 'x' or 'xy'"),
     Mistake("a support on an empty group", lambda: blocks(empty_group("NONE")).fix("NONE", "x"), fc.ModelError,
             r"group 'NONE' is empty: no displacement can be prescribed on it"),
     Mistake("a support in z of a plane model", lambda: blocks().fix("LOWER_LEFT", "z"), fc.ModelError,
@@ -419,11 +419,11 @@ CONTACT = [
     Mistake("a penetration larger than an element", lambda: solved(blocks(changed(shift=-2.0))), fc.ContactError,
             r"no facet of 'CONT_UPPER' faces 'CONT_LOWER': the outer sides of the two groups look away from each other; is one of them the wrong face of its body, or do the bodies lie inside each other, by 2 or more\?"),
     Mistake("an obstacle that is inside out", lambda: solved(with_obstacle(1.0, (0.0, 1.0))), fc.ContactError,
-            r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: turn its normal or its facets round, or name another face of the body"),
+            r"the rigid obstacle of contact 'plane' faces in the same direction as 'TOP', so that they cannot touch: reverse its normal or its facets, or name another face of the body"),
     Mistake("an obstacle deep in the body", lambda: solved(with_obstacle(0.2)), fc.ContactError,
             r"contact 'plane' begins with a penetration of 0\.8 at point \d+ \[.*\], more than the length of the element there \(0\.5\): move a body apart, turn a surface that is inside out, or give an interference that is meant as clearance"),
     Mistake("a contact that is never reached", lambda: solved(blocks(changed(shift=1.0))), fc.FastcontactWarning,
-            r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and which way the loads push"),
+            r"contact 'pair' never closed: the smallest gap is 0\.99\. Check its sides and the direction of the loads"),
     Mistake("a pair was forgotten", lambda: solved(blocks(changed(shift=0.001), contact=False)), fc.FastcontactWarning,
             r"bodies '(UPPER|LOWER)' and '(UPPER|LOWER)' interpenetrate by 0\.009 near \[.*\], and no contact is defined between them: add_contact for the groups that meet"),
     Mistake("bodies overlap and no pair joins them", lambda: solved(blocks(changed(shift=-2.0), contact=False)),
@@ -438,7 +438,7 @@ CONTACT = [
     Mistake("all nodes excluded", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"), fc.ContactError,
             r"contact 'pair' excludes all nodes of 'CONT_UPPER': nothing is left to touch"),
     Mistake("bodies pulled apart by a force", lambda: solved(lifted()), fc.ConvergenceError,
-            r"the loads pull bodies away, no contact stops them \(.*; resultant up to 10\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
+            r"the loads pull bodies away, and no contact stops them \(.*; resultant up to 10\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
 ]
 # fmt: on
 
@@ -479,10 +479,10 @@ LOADS = [
     Mistake("a load that varies within an element",
             lambda: solved(with_load("add_traction", group="UPPER_RIGHT", x=lambda x: np.sin(40.0 * x[:, 1]))),
             fc.FastcontactWarning,
-            r"the traction on 'UPPER_RIGHT' varies within single elements, so that its quadrature is not exact: it is off by \d+\.\d+% of the whole; refine the mesh there"),
+            r"the traction on 'UPPER_RIGHT' varies within single elements, so that its quadrature is not exact: its error is \d+\.\d+% of the total; refine the mesh there"),
     Mistake("a force where the displacement is prescribed",
             lambda: solved(with_load("add_force", group="UPPER_TOP", y=-10.0)), fc.FastcontactWarning,
-            r"the total force on 'UPPER_TOP' acts on \d+ points whose displacement is prescribed in its direction: all of it goes into the supports\. Load other points, or leave out the support"),
+            r"the total force on 'UPPER_TOP' acts on \d+ points whose displacement is prescribed in its direction: the supports carry all of it\. Load other points, or omit the support"),
     Mistake("a force on an empty group", lambda: blocks(empty_group("NONE")).add_force("NONE", x=1.0), fc.ModelError,
             r"group 'NONE' is empty: no force can act on it"),
     Mistake("a body force on facets", lambda: with_load("add_body_force", groups="UPPER_TOP", y=-1.0), fc.ModelError,
@@ -494,7 +494,7 @@ LOADS = [
     Mistake("a spring as a rigid link",
             lambda: fc.solve(with_load("add_spring", group="UPPER_TOP_LEFT", to="LOWER_BOTTOM_LEFT", y=1e30), 1),
             fc.ModelError,
-            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): results would keep no digit; take \de\+06 or less, or a relation \(relate, relate_groups\), which is rigid and exact"),
+            r"the spring between 'UPPER_TOP_LEFT' and 'LOWER_BOTTOM_LEFT' is 1\.\de\+27 times as stiff as the body at one of its ends \(\d+\): results would keep no digit; use \de\+06 or less, or a multi-point constraint \(relate, relate_groups\), which is exact"),
 ]
 # fmt: on
 

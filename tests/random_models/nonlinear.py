@@ -120,7 +120,7 @@ def outcome(seed: int) -> dict[str, Any]:
             apart /= np.abs(last.displacement).max() or 1.0  # a ball between coarse nodes may touch none
             row |= {"words": again.words, "said again": float(apart)}
     bounds = {"balance": BALANCE, "moment": BALANCE, "said again": SAME, "work": WORK}
-    if any("works of these load steps do not add up" in text for text in last.warnings):
+    if any("energy of these load steps is out of balance" in text for text in last.warnings):
         bounds.pop("work")  # it is told, with the number
     row["wrong"] = [name for name, bound in bounds.items() if not row.get(name, 0.0) <= bound]
     return row | {

@@ -64,7 +64,9 @@ def test_once_closed_means_closed_in_a_load_step_before(make, formulation, swap)
     assert pulled["bilateral_once_closed"].contact["pair"].pressure == pytest.approx(-expected, rel=1e-10)
 
 
-@pytest.mark.filterwarnings("ignore:nodes flipped between two facets")  # opposite nodes, of which facets bend outwards
+@pytest.mark.filterwarnings(
+    "ignore:nodes alternated between two facets"
+)  # opposite nodes, of which facets bend outwards
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_once_closed_leaves_the_rest_free(formulation, forma04):
     """Two half-spheres, pressed, then pulled: they hang on what had been closed, the rest opens wider."""

@@ -215,7 +215,10 @@ def test_history_is_a_table_and_the_summary_tells(tmp_path, root):
     [
         (lambda m, s: fc.contact_resultants(m, s, "plan"), "unknown contact pair 'plan': did you mean 'plane'"),
         (lambda m, s: fc.wear(m, s, "plane", -1.0), "coefficient of wear -1.0 must be"),
-        (lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)), "needs a point of the space"),
+        (
+            lambda m, s: fc.contact_moment(s[0].contact["plane"], (0.0, 0.0, 0.0)),
+            "needs one number per dimension",
+        ),
     ],
 )
 def test_what_is_refused(call, said):
@@ -242,5 +245,5 @@ def test_steps_of_another_model_or_order_are_refused():
         with pytest.raises(fc.errors.ContactError, match="load step 1 is of another model"):
             answer(sliding(6))
     for wrong in (steps[::-1], steps[1:]):
-        with pytest.raises(fc.errors.ContactError, match="step 1 was expected and step 2 came"):
+        with pytest.raises(fc.errors.ContactError, match="step 1 was expected, but got step 2"):
             fc.wear(model, wrong, "floor", 1e-3)

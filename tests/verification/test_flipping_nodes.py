@@ -18,7 +18,7 @@ def spheres(**options):
 
 
 def test_the_force_between_spheres_is_that_of_averaged_normals():
-    with pytest.warns(fc.FastcontactWarning, match=r"flipped between two facets .* by \d\.\de-0\d of its largest"):
+    with pytest.warns(fc.FastcontactWarning, match=r"alternated between two facets .* by \d\.\de-0\d of its largest"):
         faceted = spheres(normals="facet")
     averaged = spheres(normals="averaged")
     assert "rounded" in faceted.iterations["history"][-1]

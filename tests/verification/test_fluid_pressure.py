@@ -151,4 +151,4 @@ def test_facets_that_two_fluids_press_on_are_told():
         model.add_fluid_pressure(name, 1e-3, source="BOTTOM_LEFT")
     with pytest.warns(fc.FastcontactWarning) as told:
         fc.solve(model, 1)
-    assert any("'near' and 'far' both press on 4 secondary facets" in str(warning.message) for warning in told)
+    assert any("'near' and 'far' both act on 4 secondary facets" in str(warning.message) for warning in told)

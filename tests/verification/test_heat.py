@@ -321,10 +321,10 @@ def test_temperatures_and_films_come_and_go():
 
 def test_spans_that_cannot_be_are_refused():
     model = fc.Model(fc.generate.block(), "plane_strain")
-    with pytest.raises(fc.errors.ModelError, match="begins at 1 without a ramp: give it one"):
+    with pytest.raises(fc.errors.ModelError, match="begins at 1 without a ramp: give it a ramp"):
         model.fix_temperature("RIGHT", 220.0, begins=1.0)
     with pytest.raises(
-        fc.errors.ModelError, match="the film on 'RIGHT' begins at 2 and ends at 1: it must begin before"
+        fc.errors.ModelError, match="the film on 'RIGHT' begins at 2 and ends at 1: it must begin earlier"
     ):
         model.add_film("RIGHT", 2.0, 20.0, begins=2.0, ends=1.0)
 
@@ -409,7 +409,7 @@ def test_what_cannot_be_is_refused_by_its_name():
             joined(model, conductance=wrong)
     with refused(fc.errors.ContactError, match="zero or more"):
         joined(model, conductance=-1.0)
-    with refused(fc.errors.ContactError, match="no friction that could make it"):
+    with refused(fc.errors.ContactError, match="no friction that could generate it"):
         joined(model, friction_heat=0.5)
     with refused(fc.errors.ContactError, match="needs the temperature of its obstacle"):
         model.add_obstacle(

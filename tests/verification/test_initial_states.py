@@ -214,7 +214,7 @@ def test_initial_states_in_a_case_file(tmp_path):
         (
             "[[initial_stress]]",
             "plane_stress",
-            r"initial_stress\[0\]: the initial stress of all solid cells names no component",
+            r"initial_stress\[0\]: the initial stress of all solid cells has no component",
         ),
         ("[[initial_stress]]\nyz = 1.0", "plane_strain", "has the component yz, which plane_strain does not have"),
         (

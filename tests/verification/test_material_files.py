@@ -145,12 +145,12 @@ def test_a_graded_bar_of_a_case_file(folder, E, scale, within):
     [
         ("{file = 'scan.vtu'}", "needs 'field', its name in the file"),
         ("{file = 'scan.vtu', field = 'F'}", "unknown field of cells 'F'"),
-        ("{file = 'scan.vtu', field = 'vectors'}", "has 3 components: one with a single number a cell is needed"),
+        ("{file = 'scan.vtu', field = 'vectors'}", "has 3 components: a field with a single number per cell is needed"),
         ("{file = 'scan.vtu', field = 'E', over = 'nodes'}", "over must be cells or points, not 'nodes'"),
-        ("{file = 'scan.vtu', field = 'E', instant = 1.0}", "has no times: leave out instant"),
-        ("{file = 'scan.med', field = 'E'}", "has 2 instants: say which with instant"),
-        ("{file = 'scan.med', field = 'E', instant = 0.4}", "has no instant 0.4, the next is 0"),
-        ("{file = 'gauss.med', field = 'E'}", "has 4 values in each cell, at integration points"),
+        ("{file = 'scan.vtu', field = 'E', instant = 1.0}", "has no times: omit instant"),
+        ("{file = 'scan.med', field = 'E'}", "has 2 instants: select one with instant"),
+        ("{file = 'scan.med', field = 'E', instant = 0.4}", "has no instant 0.4, the nearest is 0"),
+        ("{file = 'gauss.med', field = 'E'}", "has 4 values per cell, at integration points"),
         ("{file = 'block.med', field = 'E'}", "unknown field 'E'"),
         ("{file = 'coarse.vtu', field = 'E'}", r"has no cell where \d+ cells of the mesh are"),
         ("{file = 'no.vtu', field = 'E'}", "there is no file"),
@@ -165,14 +165,14 @@ def test_other_mistakes(folder, tmp_path):
     mesh = fc.read_mesh(folder / "block.med")
     with pytest.raises(fc.MeshError, match="unknown group of cells 'TUP'"):
         fc.read_field(mesh, folder / "scan.vtu", "E", groups="TUP")
-    with pytest.raises(fc.MeshError, match="the groups TOP hold no solid cells"):
+    with pytest.raises(fc.MeshError, match="the groups TOP contain no solid cells"):
         fc.read_field(mesh, folder / "scan.vtu", "E", groups="TOP")
     path = vtkhdf(tmp_path / "scan.vtkhdf", mesh)
     with pytest.raises(fc.FileError, match="unknown field of cells 'F'"):
         fc.read_field(mesh, path, "F")
     with h5py.File(path, "a") as file:
         file["VTKHDF/Connectivity"][0] = mesh.n_points
-    with pytest.raises(fc.FileError, match="names a point that is not there"):
+    with pytest.raises(fc.FileError, match="refers to a missing point"):
         fc.read_field(mesh, path, "E")
     with h5py.File(path, "a") as file:
         del file["VTKHDF/NumberOfCells"]
@@ -181,7 +181,7 @@ def test_other_mistakes(folder, tmp_path):
         fc.read_field(mesh, path, "E")
     with h5py.File(path, "a") as file:
         del file["VTKHDF/Points"]
-    with pytest.raises(fc.FileError, match="holds no unstructured grid of VTK"):
+    with pytest.raises(fc.FileError, match="contains no unstructured grid of VTK"):
         fc.read_field(mesh, path, "E")
     med(tmp_path / "holes.med", mesh)
     with h5py.File(tmp_path / "holes.med", "a") as file:

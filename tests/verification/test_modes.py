@@ -202,7 +202,7 @@ def test_a_warning_counts_modes_that_friction_would_hold():
 
     (step,) = fc.solve(pressed({"x": 2e-4, "y": -2e-4}, friction=0.05), 1)
     free, own = pressed({}, friction=0.05), {"stress_stiffening": False, "n": 3}
-    with pytest.warns(fc.FastcontactWarning, match=r"1 of 3 modes .* next to zero .*hold_sliding=True holds"):
+    with pytest.warns(fc.FastcontactWarning, match=r"1 of 3 modes .* close to zero .*hold_sliding=True holds"):
         loose = fc.modes(free, step, **own).frequencies
     held = fc.modes(free, step, hold_sliding=True, **own).frequencies
     assert abs(loose[0]) < 1e-3 * held[0]
@@ -321,7 +321,7 @@ def test_what_is_refused():
     model = model_of(block((1.0, 0.1), (10, 1)), "plane_stress")
     column, other = pressed_column((41, 2))
     for call, said in (
-        (lambda: fc.modes(model, n=0), "ask for one or more"),
+        (lambda: fc.modes(model, n=0), "request one or more"),
         (lambda: fc.modes(model, n=44), "modes of 44 free displacements"),
         (lambda: fc.modes(model, other), "displacements of shape .126, 2., but the mesh points of shape .22, 2."),
         (lambda: fc.modes(model, n=2, linear_solver="nothing"), "nothing"),
@@ -332,6 +332,6 @@ def test_what_is_refused():
     with pytest.raises(fc.ModelError, match="10 solid cells have none: give them density"):
         fc.modes(bare)
     for model, step in (pressed_column((10, 1)), (column, other)):  # all modes at once, and by iterations
-        with pytest.raises(fc.ModelError, match="the settled step is not stable"):
+        with pytest.raises(fc.ModelError, match="the equilibrium of the step is unstable"):
             fc.modes(model, step)
         assert fc.modes(model, step, 1, stress_stiffening=False).frequencies[0] > 0.0

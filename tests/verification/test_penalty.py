@@ -113,7 +113,7 @@ def layered(formulation, element, approach, matching=True, penalty=TABLE):
     return fc.solve(model, 3)[-1]
 
 
-@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the energy of these load steps")
 @pytest.mark.parametrize(("element", "matching"), [("quad4", True), ("quad4", False), ("quad8", False)])
 @pytest.mark.parametrize("approach", [0.001, 0.006, 0.02, 0.03])
 def test_a_table_of_pressures(element, matching, approach):
@@ -128,7 +128,7 @@ def test_a_table_of_pressures(element, matching, approach):
     assert step.work["penalty_energy"] == pytest.approx(layer, rel=1e-9)
 
 
-@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the energy of these load steps")
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_a_table_of_pressures_in_every_formulation(formulation):
     found, mortar = (layered(name, "quad4", 0.02).contact["pair"].pressure for name in (formulation, "mortar"))
@@ -145,7 +145,7 @@ def test_a_wrong_table_is_refused(table):
         model.add_obstacle("wall", secondary="TOP", obstacle=wall, penalty=table)
 
 
-@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the works of these load steps")
+@pytest.mark.filterwarnings("ignore:contact 'pair' penetrates", "ignore:the energy of these load steps")
 @pytest.mark.parametrize(("clearance", "p0", "at"), [(0.002, 1.0, 0.5), (0.002, 1.0, -0.5), (0.0005, 1e-5, 3.2)])
 def test_an_exponential_law(clearance, p0, at):
     """Pressure p0 exp(h ln(100) / c0) at the overclosure h up to 3 c0, straight on from there."""

@@ -175,9 +175,9 @@ def test_one_node_is_joined_with_all_of_a_group():
         (
             "add_force",
             {"group": "TOP", "y": 1.0, "weighting": "linear"},
-            "no place from which distances count: give at",
+            "no point from which distances count: give at",
         ),
-        ("add_force", {"group": "TOP", "y": 1.0, "radius": 1.0}, "no place from which distances count"),
+        ("add_force", {"group": "TOP", "y": 1.0, "radius": 1.0}, "no point from which distances count"),
         ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0), "weighting": "square"}, "weighting 'square'"),
         ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0, 1.0)}, "must be 2 numbers"),
         (
@@ -186,8 +186,12 @@ def test_one_node_is_joined_with_all_of_a_group():
             "no part of 'TOP' lies within the radius",
         ),
         ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0), "distribute": False}, "leave out at or distribute"),
-        ("add_force", {"group": "TOP_LEFT", "y": 1.0, "at": (1.0, 1.0)}, "lie in one line or place"),
-        ("add_coupling", {"reference": "PIN", "group": "TOP", "weighting": "linear"}, "without weighting or radius"),
+        ("add_force", {"group": "TOP_LEFT", "y": 1.0, "at": (1.0, 1.0)}, "are collinear or coincide"),
+        (
+            "add_coupling",
+            {"reference": "PIN", "group": "TOP", "weighting": "linear"},
+            "has no weighting or radius",
+        ),
         (
             "add_coupling",
             {"reference": "PIN", "group": "TOP", "kind": "distributing", "weighting": "l"},
@@ -205,7 +209,7 @@ def test_mistakes_are_told(method, arguments, words):
 
 def test_no_force_acts_through_a_place_of_a_ring():
     model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2), "quad4", (1.0, 0.0)), "axisymmetric")
-    with pytest.raises(fc.ModelError, match="in axisymmetry no force acts through a place"):
+    with pytest.raises(fc.ModelError, match="in axisymmetry a force cannot act at a point"):
         model.add_force("TOP", y=1.0, at=(1.5, 1.0))
 
 

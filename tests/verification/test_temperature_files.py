@@ -226,10 +226,10 @@ def test_fields_in_case_files(folder):
         ("file = 3\nfield = 'TEMP'", "'temperature\\[0\\].file' must be of type str or list"),
         ("file = [3]\nfield = 'TEMP'", "'file' must be a path or a list of paths"),
         ("file = []\nfield = 'TEMP'", "no file is given for the temperature"),
-        ("file = 'vectors.med'\nfield = 'TEMP'", "has 2 components: one with a single number a point is needed"),
+        ("file = 'vectors.med'\nfield = 'TEMP'", "has 2 components: a field with a single number per point is needed"),
         ("file = 'holes.med'\nfield = 'TEMP'", r"has no value at 1 points \(first: point 3"),
-        ("file = 'heat.med'\nfield = 'TEMP'\ninstant = 30.0", "has no instant 30, the next is 0|the next is 60"),
-        ("file = 'heat.vtu'\nfield = 'TEMP'\ninstant = 30.0", "has no times: leave out instant"),
+        ("file = 'heat.med'\nfield = 'TEMP'\ninstant = 30.0", "has no instant 30, the nearest is 0|the nearest is 60"),
+        ("file = 'heat.vtu'\nfield = 'TEMP'\ninstant = 30.0", "has no times: omit instant"),
         ("file = 'heat.med'\nfield = 'TEMP'\ntimes = [0, 1, 2]", "has 2 instants, but 3 times"),
         ("file = 'heat.med'\nfield = 'TEMP'\ntimes = [1, 0]", "must ascend"),
         ("file = 'heat.med'\nfield = 'TEMP'\nramp = [[0, 0], [1, 1]]", "has 2 instants and thus no ramp"),
@@ -237,7 +237,7 @@ def test_fields_in_case_files(folder):
         ("file = ['heat.vtu', 'heat.vtu']\nfield = 'TEMP'", "has 2 instants without times"),
         (
             "file = ['heat.med', 'heat.vtu']\nfield = 'TEMP'\ntimes = [0, 1, 2]",
-            "has 2 instants: one of several files has one",
+            "has 2 instants: each of several files must have one",
         ),
         (
             "file = 'heat.med'\nfield = 'TEMP'\ngroups = 'TOP'",
@@ -276,7 +276,7 @@ def test_a_damaged_grid_of_vtk_is_told(tmp_path):
         model.add_temperature_file(path, "TEMP")
     with h5py.File(tmp_path / "empty.vtkhdf", "w") as file:
         file.create_group("other")
-    with pytest.raises(fc.FileError, match="holds no unstructured grid of VTK"):
+    with pytest.raises(fc.FileError, match="contains no unstructured grid of VTK"):
         model.add_temperature_file(tmp_path / "empty.vtkhdf", "TEMP")
 
 

@@ -64,7 +64,7 @@ class Sectors:
         )
 
     def diameters(self, chosen: int | str | Sequence[int]) -> list[int]:
-        """Return the nodal diameters asked for, ascending; ModelError if the ring has none of that number."""
+        """Return the requested nodal diameters, ascending; ModelError if the ring cannot have one of them."""
         most = self.number // 2
         if isinstance(chosen, str):
             if chosen != "all":
@@ -78,7 +78,7 @@ class Sectors:
 
 
 def _sense(interface: PeriodicInterface, turn: Array) -> int:
-    """Return 1 if the rotation of an interface is `turn` (dim, dim), -1 if it is the inverse, else 0."""
+    """Return 1 if the rotation of an interface is `turn` (dim, dim), -1 if it is the inverse, and 0 otherwise."""
     assert interface.turn is not None
     if np.allclose(interface.turn, turn, atol=LENGTH_ROUND_OFF):
         return 1
@@ -87,7 +87,7 @@ def _sense(interface: PeriodicInterface, turn: Array) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """Motions of one number of nodal diameters."""
+    """Motions with a given number of nodal diameters."""
 
     sectors: Sectors
     diameters: int
@@ -115,7 +115,7 @@ class Wave:
         return blocks
 
     def twice(self, K: bsr_array) -> bsr_array:
-        """Return the real form of a real matrix (n, n) with its blocks."""
+        """Return the real form of a real block matrix (n, n), of the same block size."""
         if self.single:
             return K
         n, entries = K.shape[0] // K.blocksize[0], len(K.indices)
@@ -124,11 +124,11 @@ class Wave:
         return bsr_array((data, indices, indptr), shape=(2 * K.shape[0], 2 * K.shape[0]))
 
     def both(self, values: AnyArray) -> AnyArray:
-        """Return values (n, ...) of nodes or displacements of real and imaginary parts."""
+        """Return values (n, ...) of nodes or displacements, repeated for the imaginary part unless the wave is standing."""
         return values if self.single else np.concatenate([values, values])
 
     def relations(self, model: Model, others: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
-        """Return the constraints of real and imaginary parts: `others`, and those of the ends of the sector with phases."""
+        """Return the constraints `others`, and those with phase factors between the ends of the sector, in the real form."""
         ends = [
             MultiPointConstraint(
                 "cyclic symmetry", self.real(turned_rows(interface, self.phase(interface), model.mesh))
@@ -177,7 +177,7 @@ class Wave:
         return csr_array(coo_array(entries, shape=(count, len(held.nodes)))), np.concatenate(kept)
 
     def _across(self, held: Conditions, interface: PeriodicInterface, here: Indices, there: Indices) -> AnyArray:
-        """Return the part (k, k + l) of conditions at both nodes of an interface; that of the second node comes last."""
+        """Return the combinations (k, k + l) of the k and l conditions at the first and second node of an interface."""
         assert interface.turn is not None
         share = np.nan_to_num(held.areas[np.concatenate([here, there])], posinf=0.0)
         first, second = share[: len(here)].max(), share[len(here) :].max()

@@ -25,9 +25,9 @@ from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 UNSTABLE = (
-    "the settled step is not stable, small motions grow by themselves: where nodes slide, as round a tightened bolt, "
-    "hold them (hold_sliding=True); beyond a load that buckles take a lower one, or leave out the stiffness by stresses "
-    "(stress_stiffening=False)"
+    "the equilibrium of the step is unstable, since the stiffness is not positive definite: where nodes slide, as round a "
+    "tightened bolt, hold them (hold_sliding=True); beyond a buckling load use a lower load, or neglect the geometric "
+    "stiffness (stress_stiffening=False)"
 )
 # Iterations between checks of the error.
 ROUND = 20
@@ -74,7 +74,7 @@ def lowest(
         pairs = _by_multigrid(solver, shifted, M, start, n)
     else:
         pairs = _by_factors(solver, shifted, M, rng.normal(size=len(free)) * free, n)
-    # Ritz values in the span: more accurate than those of the iteration, and vectors of equal ones are orthogonal.
+    # Ritz pairs in the span of the iterates are more accurate, and their vectors are orthogonal for equal eigenvalues.
     small, mass = pairs.T @ (K @ pairs), pairs.T @ (M @ pairs)
     lower = np.linalg.inv(np.linalg.cholesky(mass))
     values, vectors = np.linalg.eigh(lower @ (0.5 * (small + small.T)) @ lower.T)
@@ -101,7 +101,7 @@ def _by_factors(solver: LinearSolver, shifted: bsr_array, M: bsr_array, start: A
         return np.asarray(eigsh(shifted, n, M, sigma=0.0, OPinv=inverse, v0=loaded.full_solution(M @ start))[1])
     except ArpackNoConvergence as error:
         raise ConvergenceError(
-            f"Lanczos iterations found {len(error.eigenvalues)} of {n} modes: ask for fewer"
+            f"Lanczos iterations found {len(error.eigenvalues)} of {n} modes: request fewer"
         ) from error
 
 
@@ -121,11 +121,11 @@ def _by_multigrid(solver: Multigrid, shifted: bsr_array, M: bsr_array, start: Ar
             warnings.simplefilter("ignore", UserWarning)  # a warning that a round has few iterations
             values, vectors = lobpcg(shifted, vectors, M, unit, tol=1e-300, maxiter=ROUND, largest=False)
         residuals = shifted @ vectors[:, :n] - (M @ vectors[:, :n]) * values[:n]
-        # Measured by the energy of the error, independent of units: the error of eigenvalues is its square.
+        # The error is measured by its energy, independent of units; the error of eigenvalues is of second order.
         if (np.einsum("ij,ij->j", residuals, cycle(residuals)) <= TOLERANCE * values[:n]).all():
             return np.asarray(vectors)
     raise ConvergenceError(
-        f"{n} modes did not settle in {MAX_ITERATIONS} iterations of multigrid: ask for fewer, or use "
+        f"{n} modes did not converge in {MAX_ITERATIONS} iterations with multigrid: request fewer, or use "
         'linear_solver="direct" if memory allows'
     )
 

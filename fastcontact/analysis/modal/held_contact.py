@@ -149,7 +149,7 @@ def _along(
     directions: Sequence[Array], rows: Sequence[csr_array], kept: Indices, owners: Indices, areas: Array,
     compliance: csr_array | None = None,
 ) -> Conditions:  # fmt: skip
-    """Return the conditions along all tangents, of rows (k, n_dofs), the `kept` (k,) of those with owners and areas (q,)."""
+    """Return the conditions along all tangents, with rows (k, n_dofs) for the `kept` (k,) of the q multipliers of a pair."""
     count = len(rows)
     give = None if compliance is None else csr_array(block_diag([compliance] * count, format="csr"))
     stacked = csr_array(vstack(rows, format="csr"))

@@ -43,6 +43,10 @@ class Shapes(StepSequence):
             Number of the mode, from 0.
         count : int
             Number of steps; their load factors are the phases, from 0 to 1.
+
+        Returns
+        -------
+        list of StepResult
         """
         return phases(self[number], count)
 
@@ -185,7 +189,7 @@ class RingModes(Shapes):
 
     @property
     def kinematics(self) -> str:
-        """Of the model."""
+        """Kinematics of the model."""
         return self.modes._model.kinematics
 
     @cached_property
@@ -194,7 +198,7 @@ class RingModes(Shapes):
 
     @cached_property
     def mesh(self) -> Mesh:
-        """See the class."""
+        """Mesh of all sectors, see `RingModes`."""
         part, centre = self.modes._model.mesh, self._sectors.centre
         return union(*(part.replace(points=(part.points - centre) @ turn.T + centre) for turn in self._turns))
 

@@ -1,7 +1,7 @@
 """Adjoint solution of a converged load step.
 
-With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric matrix of the step: stiffness
-and active constraints of the linear solver. E contains the derivatives of the pairing on the deformed configuration, and
+With y = (w, mu) for the unknowns and the multipliers, ``(J0 + E).T y = q``. J0 is the symmetric saddle-point matrix of the
+step, stiffness and active constraints. E contains the derivatives of the pairing on the deformed configuration, and
 subtracts the springs of floating bodies. GMRES solves ``s + E.T J0^-T s = E.T J0^-T q`` for ``s = E.T y``.
 """
 
@@ -18,7 +18,7 @@ from fastcontact.arrays import Array
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import TOLERANCE
 
-# Largest number of solutions of GMRES for s.
+# Largest number of GMRES iterations for s, each with one linear solution.
 SOLUTIONS = 200
 
 
@@ -53,11 +53,11 @@ class Change:
     Attributes
     ----------
     out : ndarray (n_dofs,)
-        Internal minus external forces, without contact forces [force / unit of the parameter].
+        Derivative of internal minus external forces, without contact forces [force / unit of the parameter].
     lift : ndarray (n_dofs,)
-        Prescribed displacements [length / unit of the parameter].
+        Derivative of the prescribed displacements [length / unit of the parameter].
     sample : ndarray
-        `Sample.all` [its unit / unit of the parameter].
+        Derivative of `Sample.all` [its unit / unit of the parameter].
     """
 
     out: Array
@@ -132,7 +132,7 @@ class Adjoint:
         if info:
             raise ConvergenceError(
                 f"the adjoint equations of the moving contact geometry do not converge in {self.solutions} solutions: "
-                "keep the pairing (Criteria(keep_pairing=True)), or take differences of two solutions"
+                "keep the pairing (Criteria(keep_pairing=True)), or use finite differences of two solutions"
             )
         return self._solve_transposed(right - s, multiplier)
 

@@ -37,7 +37,7 @@ def by_constant(contact: MovingContact, parameter: Label) -> tuple[Array, Array 
         pairs = {pair.name: made.bind(pair, contact.problem.pairs[pair.name].held) for pair in made.contact}
         return replace(contact, problem=replace(contact.problem, model=made, pairs=pairs))
 
-    # Fourth order: the error is proportional to the fourth power of the step.
+    # Central differences of fourth order in the step.
     forces = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
     return (forces[0] + forces[1]) / (12.0 * step), contact.along(at, step) if contact.problem.pairs else None
 
@@ -61,7 +61,7 @@ def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | N
     components = value if isinstance(value, tuple) else (value,)
     if value is None or any(map(varying, components)):
         raise ModelError(
-            f"the material {parameter[1]!r} has no {name}, or one that varies: there is no sensitivity to it"
+            f"the material {parameter[1]!r} has no {name}, or one that varies: its sensitivity is not available"
         )
     return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 
@@ -71,7 +71,7 @@ def _component(parameter: Label, names: Sequence[str]) -> int | None:
     if len(parameter) == 2 and (not names or parameter[0] == "expansion"):
         return None
     if len(parameter) == 2:
-        raise ModelError(f"{parameter[0]} of the material {parameter[1]!r} has components: ask for (..., '{names[0]}')")
+        raise ModelError(f"{parameter[0]} of the material {parameter[1]!r} has components: request (..., '{names[0]}')")
     if str(parameter[2]) not in names:
         raise ModelError(unknown(f"component of {parameter[0]}", str(parameter[2]), names))
     return names.index(str(parameter[2]))
@@ -111,7 +111,7 @@ def _changed(material: Material, name: str, component: int | None, by: float) ->
 
 
 def _inside(contact: MovingContact) -> Array:
-    """Return the internal forces of the materials (n_dofs,) minus those of heat and initial states [force]."""
+    """Return the internal forces (n_dofs,) minus those of thermal expansion and initial states [force]."""
     problem = contact.problem
     model = problem.model
     force = np.zeros(len(contact.u))

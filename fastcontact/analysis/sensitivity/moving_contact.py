@@ -28,13 +28,13 @@ from fastcontact.errors import ModelError
 from fastcontact.round_off import DIFFERENCES
 
 REMEDY = "Change the load slightly, or use one-sided finite differences between two solutions"
-# Increment of central differences: for constants relative to their admissible range, for forces to the largest force.
+# Increment of central differences, relative to the admissible range of a constant or to the largest force.
 CHANGED = 1e-3
-# A larger difference of one-sided derivatives is a kink: for forces relative to the largest one over the shortest edge,
-# for gaps absolute.
+# A difference of one-sided derivatives above this is a kink; for forces it is relative to the largest force over the
+# shortest edge, for gaps it is absolute.
 SMOOTH = 1e-3
-# Largest error of the derivatives from simultaneous moves, relative to the largest of them; above it points are moved
-# one by one.
+# Error of the derivatives from simultaneous moves, relative to the largest derivative, above which points are moved one by
+# one.
 TOGETHER = 1e-5
 
 
@@ -112,8 +112,8 @@ class MovingContact:
         constraints, multiplier = self.constraints_at(u), self.solution.multiplier
         if len(constraints) != len(multiplier):
             raise ModelError(
-                f"contact has {len(multiplier)} constraints, but {len(constraints)} as soon as nodes move: nodes of both "
-                f"sides coincide, and the one-sided derivatives differ there. {REMEDY}"
+                f"contact has {len(multiplier)} constraints, but {len(constraints)} if nodes move: nodes of both sides "
+                f"coincide, and the one-sided derivatives differ there. {REMEDY}"
             )
         gap = constraints.gap0 + constraints.B @ self.u
         if constraints.normal_compliance is not None:
@@ -260,7 +260,7 @@ class MovingContact:
 
 
 def _independent_groups(dofs: Indices, reached: csr_array, dim: int) -> list[Indices]:
-    """Return groups of components of which no two affect the same constraint, or constraints that share points."""
+    """Return groups of components, no two of which affect the same constraint or constraints that share points."""
     n_points = reached.shape[1]
     points = np.unique(dofs[dofs < n_points * dim] // dim)
     around = _ones(csr_array(reached.T @ reached))

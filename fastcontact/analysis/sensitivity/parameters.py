@@ -48,7 +48,7 @@ def check_parameter(model: Model, parameter: Label) -> None:
     if kind == "friction":
         raise ModelError(
             "results have no sensitivity to friction: if all nodes stick they do not depend on it, and if nodes slip they "
-            "depend on all load steps. Take differences of two solutions"
+            "depend on all load steps. Use finite differences of two solutions"
         )
     if kind not in FORMS:
         raise ModelError(unknown("parameter", kind, FORMS))
@@ -78,7 +78,7 @@ def _nothing(contact: MovingContact) -> Change:
 def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
     """Return the loads or temperatures on a group, restricted to it.
 
-    ModelError if there are none, and `others` lack the name.
+    Raises ModelError if there are none and the name is not in `others`.
     """
     group = str(parameter[1])
     items_of_group = [
@@ -238,7 +238,7 @@ def _of_motion(contact: MovingContact, parameter: Label) -> Change:
 
 
 def _opened(model: Model, parameter: Label) -> None:
-    """Refuse clearances of pairs that do not exist or are tied."""
+    """Raise ModelError if a contact pair does not exist or is tied, so that it has no clearance."""
     if _item("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
         raise ModelError(f"contact '{parameter[1]}' is tied: it keeps its gaps, and has no clearance")
 
@@ -263,7 +263,7 @@ def _of_constant(contact: MovingContact, parameter: Label) -> Change:
     return replace(nothing, out=out, sample=nothing.sample if sample is None else sample)
 
 
-# By kind: a check that raises ModelError if there is no such parameter, and the change of the residual.
+# For each kind of parameter, a check that raises ModelError if it does not exist, and the change of the residual.
 KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
     **dict.fromkeys(CONSTANTS, (check_constant, _of_constant)),
     "load": (_loads, _of_load),

@@ -1,4 +1,4 @@
-"""Quantities that sensitivities are available for, and their gradients."""
+"""Quantities for which sensitivities are available, and their gradients."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _reaction(contact: MovingContact, none: Gradient, quantity: Label) -> Gradie
     axis, points = _axis(model, quantity), model.mesh.points_of(str(quantity[1]))
     if model.springs:
         raise ModelError(
-            "reactions of a model with springs have no sensitivities: ask for a displacement or a contact force"
+            "reactions of a model with springs have no sensitivities: request a displacement or a contact force"
         )
     whole = np.zeros(len(contact.u))
     whole[points * model.mesh.dim + axis] = 1.0
@@ -103,8 +103,8 @@ def _contact_force(contact: MovingContact, none: Gradient, step: StepResult, qua
         shared = np.intersect1d(nodes, [*other_pair.secondary.points, *getattr(other_pair.primary, "points", ())])
         if len(shared):
             raise ModelError(
-                f"point {shared[0]} carries forces of both contact '{quantity[1]}' and contact '{name}': the force of one of "
-                "them has no sensitivity here; let the pairs share no nodes"
+                f"point {shared[0]} carries forces of both contact '{quantity[1]}' and contact '{name}': the force of a "
+                "single pair has no sensitivity here; use pairs that share no nodes"
             )
     dim, n = contact.problem.model.mesh.dim, len(contact.u)
     size = n + len(contact.active)
@@ -127,7 +127,7 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: L
         raise ModelError(f"point {result.points[row]} of contact '{name}' is open: its pressure is zero")
     if contact.problem.model.periodic_interfaces:
         raise ModelError(
-            "pressures of periodic and cyclic models have no sensitivities: ask for a force or a displacement"
+            "pressures of periodic and cyclic models have no sensitivities: request a force or a displacement"
         )
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, none.multiplier

@@ -1,4 +1,4 @@
-"""Reconstruct the end of a load step as equations that can be differentiated."""
+"""Reconstruction of the equations at the end of a load step, in a form that can be differentiated."""
 
 from __future__ import annotations
 
@@ -58,25 +58,25 @@ def _check_path(model: Model, step: StepResult, criteria: Criteria) -> None:
         ):
             if pair.options.get(option):
                 raise ModelError(
-                    f"contact '{pair.name}' has {meaning}: its results depend on all load steps, and sensitivities are those "
-                    f"of one. Take differences of two solutions, or leave out {option}"
+                    f"contact '{pair.name}' has {meaning}: its results depend on all load steps, and sensitivities consider "
+                    f"a single step. Use finite differences of two solutions, or omit {option}"
                 )
         if pair.fluid is not None:
-            raise ModelError(f"contact '{pair.name}' has a fluid, which sensitivities do not support: leave it out")
+            raise ModelError(f"contact '{pair.name}' has a fluid, which sensitivities do not support: omit it")
         if pair.options.get("kind") == "bilateral_once_closed":
             raise ModelError(
-                f"contact '{pair.name}' never opens what was closed in earlier load steps: sensitivities are those of one "
-                "step. Take differences of two solutions"
+                f"contact '{pair.name}' keeps nodes closed that closed in earlier load steps, and sensitivities consider a "
+                "single step. Use finite differences of two solutions"
             )
     if stage_of(model, step) is not model:
         raise ModelError(
-            "pretension sections or temporary supports hold positions that earlier load steps have found: sensitivities are "
-            "those of one step. Ask for them in the last step before the lock, or take differences of two solutions"
+            "pretension sections or temporary supports hold positions from earlier load steps, and sensitivities consider a "
+            "single step. Request them in the last step before the lock, or use finite differences of two solutions"
         )
     if criteria.geometry_updates is not None and not criteria.keep_pairing:
         raise ModelError(
             f"after a fixed number of geometry updates ({criteria.geometry_updates}) contact detection has not "
-            "converged: leave out geometry_updates, or keep the pairing (keep_pairing)"
+            "converged: omit geometry_updates, or keep the pairing (keep_pairing)"
         )
 
 
@@ -94,7 +94,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
     near = np.full(len(constraints), np.inf)
     for name, rows in constraints.rows().items():
         active, usable = solution.active[rows], constraints.usable[rows]
-        # Per area: a constraint with a tiny area has a tiny force.
+        # Forces are divided by areas, since the force of a constraint with a small area is small.
         areas = constraints.parts[name].areas
         force = solution.multiplier[rows] / (1.0 if areas is None else areas)
         largest = float(np.abs(force).max(initial=0.0)) or 1.0

@@ -23,9 +23,8 @@ def planes(corners, n_corners, origin, axes):
         _plane(corners[i], n_corners, origin[i], axes[i])
 
 
-# Inlined rather than a separate kernel: the process that compiles a separate kernel runs another copy than later
-# processes, in which products and sums may be fused differently. Tangents that differ in the last bit then change all
-# contact results there.
+# This function is inlined, since the process that compiles a separate kernel runs another copy than later processes, in
+# which products and sums may be fused differently. Tangents that differ in the last bit would change all contact results.
 @innermost_kernel
 def _plane(corners, count, origin, axes):
     origin[:] = 0.0
@@ -131,7 +130,7 @@ def _common(corners, count, others, n_others, origin, axes, subject, window, spa
 
 @kernel
 def _meets(low, high, origin, normal, radius, reach):
-    """Whether a box may meet the cylinder of a `radius` and of length 2 `reach` around a normal; an empty box does not."""
+    """Return whether a box may meet the cylinder of a `radius` and length 2 `reach` around a normal; False if it is empty."""
     if low[0] > high[0]:
         return False
     far, along, size = 0.0, 0.0, 0.0
@@ -148,7 +147,7 @@ def _meets(low, high, origin, normal, radius, reach):
 def facing_pairs(
     secondary, n_secondary, origin, axes, radius, reach, primary, n_primary, other_normal, numbers, tree, facing, pairs
 ):
-    """Find which primary polygons lie above or below each secondary one, and face it.
+    """Find the primary polygons that lie above or below each secondary polygon and face it.
 
     Parameters
     ----------
@@ -324,9 +323,9 @@ def integrate(
     """Integrate products of shape functions over the segments of the secondary facets `low` to ``high - 1``.
 
     Both facets are projected along the normal of the secondary polygon; areas are those of the reference surface. Segments
-    are divided into triangles around their centres: the rule is not exact on mapped facets, and with the centre its
-    error does not depend on a first corner and does not jump where corners appear or vanish. Between flat triangles it
-    is exact.
+    are divided into triangles around their centres. The rule is exact between flat triangles. On mapped facets it is not
+    exact, but thanks to the centre its error does not depend on the choice of a first corner, and it does not jump where
+    corners appear or vanish.
 
     Planes and polygons are those of `facing_pairs`, `pairs` (n_pairs, 2) its result, ascending in the secondary facet;
     those of facet s begin at ``start[s]``.

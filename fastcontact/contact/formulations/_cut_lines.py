@@ -1,8 +1,8 @@
 """Segmentation of secondary lines at the projected primary nodes, and integration over the segments.
 
 The gap between non-matching facets has a kink opposite every primary node; between two kinks it is smooth (Popp, Gee and
-Wall, 2009). At the end of the primary side the cut lies along the normal there: points beyond it face nothing, and the
-projections that decide this must agree with the cut.
+Wall, 2009). At an end of the primary side the cut lies along the normal there. Points beyond the cut do not face the side,
+and the projections that decide this must agree with the cut.
 """
 
 from __future__ import annotations
@@ -21,7 +21,8 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.mesh import elements, quadrature
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
-# Lines face each other if their normals enclose more than 120 degrees: beside a corner the flank is closest, but not faced.
+# Lines face each other if the angle between their normals exceeds 120 degrees: beside a corner, the flank is closest but
+# does not face the point.
 OPPOSITE = -0.5
 NO_BORDERS = np.empty(0, np.intp), np.empty(0)
 
@@ -91,10 +92,10 @@ def normals_at(block: FacetBlock, coordinates: Array, points: LinePoints) -> Arr
 def _opposite_nodes(block: FacetBlock, primary: Surface, deformed: Array, normals: Array) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie opposite the ends of primary facets.
 
-    Where two primary facets meet, the opposite point lies on the bisector of the angle between them: beside it another
-    facet is nearer. The closest point of the block is used only where the primary side ends, and at its corners, beside
-    which the flank is not faced: opposite a concave corner of sides that are apart, or overlap by an interference, it
-    jumps from one facet to the next as the bodies move.
+    Where two primary facets meet, the opposite point lies on the bisector of the angle between them, at which the closest
+    facet changes. The closest point of the block is used only where the primary side ends, and at its corners, beside
+    which points do not face the flank. It is unsuitable elsewhere, since opposite a concave corner of sides with a gap or an
+    interference it jumps from one facet to the next as the bodies move.
     """
     ends, first = np.unique(np.concatenate([other.local[:, :2].ravel() for other in primary.blocks]), return_index=True)
     foot, normal = deformed[primary.points[ends]], normals[ends]
@@ -130,7 +131,7 @@ def _opposite_ends(
     block: FacetBlock, primary: Surface, deformed: Array, normals: Array, tolerance: float
 ) -> tuple[Indices, Array]:
     """Return (facet, xi) of the points of a block that lie on the normals at the ends of the primary side."""
-    # A tolerance for round-off only does not extend the side: a cut there would leave a strip that faces the tolerance.
+    # A tolerance for round-off only does not extend the side: a cut there would leave a sliver of the tolerance's width.
     ends = (1.0, 1.0 + 2.0 * tolerance) if tolerance > SINGLE_PRECISION else (1.0,)
     first, facets, places = 0, [], []
     for other in primary.blocks:

@@ -50,9 +50,9 @@ class Block:
 class SurfaceFacets(NamedTuple):
     """The facets of a rigid surface, their neighbours and their normals.
 
-    Smooth normals of facets are the mean over the facets at a node whose angle to them is at most the crease. Normals of
-    points are the mean over all facets there, not normalised; they distinguish inside from outside next to the point
-    (Baerentzen and Aanaes, 2005). Both are weighted by the angles of the facets (Thuermer and Wuethrich, 1998).
+    The smooth normal of a facet at a node is the mean over the facets there whose angle to it is at most the crease. The
+    normal of a point is the mean over all facets there, not normalised; it distinguishes inside from outside next to the
+    point (Baerentzen and Aanaes, 2005). Both are weighted by the angles of the facets (Thuermer and Wuethrich, 1998).
     """
 
     blocks: list[Block]
@@ -172,7 +172,7 @@ def _ridge_table(blocks: list[Block]) -> tuple[Indices, Indices, Indices, Indice
 
 
 def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Indices, consistent: Mask) -> None:
-    """Refuse neighbours of opposite orientation, naming a facet of the smaller part."""
+    """Raise ContactError for neighbours of opposite orientation, naming a facet of the smaller part."""
     if consistent.all():
         return
     n = sum(len(block.nodes) for block in blocks)
@@ -184,7 +184,7 @@ def _check_orientation(blocks: list[Block], group: str, one: Indices, other: Ind
     numbers = np.concatenate([block.numbers for block in blocks])
     raise ContactError(
         f"{_described(blocks, pair[0])} of the rigid surface '{group}' has the opposite orientation to its neighbour facet "
-        f"{numbers[pair[1]]}: turn it, so that all normals point out of the obstacle"
+        f"{numbers[pair[1]]}: reverse it, so that all normals point out of the obstacle"
     )
 
 
@@ -210,7 +210,7 @@ def _smooth_normals(
 
 
 def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:
-    """Return all pairs (i, j), i = j among them, of entries with the same node."""
+    """Return all pairs (i, j) of entries with the same node, including i = j."""
     at = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
     pairs = at @ at.T
     pairs.sort_indices()

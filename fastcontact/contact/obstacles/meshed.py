@@ -14,8 +14,8 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE, and by more than this fraction
-# of its height: borders on a plane of symmetry, to which facets are never exactly normal, remain in contact.
+# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE and by more than this fraction
+# of its height, so that borders on a plane of symmetry, to which facets are never exactly normal, remain in contact.
 LEAN = 0.27
 
 
@@ -24,15 +24,15 @@ LEAN = 0.27
 class MeshedSurface:
     """A rigid surface given by a group of facets of a mesh.
 
-    Normals point out of the obstacle, towards the body: in two dimensions to the right of a line's direction, in three
-    to the side from which the nodes of a face run counter-clockwise; facets on the outside of solid cells of their
-    mesh point out of these. Distances are exact, to the closest point of the curved facets. Beyond the border of an
-    open surface there is no contact.
+    Normals point out of the obstacle, towards the body. In two dimensions they point to the right of a line's direction,
+    in three dimensions to the side from which the nodes of a face run counter-clockwise. Normals of facets on the outside
+    of solid cells of their mesh point out of these cells. Distances to the closest point of the curved facets are exact.
+    Beyond the border of an open surface there is no contact.
 
     Parameters
     ----------
     mesh : Mesh
-        The mesh of the surface, or that of the model; there, the points of the group must belong to no solid cell.
+        The mesh of the surface, or that of the model, in which the points of the group must not belong to solid cells.
     group : str
         A group of facets.
     flip : bool
@@ -46,8 +46,8 @@ class MeshedSurface:
     MeshError
         If there is no such group.
     ContactError
-        If the group holds no facets, a facet has no area, facets that share an edge have opposite orientations, or more than
-        two share one.
+        If the group contains no facets, a facet has no area, or an edge is shared by facets of opposite orientation or by
+        more than two facets.
 
     Examples
     --------
@@ -85,7 +85,7 @@ class MeshedSurface:
         if len(shared):
             raise ContactError(
                 f"{len(shared)} points of the rigid surface '{self.group}' belong to solid cells of the model (first: "
-                f"point {shared[0]}): a rigid surface stands apart, so give it points of its own or a mesh of its own"
+                f"point {shared[0]}): a rigid surface must be separate, so give it its own points or its own mesh"
             )
 
     def distance(self, points: Array) -> tuple[Array, Array]:
@@ -100,13 +100,13 @@ class MeshedSurface:
         offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        # There the direction to the closest point is dominated by round-off; the facet's normal replaces it.
+        # At touching points the direction to the closest point is dominated by round-off; the facet's normal replaces it.
         touching = closest.distance <= SINGLE_PRECISION * size
         outside = np.einsum("nd,nd->n", offset, sense) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
         normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
         sense /= np.linalg.norm(sense, axis=1, keepdims=True)
-        # Next to a sharp edge the direction to the closest point is the normal, not that of either facet.
+        # Next to a sharp edge the normal is the direction to the closest point, not the normal of either facet.
         sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
         turned = on_ridge & sharp & ~touching
         normal[turned] = offset[turned] / distance[turned, None]
@@ -118,8 +118,8 @@ class MeshedSurface:
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
         """Return pseudonormals (n, dim) at projections, smooth normals, and whether projections lie on a ridge or border.
 
-        The pseudonormal, whose sign of the distance is always right, is the normal inside a facet, the mean of the adjacent
-        facets on an edge, and the angle-weighted mean of all facets at a corner (Baerentzen and Aanaes, 2005).
+        The pseudonormal always gives the correct sign of the distance. It is the normal inside a facet, the mean of the
+        adjacent facets on an edge, and the angle-weighted mean of all facets at a corner (Baerentzen and Aanaes, 2005).
         """
         sense, smooth = closest.normal.copy(), np.empty_like(closest.normal)
         on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
@@ -160,7 +160,7 @@ class MeshedSurface:
 
 
 def _place(block: Block, xi: Array) -> tuple[Indices, Indices]:
-    """Return on which corner and on which edge of their facets reference coordinates lie, each (n,), -1 for none."""
+    """Return the corners (n,) and edges (n,) of facets on which reference coordinates lie, -1 for none."""
     element = block.element
     none = np.full(len(xi), -1, np.intp)
     if element.dim == 1:

@@ -21,7 +21,7 @@ class Pose:
     Attributes
     ----------
     displacement : ndarray (dim,)
-        [length].
+        Displacement from the initial position [length].
     angle : float
         Rotation angle [radian].
     """
@@ -35,7 +35,7 @@ class RigidSide:
     """A rigid obstacle that may translate and rotate; its position is part of the configuration."""
 
     obstacle: Obstacle  # in its initial position
-    motion: Array  # (dim,): its displacement where the multiplier of its history is 1 [length]
+    motion: Array  # (dim,): its displacement at multiplier 1 of its ramp [length]
     rotation: Rotation | None = None
 
     @property
@@ -63,9 +63,7 @@ class RigidSide:
         """Return gap (n,) [length] and normals (n, dim) [-] of `points` (n, dim) [length] from the obstacle at rest."""
         distance_and_normal = self.obstacle.distance(points)
         if is_masked(distance_and_normal):
-            raise ContactError(
-                f"the distance from a rigid obstacle {REFUSAL}; a gap that is infinite leaves a point out"
-            )
+            raise ContactError(f"the distance from a rigid obstacle {REFUSAL}; an infinite gap excludes a point")
         if any(np.iscomplexobj(values) for values in distance_and_normal):
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
@@ -73,10 +71,10 @@ class RigidSide:
     def turning(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array | None:
         """Return the displacement of points of the obstacle's surface by rotation alone (n, dim) [length]; None without any.
 
-        A point now at `positions` (n, dim) [length] and before at `before` has slid over the surface by its own displacement
-        minus that of the obstacle and minus this result. The slip is the change of position on the obstacle, in the frame of
-        half the rotation and of the length of the arc: zero where a point sticks, along the circle where it is at rest
-        in 3D.
+        The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus the
+        displacement of the obstacle and minus this result. It equals the change of the position relative to the obstacle, in
+        the frame rotated by half the angle and scaled from the chord to the arc. It vanishes where a point sticks, and lies
+        along the circle where a point is at rest in 3D.
         """
         angle = now.angle - then.angle
         if self.rotation is None or angle == 0.0:

@@ -1,4 +1,4 @@
-"""The simple shapes: half-space, ball, cylinder, heights over the other coordinates, flat punch."""
+"""Rigid shapes: half-space, sphere, cylinder, heights over the other coordinates, and flat punch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _positive(**values: float) -> None:
 def _vector(name: str, values: ArrayLike, dim: int) -> Array:
     vector = finite_vector(values, dim)
     if vector is None:
-        raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one a coordinate")
+        raise ContactError(f"{name} = {values!r} of a rigid obstacle must be {dim} finite numbers, one per coordinate")
     return vector
 
 
@@ -41,10 +41,10 @@ class HalfSpace:
 
     Parameters
     ----------
-    point : sequence of float
+    point : sequence of float (dim,)
         A point of the plane [length].
-    normal : sequence of float
-        Outward direction, of any length.
+    normal : sequence of float (dim,)
+        Outward direction, of any length [-].
 
     Examples
     --------
@@ -77,12 +77,12 @@ class Sphere:
 
     Parameters
     ----------
-    centre : sequence of float
-        [length].
+    centre : sequence of float (dim,)
+        Centre [length].
     R : float
         Radius [length].
     hollow : bool
-        The body lies inside.
+        Whether the body lies inside.
 
     Examples
     --------
@@ -118,12 +118,12 @@ class Cylinder:
 
     Parameters
     ----------
-    point, axis : sequence of float
-        A point of the axis [length], and its direction.
+    point, axis : sequence of float (3,)
+        A point of the axis [length], and its direction, of any length [-].
     R : float
         Radius [length].
     hollow : bool
-        The body lies inside.
+        Whether the body lies inside.
 
     Examples
     --------
@@ -195,9 +195,25 @@ class Height:
 
 @typed(ContactError)
 def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
-    """Return a paraboloid of revolution (a parabola in two dimensions) of radius `R` [length] at its tip.
+    """Return a paraboloid of revolution, a parabola in two dimensions.
 
-    `tip` is the height of its tip above the origin [length], and `side` ("above" or "below" the body) its position.
+    Parameters
+    ----------
+    R : float
+        Radius of curvature at the tip [length].
+    tip : float
+        Height of the tip above the origin [length].
+    side : str
+        Position of the obstacle: ``"above"`` or ``"below"`` the body.
+
+    Returns
+    -------
+    Height
+
+    Raises
+    ------
+    ContactError
+        If `R` is not positive, or `side` is unknown.
 
     Examples
     --------
@@ -218,9 +234,25 @@ def paraboloid(R: float, tip: float = 0.0, side: str = "above") -> Height:
 
 @typed(ContactError)
 def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
-    """Return a cone (a wedge in two dimensions) that rises by `slope` from its tip.
+    """Return a cone, a wedge in two dimensions; at its tip the normal is the axis.
 
-    `slope` is the tangent of the angle between its side and the plane. At the tip the normal is the axis.
+    Parameters
+    ----------
+    slope : float
+        Tangent of the angle between the side of the cone and the plane normal to its axis [-].
+    tip : float
+        Height of the tip above the origin [length].
+    side : str
+        Position of the obstacle: ``"above"`` or ``"below"`` the body.
+
+    Returns
+    -------
+    Height
+
+    Raises
+    ------
+    ContactError
+        If `slope` is not positive, or `side` is unknown.
 
     Examples
     --------
@@ -249,9 +281,9 @@ class FlatPunch:
     Parameters
     ----------
     radius : float
-        [length].
+        Radius or half-width [length].
     height : float
-        Height of the face over the origin [length].
+        Height of the face above the origin [length].
     side : str
         ``"above"`` or ``"below"`` the body.
 

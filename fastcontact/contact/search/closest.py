@@ -14,7 +14,7 @@ from fastcontact.contact.search.box_tree_kernels import build, tree_order
 from fastcontact.contact.search.facet_tables import flat_triangles, tables
 from fastcontact.errors import ContactError
 
-# Number of consecutive points in the order of the search that need not be sorted among themselves.
+# Number of consecutive points in the order of the search that need not be sorted.
 TOGETHER = 16
 # Overhang up to which a point still faces a side that ends there: nodes on an axis or plane of symmetry lie slightly beyond
 # inclined facets, and nodes at the end of one side beyond that of the other if the two strain differently.
@@ -27,7 +27,7 @@ class Closest(NamedTuple):
     Normals point to the right of a line's direction, and to the side from which a face's nodes run counter-clockwise.
     """
 
-    facet: Indices  # (n,): row of the facet; of equally close ones the first
+    facet: Indices  # (n,): row of the facet, the first one of several at equal distance
     xi: Array  # (n, dim - 1): reference coordinates of the projection [-]
     normal: Array  # (n, dim): unit normal of the facet there [-]
     overhang: Array  # (n,): distance of the point beyond the end of its facet, in facet lengths; 0 within [-]
@@ -38,8 +38,8 @@ class Closest(NamedTuple):
 def closest(points: Array, corners: Array) -> Closest:
     """Project `points` (n, dim) [length] on the closest of many facets of one kind, or raise ContactError if that fails.
 
-    `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets: lines of 2 or 3 nodes in 2D; triangles of 3 or 6
-    and quadrangles of 4, 8 or 9 in 3D.
+    `corners` (n_facets, n_nodes, dim) [length] are the nodes of the facets. In 2D they are lines of 2 or 3 nodes, in 3D
+    triangles of 3 or 6 nodes and quadrangles of 4, 8 or 9 nodes.
     """
     points, corners = np.ascontiguousarray(points), np.ascontiguousarray(corners)
     n, dim = points.shape
@@ -57,7 +57,7 @@ def closest(points: Array, corners: Array) -> Closest:
 
 
 def closest_of_kinds(points: Array, kinds: Sequence[Array]) -> Closest:
-    """Project points on the closest facet of several arrays of corners, one a kind; rows count through all of them."""
+    """Project points on the closest facet of several arrays of corners, one per kind; rows count through all arrays."""
     if len(kinds) == 1:
         return closest(points, kinds[0])
     first = np.cumsum([0] + [len(corners) for corners in kinds])

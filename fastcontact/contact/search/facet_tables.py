@@ -59,7 +59,7 @@ def tables(n_nodes: int) -> Tables:
 
 
 def flat_triangles(n_nodes: int) -> Indices:
-    """Return the flat triangles (n, 3) between the nodes of a facet in 3D, normals as those of the facet."""
+    """Return the flat triangles (n, 3) between the nodes of a facet in 3D, oriented like the facet."""
     return np.array(_FLAT[n_nodes])
 
 

@@ -11,7 +11,7 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 @interpretable_kernel
 def prepare(facets, begin, end, to_terms, weights, low, high):
-    """Fill all but the nodes and the midst of the facets `begin` to `end`, and their boxes `low`, `high` (n_facets, 3).
+    """Fill the terms and bounds of the facets `begin` to ``end - 1``, and their boxes `low`, `high` (n_facets, 3).
 
     The boxes contain the nodes, extended at curved sides by the bound on the deviation of the facet from flat triangles.
     `to_terms` and `weights` are those of `facet_tables.Tables`.

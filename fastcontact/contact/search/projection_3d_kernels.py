@@ -17,14 +17,14 @@ from fastcontact.round_off import ROUND_OFF
 
 
 class Facets(NamedTuple):
-    """Facets of one kind, relative to a point in their midst: far from the origin, round-off would exceed STEP.
+    """Facets of one kind, relative to their centre, since round-off far from the origin would exceed STEP.
 
     `convex` bounds the distance up to which a local minimum is unique: with four nodes by `straight_3d_kernels.room`,
     with more nodes by the square of a distance below which half the squared distance is convex.
     """
 
     nodes: Array  # (n_facets, m, 3), relative to the origin [length]
-    midst: Array  # (3,): that point [length]
+    midst: Array  # (3,): their centre [length]
     terms: Array  # (n_facets, m, 3): coefficients of the polynomials [length]
     bend: Array  # (n_facets,): bound on a facet's deviation from the flat triangles between its nodes [length]
     convex: Array  # (n_facets,) [length^2]
@@ -46,7 +46,7 @@ def vector(vectors, f, k):
 
 @inlined_kernel
 def node(facets, f, k):
-    """Return node `k` of facet `f`, relative to the midst."""
+    """Return node `k` of facet `f`, relative to the centre."""
     return minus(vector(facets.nodes, f, k), (facets.midst[0], facets.midst[1], facets.midst[2]))
 
 
@@ -115,7 +115,7 @@ def _allowed(sides, s, t, ps, pt, size):
 
 @kernel
 def _definite(hss, hst, htt):
-    """Return the Hessian with the absolute values of its eigenvalues, moved a little off zero if it is not definite.
+    """Return the Hessian with the absolute values of its eigenvalues, shifted slightly from zero if it is not definite.
 
     For two by two, |H| = (H^2 + |det H| I) / sqrt(tr H^2 + 2 |det H|), by the theorem of Cayley and Hamilton.
     """
@@ -153,9 +153,9 @@ def _newton_step(sides, s, t, gs, gt, hss, hst, htt):
 
 @kernel
 def _downhill(terms, f, s, t, sides, point, value, hss, hst, htt):
-    """Return a step down from a stationary point (s, t) that is no minimum, else zeros.
+    """Return a step that decreases the distance from a stationary point (s, t); zeros if the point is a minimum.
 
-    Candidates are the direction in which the Hessian is smallest, and those along the sides.
+    Candidates are the direction of the smallest curvature of the Hessian, and those along the sides.
     """
     middle, radius = 0.5 * (hss + htt), np.sqrt(0.25 * ((hss - htt) * (hss - htt)) + hst * hst)
     if middle - radius >= -1e-9 * (abs(middle) + radius):
@@ -187,8 +187,8 @@ def _fits(sides, s, t):
 def descend(terms, f, s, t, sides, point):
     """Return the local minimum (s, t) of the distance from `point` to facet `f`, and whether the iteration converged.
 
-    Newton's method for the squared distance over the polygon of the reference domain: an active-set method that
-    continues along the sides it reaches, and never increases the distance.
+    Newton's method minimises the squared distance over the polygon of the reference domain. It is an active-set method that
+    continues along the sides it reaches and never increases the distance.
     """
     for _ in range(MAX_ITERATIONS):
         value, gs, gt, hss, hst, htt = _expansion(terms, f, s, t, point)
@@ -206,7 +206,7 @@ def descend(terms, f, s, t, sides, point):
             if rate > 1e-14 * size:
                 room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
                 length = min(length, max(room, 0.0) / rate)
-        if length * size > 1e-6:  # below, the decrease is lost in rounding
+        if length * size > 1e-6:  # in smaller steps round-off exceeds the decrease
             for _ in range(40):
                 if half_square(terms, f, s + length * ps, t + length * pt, point) <= value * (1.0 + 1e-14):
                     break
@@ -219,9 +219,9 @@ def descend(terms, f, s, t, sides, point):
 def project(facets, f, domain, point, reach):
     """Return (s, t) of the point of facet `f` closest to `point`, half the squared distance, and whether it converged.
 
-    The facet deviates from the flat triangles between its nodes by at most `bend`: the descent starts from the closest one.
-    With more than four nodes, a minimum within `convex` is the only one. Otherwise the descent is restarted wherever a closer
-    point is possible. The distance is infinite if its square exceeds `reach`.
+    The facet deviates from the flat triangles between its nodes by at most `bend`. The descent starts from the closest
+    triangle. With more than four nodes, a minimum within `convex` is unique. Otherwise the descent is restarted wherever a
+    closer point is possible. The returned distance is infinite if its square exceeds `reach`.
     """
     terms, bend = facets.terms, facets.bend[f]
     nodes, triangles, sides = domain
@@ -248,7 +248,7 @@ def project(facets, f, domain, point, reach):
         if value < best:
             s, t, best, converged = a, b, value, good
     side = minus(node(facets, f, 1), node(facets, f, 0))
-    # Near the centres of curvature the distance has several minima on one triangle: start from every node too.
+    # Near the centres of curvature the distance has several minima on one triangle, so that the descent starts at every node.
     for k in range(nodes.shape[0] if np.sqrt(2.0 * best) * 16.0 * bend > dot(side, side) else 0):
         a, b, good = descend(terms, f, nodes[k, 0], nodes[k, 1], sides, point)
         value = half_square(terms, f, a, b, point)
@@ -276,7 +276,7 @@ def onto_sides(sides, s, t):
     for k in range(sides.shape[0]):
         room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
         if room <= ROUND_OFF:
-            # Of a + b <= c the first coordinate is solved for: it is as exact as the other.
+            # The equation a s + b t = c is solved for s unless a = 0; s is then as accurate as t.
             if sides[k, 0] != 0.0:
                 s = (sides[k, 2] - sides[k, 1] * t) / sides[k, 0]
             else:

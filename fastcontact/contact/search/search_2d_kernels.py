@@ -50,7 +50,7 @@ def _project(nodes, f, x, y):
             s = new
             if change < 1e-15:
                 break
-    # At a common node all its facets have exactly the same distance: the one with the lowest number is taken.
+    # At a common node the distances of all its facets must be equal, so that the one with the lowest number is taken.
     if abs(s) == 1.0:
         end = 0 if s < 0.0 else 1
         px, py = nodes[f, end, 0], nodes[f, end, 1]
@@ -61,11 +61,11 @@ def _project(nodes, f, x, y):
 
 @interpretable_kernel
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
-    """Project points (n, 2) on their closest facets; of equally close facets on the one with the lowest number.
+    """Project points (n, 2) on their closest facets; of facets at equal distance the one with the lowest number is taken.
 
-    Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space follow each other. Facets are in
-    the order of the tree; `numbers` (n_facets,) are those before they were sorted. `result` is filled in place, with facet
-    -1 and distance NaN where a point is not finite.
+    Points are processed from `begin` to ``end - 1`` of an `order` (n,) in which neighbours in space follow each other. Facets
+    are in the order of the tree; `numbers` (n_facets,) are their numbers before sorting. `result` is filled in place, with
+    facet -1 and distance NaN where a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     for k in range(begin, end):

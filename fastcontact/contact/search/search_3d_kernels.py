@@ -12,10 +12,11 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
 @interpretable_kernel
 def closest_facets(points, order, begin, end, facets, domain, numbers, tree, closest_facet):
-    """Project points (n, 3) on their closest facets; of facets that meet in the closest point the one with the lowest number.
+    """Project points (n, 3) on their closest facets.
 
-    Arguments are as for `search_2d_kernels.closest_facets`. Where a projection fails, the distance is NaN; where a point is
-    not finite, the facet is -1, too.
+    Of facets that meet in the closest point, the one with the lowest number is taken. Arguments are as for
+    `search_2d_kernels.closest_facets`. Where a projection fails, the distance is NaN; where a point is not finite, the facet
+    is also -1.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     midst = facets.midst[0], facets.midst[1], facets.midst[2]

@@ -80,7 +80,7 @@ def on_flat(r, a, b):
         return _on_longest_side(r, a, b)
     area = va + vb + vc
     s, t = vb / area, vc / area
-    if square < LENGTH_ROUND_OFF * aa * bb:  # rounding errors are large there, and one more step makes them small
+    if square < LENGTH_ROUND_OFF * aa * bb:  # one step of iterative refinement, since rounding errors are large here
         v = rest(r, a, b, (0.0, 0.0, 0.0), s, t)
         s, t = s + (bb * dot(a, v) - ab * dot(b, v)) / square, t + (aa * dot(b, v) - ab * dot(a, v)) / square
     if s >= -ROUND_OFF and t >= -ROUND_OFF and s + t <= 1.0 + ROUND_OFF:
@@ -105,10 +105,10 @@ def _on_longest_side(r, a, b):
 def on_bilinear(r, a, b, c, reach):
     """Return (s, t) of the point ``a s + b t + c s t`` of a bilinear facet closest to `r`, and the squared distance.
 
-    Exact where the squared distance has only one minimum on the facet (see `room`), else NaN or a stationary point. The
-    distance is infinite where it clearly exceeds `reach`. Newton's method starts from the closest point on the plane of
-    a and b, and uses precomputed products of vectors; where it leaves the facet, the result is the closest point of the
-    straight sides.
+    The result is exact where the squared distance has only one minimum on the facet (see `room`); elsewhere it is NaN or a
+    stationary point. The distance is infinite where it clearly exceeds `reach`. Newton's method starts from the closest point
+    on the plane of a and b, and uses precomputed products of vectors. If it leaves the facet, the result is the closest point
+    of the straight sides.
     """
     aa, ab, bb, ac, bc, cc = dot(a, a), dot(a, b), dot(b, b), dot(a, c), dot(b, c), dot(c, c)
     ar, br, cr = dot(a, r), dot(b, r), dot(c, r)
@@ -128,7 +128,7 @@ def on_bilinear(r, a, b, c, reach):
             v = rest(r, a, b, c, s, t)
             return s, t, dot(v, v)
         s, t, square = _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr)
-        # The minimum over the sides is the global one where the facet comes no closer in its interior.
+        # The minimum over the sides is the global one if the distance does not decrease into the facet.
         v = rest(r, a, b, c, s, t)
         inward = (abs(s) == 1.0 and s * dot(v, along(a, c, t)) < 0.0) or (
             abs(t) == 1.0 and t * dot(v, along(b, c, s)) < 0.0
@@ -181,10 +181,10 @@ def _on_sides(r, a, b, c, aa, ab, bb, ac, bc, cc, ar, br, cr):
 def room(a, b, c):
     """Return the bound on |(r - X) . c| below which a local minimum X of the distance to r is the only one on the facet.
 
-    From X, with r - X = v, to another point X + ds p + dt q, where p and q are the tangents along s and t at the other and
-    at this t and s, the squared distance changes by ``|ds p + dt q|^2 - 2 v . (ds p + dt q)``. At a minimum that is at
-    least ``2 |ds dt| (|p| |q| - |p . q| - |v . c|)``, and ``|p| |q| - |p . q| = |p x q|^2 / (|p| |q| + |p . q|)``. The
-    vector product and the scalar product are linear in s and in t, so that their bounds are found at the corners.
+    Let r - X = v, and let another point be X + ds p + dt q, with p the tangent along s at the t of that point and q the
+    tangent along t at the s of X. The squared distance changes by ``|ds p + dt q|^2 - 2 v . (ds p + dt q)``. At a minimum
+    this is at least ``2 |ds dt| (|p| |q| - |p . q| - |v . c|)``, and ``|p| |q| - |p . q| = |p x q|^2 / (|p| |q| + |p . q|)``.
+    The vector product and the scalar product are linear in s and in t, so that their bounds are found at the corners.
     """
     normal = cross(a, b)
     area, product, first, second = np.inf, 0.0, 0.0, 0.0

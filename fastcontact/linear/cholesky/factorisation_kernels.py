@@ -55,13 +55,13 @@ def plan(
     Parameters
     ----------
     start, order, first, begin
-        As of `factorise`.
+        See `factorise`.
     values, before : ndarray
-        Entries of the matrix, and of the last one.
+        Entries of this matrix and of the previous one.
     above : ndarray of int (n_supernodes,)
         Parents of supernodes, or -1.
     kept : ndarray of int (n_supernodes,)
-        Offsets of the update matrices that are kept of the last factorisation, or -1.
+        Offsets of the update matrices that are kept from the last factorisation, or -1.
     source : ndarray of int (n_supernodes,)
         Filled with `ANEW`, `BELOW`, or for the root of a subtree that keeps its columns, the offset of its update matrix.
     target : ndarray of int (n_supernodes,)

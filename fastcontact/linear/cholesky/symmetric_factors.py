@@ -35,8 +35,7 @@ class SymmetricFactors:
     position : ndarray of int (n,)
         Position of each unknown in the factors.
     last : ndarray of int (m,)
-        Unknowns that are eliminated after all others, so that their columns of L only have entries in rows of these
-        unknowns.
+        Unknowns that are eliminated after all others; their columns of L have entries only in rows of these unknowns.
     """
 
     def __init__(self, L: LowerTriangle, d: Array, position: Indices, last: Indices) -> None:

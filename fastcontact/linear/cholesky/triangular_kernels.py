@@ -79,13 +79,13 @@ def backward(
         below = begin[s + 1] - begin[s]
         for k in range(below):
             gathered[k] = x[rows[begin[s] + k]]
-        # Two columns at a time, which share the loads of the vector; the last one may be single.
+        # Two columns are processed at a time, which share the loads of the vector; the last column may be single.
         while j >= low:
             single = j == low
             one = start[j] + 1
             other = one if single else start[j - 1] + 2
             first_sum, second_sum = 0.0, 0.0
-            # Slices, because they tell the compiler that entries are contiguous.
+            # Slices show the compiler that entries are contiguous.
             n = high - 1 - j
             a, b, beside = values[one : one + n], values[other : other + n], x[j + 1 : high]
             for k in range(n):

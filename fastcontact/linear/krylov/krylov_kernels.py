@@ -12,13 +12,13 @@ from fastcontact._jit.decorators import kernel
 CHUNK = 4096
 # Work of kernels for a number, see `_jit.parallel.portions`.
 WORK_OF_NUMBER = 0.5
-# First index of a whole range: for a literal 0, or an unsigned number, Numba would compile another copy of `stretch_dot`.
+# First index of a whole range; with a literal 0 or an unsigned number, Numba would compile another copy of `stretch_dot`.
 FIRST = np.int64(0)
 
 
 @kernel
 def stretch_dot(a, b, low, high):
-    """Return the dot product of a stretch, in four sums that the processor can add side by side."""
+    """Return the dot product of the entries `low` to ``high - 1``, in four independent sums."""
     s0 = s1 = s2 = s3 = 0.0
     unrolled_end = low + (high - low) // 4 * 4
     for i in range(low, unrolled_end, 4):

@@ -1,14 +1,14 @@
-"""Products of small blocks with vectors and with each other, written by hand in vector instructions.
+"""Products of small blocks with vectors and with each other, written in vector instructions.
 
-The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products: it cannot see that positions
-from an index array are contiguous. Here a row of a block is one vector instruction. This halves the time of a product with a
-matrix (16.7 to 8.5 ns per unknown in single precision, 311 469 unknowns, one thread). With plain compiled loops instead of
-`add_product` and `add_transposed` results are bitwise identical, but the set-up takes 1.5 instead of 0.5 s, and an analysis
-of one step 3.7 to 4.4 instead of 3.0 to 3.4 s (sphere on a block, 279 447 unknowns).
+The compiler turns a plain loop over the nine numbers of a 3 x 3 block into nine scalar products, since it cannot see that
+positions from an index array are contiguous. Here a row of a block is one vector instruction. This halves the time of a
+product with a matrix (16.7 to 8.5 ns per unknown in single precision, 311 469 unknowns, one thread). With plain compiled
+loops instead of `add_product` and `add_transposed`, results are bitwise identical, but the set-up takes 1.5 instead of 0.5 s,
+and an analysis of one step 3.7 to 4.4 instead of 3.0 to 3.4 s (sphere on a block, 279 447 unknowns).
 
-This is the only place in `linear` with processor-specific code. `block_products_llvm` contains the instructions; the
-functions `..._plain` are the equivalent in NumPy. They run where kernels are not compiled, and the tests compare both.
-Indices are not checked here.
+No other module in `linear` has processor-specific code. `block_products_llvm` contains the instructions; the functions
+`..._plain` are their equivalents in NumPy, which run where kernels are not compiled. The tests compare both. Indices are not
+checked.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def add_transposed_plain(
 
 
 def _kernel(written: Any, plain: Any) -> Any:
-    """Return the function that kernels call: the vector instructions, or the plain function without compilation."""
+    """Return the function that kernels call: the vector instructions, or the plain function if nothing is compiled."""
     return numba.extending.intrinsic(written) if compiled() else plain
 
 

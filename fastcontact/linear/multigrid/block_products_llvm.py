@@ -1,7 +1,7 @@
 """Numba intrinsics for `block_products`: functions that generate LLVM code while Numba compiles a kernel.
 
-Each public function here implements the function of the same name in `block_products`. It is called with the Numba types of
-the arguments and returns the signature and a code generator. None of this runs when the kernel runs.
+Each public function implements the function of the same name in `block_products`. It is called with the Numba types of the
+arguments, only during compilation, and returns the signature and a code generator.
 """
 
 from __future__ import annotations
@@ -225,8 +225,8 @@ class _Writer:
 class _Row(_Writer):
     """Generator of the loop over the blocks of a row, with a sum for every row of the blocks and lane of a vector.
 
-    With three columns a vector has one number too many. In the last row of a block it is the one before the row, in others
-    the one after, so that nothing outside the block is read.
+    With three columns a vector has one number too many. In the last row of a block it is the number before the row, in other
+    rows the number after, so that nothing outside the block is read.
     """
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
@@ -265,7 +265,7 @@ class _Row(_Writer):
         self.leave(j)
 
     def met(self, r: int, p: int, numbers: Any, last: bool) -> None:
-        """Process the numbers of row r and piece p of a block further; `last` if they begin one number before it."""
+        """Process the numbers of row r and piece p of a block; `last` if they begin one number before the row."""
 
     def leave(self, j: Any) -> None:
         """Finish a block whose first column is j."""
@@ -295,7 +295,7 @@ class _Row(_Writer):
 
 
 class _RowBothWays(_Row):
-    """The same, plus the product of the transposed blocks and the row's part of x, added to y at their columns."""
+    """Generator like `_Row` that also adds the product of the transposed blocks and the row's part of x to y."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, args: Any, m: int, n: int) -> None:
         super().__init__(context, builder, signature, args, m, n)

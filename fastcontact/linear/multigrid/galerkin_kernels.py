@@ -1,8 +1,8 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
 
-Block matrices come as arrays, see `matrix.BlockMatrix`, block sizes m and n as tuples of zeros, `rows` and `cols`; numbers
-that may be split as a tuple, see `split_matrix_kernels`; which blocks are stored as `storage`, see
+Block matrices are given by arrays, see `matrix.BlockMatrix`, and block sizes m and n by tuples of zeros, `rows` and `cols`.
+Numbers that may be split are tuples, see `split_matrix_kernels`, and `storage` tells which blocks are stored, see
 `symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1``, one by one in a fixed order.
 """
 

@@ -11,7 +11,7 @@ from fastcontact.linear.multigrid.matrix import PARTS, SHORTEST, WORK_OF_ROW, Bl
 
 
 class Restriction:
-    """The transpose of a prolongator P, which is not stored; each part of its rows has its own work space.
+    """The transpose of a prolongator P, which is not stored; each part of the rows of P has its own work space.
 
     Parameters
     ----------
@@ -30,7 +30,7 @@ class Restriction:
 
     @property
     def nbytes(self) -> int:
-        """Memory without P [bytes]."""
+        """Memory of the work space, without P [bytes]."""
         return self._work.nbytes
 
     def multiply(self, x: AnyArray, y: AnyArray) -> None:

@@ -24,8 +24,8 @@ def reach(indptr, indices, ends, first, last):
 def add_parts(low, high, indptr, indices, data, ends, first, last, begin, x, work, rows, cols):
     """Fill the buffers of parts `low` to ``high - 1`` with products of their rows with x.
 
-    The buffer of part p is the blocks of `work` from ``begin[p]`` on, for the columns ``first[p]`` to ``last[p] - 1``, see
-    `reach`.
+    The buffer of part p consists of the blocks of `work` from ``begin[p]`` on, for the columns ``first[p]`` to
+    ``last[p] - 1``, see `reach`.
     """
     n = len(cols)
     for p in range(low, high):

@@ -1,7 +1,7 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Factors D and G of a symmetric update ``D.T G + G.T D``, restricted and multiplied.
 
-Sparse rows are given by ``indptr`` and ``indices``, in any order, and numbers. Restricted ones have a block of ``len(cols)``
+Sparse rows are given by ``indptr`` and ``indices``, in any order, and numbers. Restricted rows have a block of ``len(cols)``
 numbers for each coarse node. Kernels with `low` and `high` compute these rows of a result, each in a fixed order.
 """
 
@@ -86,8 +86,9 @@ def count_products(low, high, start, origin, rows, nodes, n_coarse, count):
 def products(low, high, start, origin, slot, E, rows, nodes, H, n_coarse, into, columns, out, cols):
     """Fill block rows of ``E.T H``: columns, ascending, and blocks.
 
-    E is given by its block columns: `start` (n_rows + 1,), the row `origin` and the block `slot` of each entry; H by rows, as
-    `rows`, `nodes` and numbers. `into` (n_rows + 1,) are the row pointers of the result, `out` contains zeros.
+    E is given by block columns, with `start` (n_rows + 1,) and the row `origin` and block `slot` of each entry, and H by
+    rows, with `rows`, `nodes` and numbers. `into` (n_rows + 1,) are the row pointers of the result; `out` initially contains
+    zeros.
     """
     width = len(cols)
     seen, column_slot = np.full(n_coarse, -1, np.int32), np.empty(n_coarse, np.int32)

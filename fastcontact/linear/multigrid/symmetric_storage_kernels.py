@@ -3,7 +3,7 @@
 
 Block rows are divided into parts of equal length, the last one shorter. A block whose row and column lie in the same part is
 stored once, in the upper triangle; a block between two parts is stored in both rows, so that no part writes into another.
-With parts of some planes of a mesh 0.55 to 0.65 of all blocks are stored.
+With parts that contain several planes of a mesh, 0.55 to 0.65 of all blocks are stored.
 
 The storage is a tuple ``storage = (start, upper, columns, length)``: the stored blocks of row i are ``start[i]`` to
 ``start[i + 1] - 1``, `columns` their block columns, `length` is that of parts. Blocks between parts come first, then the
@@ -32,7 +32,7 @@ def part_of(storage, i):
 def place_of(storage, part, i, j, k):
     """Return the slot of block (i, j), the `k`-th of the pattern, and whether its transpose is stored there.
 
-    `part` is ``part_of(storage, i)``; -1 if the block is not stored, since the pattern is not symmetric.
+    `part` is ``part_of(storage, i)``. The slot is -1 if the block is not stored, since the pattern is not symmetric.
     """
     if part[1] == 0:
         return k, False
@@ -181,7 +181,7 @@ def _multiply_part(low, high, storage, numbers, x, factor, share, z, y, rows):
 
 @kernel
 def multiply(low, high, storage, numbers, x, factor, share, z, y, rows):
-    """Fill parts `low` to ``high - 1`` of `y` (n,) with ``share z + factor A x``; z and y may be the same array, x not.
+    """Fill parts `low` to ``high - 1`` of `y` (n,) with ``share z + factor A x``; y may be z, but not x.
 
     Each part is processed by one thread, so that every number of y is summed in a fixed order.
     """

@@ -1,8 +1,8 @@
 """Reference solver: pyamg's smoothed aggregation as preconditioner of SciPy's conjugate gradients.
 
-Deliberately simple and slow. It serves to check our multigrid, "amg", and to compare with it: everything here except
-the choice of pivots is pyamg's and SciPy's. Equations are eliminated, ``u = T v + t``, and each set of equations gets
-its own hierarchy for the matrix ``T.T K T``.
+This solver is deliberately simple and slow. It serves to verify the solver "amg" and to compare with it: everything except
+the choice of pivots is done by pyamg and SciPy. Equations are eliminated, ``u = T v + t``, and each set of equations requires
+a new hierarchy for the matrix ``T.T K T``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from fastcontact.linear.elimination.loaded import LoadedIteration, put_back_tole
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
 from fastcontact.linear.protocol import TOLERANCE, Counters, LinearSolver, Monitor
 
-# All neighbours are strong, as in our multigrid; rigid-body modes need no improvement, and polynomials smooth cheapest.
+# All connections are strong, as in "amg"; rigid-body modes need no improvement; Chebyshev is the cheapest smoother.
 SMOOTHER = ("chebyshev", {"degree": 2, "iterations": 1})
 OPTIONS: dict[str, Any] = {
     "strength": ("symmetric", {"theta": 0.0}), "max_coarse": 200, "improve_candidates": None,
@@ -108,7 +108,7 @@ class Pyamg(LinearSolver):
         )  # fmt: skip
         if failed:
             raise ConvergenceError(
-                f"conjugate gradients with pyamg do not reach {self.tolerance:.1e}: use amg or direct"
+                f"conjugate gradients with pyamg do not reach the tolerance {self.tolerance:.1e}: use amg or direct"
             )
         return np.asarray(self._T @ v + t)
 

@@ -1,6 +1,6 @@
-"""Reference elements: each is an entry of the table of its shape; an entry there is a new element.
+"""Reference elements. A new element is a new entry in the tuple ``ELEMENTS`` of the module of its shape.
 
-Every module of this package whose name has no leading underscore holds the elements of one shape, called ``ELEMENTS``.
+Every module of this package whose name has no leading underscore contains the elements of one shape.
 """
 
 from __future__ import annotations
@@ -17,10 +17,7 @@ BY_VTK = {element.vtk: element for element in ELEMENTS.values()}
 
 
 def get(name: str) -> Element:
-    """Return the element called `name`.
-
-    MeshError if there is no such element; the message offers the nearest names.
-    """
+    """Return the element called `name`; MeshError if there is none, with the most similar names."""
     try:
         return ELEMENTS[name]
     except KeyError:

@@ -1,4 +1,4 @@
-"""A reference element: data, two functions and its default quadrature; shape functions of families of elements.
+"""Reference elements with shape functions and default quadrature, and shape functions of families of elements.
 
 Reference coordinates have no dimension.
 """
@@ -32,7 +32,7 @@ class Element:
     Parameters
     ----------
     name : str
-        Our name, e.g. ``"tri6"``.
+        Name in this package, e.g. ``"tri6"``.
     nodes : ndarray (n_nodes, dim)
         Reference coordinates [-], in the order of VTK; corners first, then mid nodes in the order of `edges`, then
         centre nodes of faces and of the cell.
@@ -54,7 +54,7 @@ class Element:
         Name of the element on the same corners with mid nodes.
     dilatation : int, optional
         Degree, 0 or 1, up to which the dilatation of nearly incompressible materials has the whole bulk modulus; None
-        where gradients are constant, so that nothing can be left out.
+        if the gradients are constant, so that the dilatation cannot be reduced.
     corner_element : Element, optional
         The linear element on the same corners, None if it is linear itself.
     """
@@ -80,7 +80,7 @@ class Element:
 
     @property
     def corner_shape(self) -> Function:
-        """Shape functions (m, n_corners) [-] of the linear element on the same corners."""
+        """Return the shape functions (m, n_corners) [-] of the linear element on the same corners."""
         return (self.corner_element or self).shape
 
     @property
@@ -90,7 +90,7 @@ class Element:
 
     @property
     def order(self) -> int:
-        """1 for linear, 2 for quadratic."""
+        """Polynomial order: 1 for linear, 2 for quadratic elements."""
         return 1 if self.corner_element is None else 2
 
     @property
@@ -132,9 +132,9 @@ class Element:
     def extrapolation(self) -> Array:
         """Matrix (n_nodes, n_q) [-] from values at the default quadrature points to values at the nodes.
 
-        The corner polynomial is fitted to the point values by least squares (exact when there are as many points
-        as corners) and evaluated at all nodes; with fewer points than corners, the mean is taken. This is what
-        code_aster does for SIEF_ELNO.
+        The polynomial of the corners is fitted to the point values by least squares (exactly if there are as many points
+        as corners) and evaluated at all nodes; with fewer points than corners, the mean is used. SIEF_ELNO of code_aster
+        is computed in the same way.
         """
         points, _ = self.quadrature
         if len(points) < self.n_corners:
@@ -168,8 +168,9 @@ def with_middles(linear: Element) -> Array:
 def serendipity(box: Element) -> Functions:
     """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear square or cube with mid nodes.
 
-    In each coordinate x of a node at X, the function of a mid node has the factor 1 - x^2 along its edge, where X is 0, and
-    (1 + x X) / 2 across it; that of a corner is its linear one times the sum of x X, less dim - 1 (Zienkiewicz and Taylor).
+    The function of a mid node at X is a product over the coordinates x, with the factor 1 - x^2 along its edge, where X is 0,
+    and (1 + x X) / 2 across the edge. The function of a corner is its linear function times the sum of all x X minus dim - 1
+    (Zienkiewicz and Taylor).
     """
     nodes, dim = with_middles(box), box.dim
     corners, middles = np.split(nodes, [box.n_nodes])
@@ -195,8 +196,8 @@ def serendipity(box: Element) -> Functions:
 def product(nodes: Array, first: Element, second: Element) -> Functions:
     """Return the nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of a product of two elements.
 
-    The function of each of the `nodes` (n_nodes, dim) [-] is one of the first element in the first coordinates, times one
-    of the second in the others: those of the nodes at the same coordinates.
+    The function of each of the `nodes` (n_nodes, dim) [-] is a function of the first element in the first coordinates times
+    a function of the second element in the other coordinates, namely those of the nodes with these coordinates.
     """
     split = first.dim
     I = np.abs(nodes[:, None, :split] - first.nodes).sum(axis=2).argmin(axis=1)  # noqa: E741

@@ -1,9 +1,10 @@
-"""Pyramids: the base [-1, 1]^2 at z = 0, then the apex (0, 0, 1); then mid nodes of the base's edges and of the rising ones.
+"""Pyramids with the base [-1, 1]^2 at z = 0 and the apex (0, 0, 1).
 
-The shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992): polynomials in z, a = x / (1 - z)
-and b = y / (1 - z). At the apex their gradient depends on the direction; there the limit along the axis is used. The conical
-product rule of 27 points integrates the gradients of the quadratic element exactly, on curved cells too, so that patch
-tests are passed; code_aster uses 10 points.
+The nodes are the corners of the base, the apex, and the mid nodes of the edges of the base and of the edges to the apex. The
+shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992): polynomials in z, a = x / (1 - z) and
+b = y / (1 - z). At the apex, where their gradient depends on the direction, the limit along the axis is used. The conical
+product rule of 27 points integrates the gradients of the quadratic element exactly, also on curved cells, so that patch tests
+are passed; code_aster uses 10 points.
 """
 
 import numpy as np
@@ -24,13 +25,13 @@ def collapsed(xi: Array) -> tuple[Array, Array, Array]:
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions (m, 5) [-] at `xi` (m, 3) [-]."""
+    """Return the shape functions (m, 5) [-] at `xi` (m, 3) [-]."""
     a, b, t = collapsed(xi)
     return np.column_stack([t * (1 + X * a) * (1 + Y * b) / 4, xi[:, 2]])
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives (m, 5, 3) [-] at `xi` (m, 3) [-]."""
+    """Return the derivatives (m, 5, 3) [-] at `xi` (m, 3) [-]."""
     a, b, _ = collapsed(xi)
     base = np.stack([X * (1 + Y * b), Y * (1 + X * a), X * Y * a * b - 1], axis=2) / 4
     apex = np.tile([0.0, 0.0, 1.0], (len(xi), 1, 1))
@@ -49,7 +50,7 @@ ALONG_X = np.array([True, False, True, False])
 
 
 def shape_13(xi: Array) -> Array:
-    """Shape functions (m, 13) [-] at `xi` (m, 3) [-]."""
+    """Return the shape functions (m, 13) [-] at `xi` (m, 3) [-]."""
     (a, b, t), z = collapsed(xi), xi[:, 2:3]
     corner = shape(xi)[:, :4] * (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)
     base = t * t / 2 * np.where(ALONG_X, (1 - a * a) * (1 + SIDES * b), (1 - b * b) * (1 + SIDES * a))
@@ -57,7 +58,7 @@ def shape_13(xi: Array) -> Array:
 
 
 def gradient_13(xi: Array) -> Array:
-    """Derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
+    """Return the derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
     (a, b, t), z = collapsed(xi), xi[:, 2:3]
     N, dN = shape(xi)[:, :4, None], gradient(xi)[:, :4]
     outward = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]
@@ -70,7 +71,7 @@ def gradient_13(xi: Array) -> Array:
 
 
 def _side(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
-    """Derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for the four S of `SIDES`; `axes` of a and b."""
+    """Return the derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for the four S of `SIDES`, with the `axes` of a, b."""
     functions = np.empty((len(a), 4, 3))
     functions[:, :, axes[0]] = -a * t * (1 + SIDES * b)
     functions[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2

@@ -1,6 +1,7 @@
-"""Quadrangles on [-1, 1]^2: four corners, 2 x 2 integration points; then mid nodes of edges 01, 12, 23, 30, and the centre.
+"""Quadrangles on [-1, 1]^2.
 
-Quadratic elements have 3 x 3 integration points.
+The nodes are the corners, counter-clockwise, the mid nodes of the edges 01, 12, 23, 30, and the centre. Linear elements have
+2 x 2, quadratic elements 3 x 3 integration points.
 """
 
 import numpy as np

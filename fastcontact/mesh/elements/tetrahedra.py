@@ -1,6 +1,7 @@
-"""Tetrahedra (0,0,0) (1,0,0) (0,1,0) (0,0,1): four corners; then mid nodes of edges 01, 12, 20, 03, 13, 23.
+"""Tetrahedra with the corners (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1).
 
-They have one and five integration points.
+The corners are followed by the mid nodes of the edges 01, 12, 20, 03, 13, 23. Linear elements have one, quadratic elements
+five integration points.
 """
 
 import numpy as np
@@ -10,12 +11,12 @@ from fastcontact.mesh.quadrature import tetrahedron_1, tetrahedron_5
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions (m, 4) [-] at `xi` (m, 3) [-]: the barycentric coordinates."""
+    """Return the shape functions (m, 4) [-] at `xi` (m, 3) [-]: the barycentric coordinates."""
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives (m, 4, 3) [-] at `xi` (m, 3) [-]."""
+    """Return the derivatives (m, 4, 3) [-] at `xi` (m, 3) [-]."""
     return np.tile(np.vstack([-np.ones(3), np.eye(3)]), (len(xi), 1, 1))
 
 

@@ -1,6 +1,7 @@
-"""Triangles (0,0) (1,0) (0,1): three corners, one integration point; then mid nodes of edges 01, 12, 20, six points.
+"""Triangles with the corners (0, 0), (1, 0), (0, 1).
 
-Three points would fail at an axis of symmetry.
+The corners are followed by the mid nodes of the edges 01, 12, 20. Linear elements have one, quadratic elements six
+integration points; three points would fail at an axis of symmetry.
 """
 
 import numpy as np
@@ -12,12 +13,12 @@ EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 def shape(xi: Array) -> Array:
-    """Shape functions (m, 3) [-] at `xi` (m, 2) [-]."""
+    """Return the shape functions (m, 3) [-] at `xi` (m, 2) [-]."""
     return np.stack([1 - xi[:, 0] - xi[:, 1], xi[:, 0], xi[:, 1]], axis=1)
 
 
 def gradient(xi: Array) -> Array:
-    """Derivatives (m, 3, 2) [-] at `xi` (m, 2) [-]."""
+    """Return the derivatives (m, 3, 2) [-] at `xi` (m, 2) [-]."""
     return np.broadcast_to(np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]]), (len(xi), 3, 2)).copy()
 
 

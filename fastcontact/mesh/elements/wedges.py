@@ -1,6 +1,7 @@
-"""Wedges: the triangle (0,0) (1,0) (0,1) at z = -1, then at z = 1; six integration points.
+"""Wedges between the triangles (0, 0), (1, 0), (0, 1) at z = -1 and z = 1.
 
-Then mid nodes of the edges below, above, upright; centres of the faces 0143, 1254, 2035. Quadratic elements have 21
+The nodes are the corners of the lower and of the upper triangle; mid nodes of the edges of the lower and of the upper
+triangle, and of the vertical edges; centres of the faces 0143, 1254, 2035. Linear elements have six, quadratic elements 21
 integration points. The order is that of Gmsh, Abaqus and VTK 9.7; older documentation of VTK numbers the triangles in the
 opposite direction.
 """
@@ -28,7 +29,7 @@ SIDE = Z[A]
 
 
 def shape_15(xi: Array) -> Array:
-    """Shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
+    """Return the shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
     L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
     corner = shape(xi) * (2 * L - 2 + z * Z)
     flat = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
@@ -36,7 +37,7 @@ def shape_15(xi: Array) -> Array:
 
 
 def gradient_15(xi: Array) -> Array:
-    """Derivatives (m, 15, 3) [-] at `xi` (m, 3) [-]."""
+    """Return the derivatives (m, 15, 3) [-] at `xi` (m, 3) [-]."""
     L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
     dL = TRI3.gradient(xi[:, :2])[:, TWICE]
     slope = np.concatenate([2 * dL, np.broadcast_to(Z[:, None], (*L.shape, 1))], axis=2)

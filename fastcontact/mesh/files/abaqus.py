@@ -1,4 +1,4 @@
-"""Abaqus input files: refusal of content that meshio misreads, and output that meshio writes incorrectly."""
+"""Abaqus input files: detection of content that meshio misreads, and output of groups that meshio writes incorrectly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NUMBERS_A_LINE = 8
 
 
 def check_readable(path: Path) -> None:
-    """Refuse files of which meshio would silently drop points or members of sets."""
+    """Raise FileError for files of which meshio would silently drop points or members of sets."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
@@ -35,8 +35,8 @@ def check_readable(path: Path) -> None:
     with_set = [bool(options.get("ELSET")) for keyword, options in sections if keyword == "ELEMENT"]
     if sorted(with_set, reverse=True) != with_set:
         raise FileError(
-            f"'{path}' names an ELSET in a later *ELEMENT section only, which meshio gives to wrong cells: "
-            "name one in each, or define them by *ELSET"
+            f"'{path}' names an ELSET only in a later *ELEMENT section, which meshio assigns to wrong cells: "
+            "name one in each section, or define them by *ELSET"
         )
 
 
@@ -50,7 +50,7 @@ def append_cell_sets(path: Path, mesh: Mesh) -> None:
     """Append the groups of cells, each once; meshio writes one *ELSET for each element of a group."""
     for name in mesh.group_names:
         if any(character in name for character in ",=*\n") or name != name.strip():
-            raise FileError(f"group name '{name}' holds a blank or a sign that Abaqus files cannot take: rename it")
+            raise FileError(f"group name '{name}' contains a character that Abaqus files do not permit: rename it")
     with open(path, "a", encoding="utf-8") as file:
         for name, members in mesh.cell_groups.items():
             file.write(f"*ELSET, ELSET={name}\n")

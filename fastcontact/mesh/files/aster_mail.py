@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.files.meshio_content import VERTEX, mesh_of
 from fastcontact.mesh.mesh import Mesh
 
-# Cells by keyword; positions of our nodes among those of code_aster where the orders differ.
+# Cells by keyword, and positions of the nodes of fastcontact among those of code_aster where the orders differ.
 KINDS = {
     "POI1": VERTEX, "SEG2": "line2", "SEG3": "line3", "TRIA3": "tri3", "TRIA6": "tri6", "QUAD4": "quad4", "QUAD8": "quad8",
     "QUAD9": "quad9", "TETRA4": "tet4", "TETRA10": "tet10", "PENTA6": "wedge6", "PENTA15": "wedge15", "PENTA18": "wedge18",
@@ -39,7 +39,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
     Raises
     ------
     FileError
-        If it is damaged or contains anything else; the message names the line.
+        If the file is damaged or contains anything else; the message names the line.
     """
     content = _Content(path)
     words = _words(path)
@@ -50,7 +50,7 @@ def read(path: Path) -> tuple[Mesh, dict[str, int]]:
             except MeshError as error:
                 raise MeshError(f"'{path}': {error}") from None
         content.add(keyword.upper(), line, _block(path, keyword, line, words))
-    raise FileError(f"'{path}' ends without FIN: it is cut off, or no mesh file of code_aster")
+    raise FileError(f"'{path}' ends without FIN: it is truncated, or not a mesh file of code_aster")
 
 
 def _words(path: Path) -> Iterator[Word]:
@@ -75,7 +75,7 @@ def _block(path: Path, keyword: str, line: int, words: Iterator[Word]) -> list[W
             del kept[-3:]
             if keyword.upper().startswith("GROUP") and name.upper() == "NOM":
                 kept.append(value)
-    raise FileError(f"'{path}', line {line}: {keyword[:40]} has no FINSF: the file is cut off")
+    raise FileError(f"'{path}', line {line}: {keyword[:40]} has no FINSF: the file is truncated")
 
 
 class _Content:

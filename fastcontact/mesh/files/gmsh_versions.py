@@ -1,4 +1,4 @@
-"""Convert Gmsh files of versions that meshio does not read."""
+"""Conversion of Gmsh files of versions that meshio does not read."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from pathlib import Path
 
 from fastcontact.errors import FileError
 
-# Files begin with $MeshFormat, and a line of version, kind and size; those of version 1 begin with their nodes.
+# Files begin with $MeshFormat and a line of version, kind and size; files of version 1 begin with their nodes.
 VERSION_1 = b"$NOD"
 # Gmsh writes 4.0 as "4", which meshio 5.3.5 mistakes for 4.1.
 VERSION_4, VERSION_4_0 = b"4", b"4.0"
 # In a line of $Entities: position of the number of physical groups, after the number of the entity and its box.
 GROUPS_OF_ENTITY = 7
-# Limit of the number of nodes of a cell, more than the largest has.
+# Limit of the number of words of a cell, above that of the largest element.
 MOST_WORDS = 200
 
 
@@ -35,7 +35,7 @@ def readable(path: Path, folder: Path) -> Path:
 
 
 def _check_groups(path: Path) -> None:
-    """Refuse a file of version 4.0 in which cells belong to several groups, of which meshio keeps one."""
+    """Raise FileError for a file of version 4.0 in which cells belong to several groups, of which meshio keeps one."""
     inside = False
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("$"):
@@ -70,5 +70,5 @@ def _section(path: Path, lines: list[str], name: str) -> Iterator[str]:
     """Yield the lines between $NAME and $ENDNAME."""
     stripped = [line.strip() for line in lines]
     if f"${name}" not in stripped or f"$END{name}" not in stripped:
-        raise FileError(f"'{path}' has no whole section ${name}: it is cut off, or no Gmsh file of version 1")
+        raise FileError(f"'{path}' has no complete section ${name}: it is truncated, or not a Gmsh file of version 1")
     yield from stripped[stripped.index(f"${name}") + 1 : stripped.index(f"$END{name}")]

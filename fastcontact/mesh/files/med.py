@@ -23,8 +23,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh, check_kinds
 from fastcontact.mesh.mesh import Mesh
 
-# Elements with different node orders in MED: our node k is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid
-# as seen from outside, we as seen from inside: its cells are mirror images of ours.
+# Elements with another node order in MED: node k here is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid as
+# seen from outside, fastcontact as seen from inside, so that cells of MED are mirror images.
 NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
 # The order of face centres is bottom, sides all round, top in MED, and -x, +x, -y, +y, bottom, top here.
 _FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
@@ -56,7 +56,7 @@ class MedContent(NamedTuple):
 def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
     """Read a mesh with its groups, with the orientation of cells in the file.
 
-    Of several meshes `mesh_name` is read, of several time steps of a mesh the first.
+    If the file contains several meshes, `mesh_name` is read; if the mesh has several time steps, the first one is read.
     """
     with opened(path) as file:
         name = _chosen_mesh(file, path, mesh_name)
@@ -101,7 +101,7 @@ def _read_mesh(file: Any, group: Any) -> tuple[Mesh, int]:
 
 
 def _group_names(families: Families, sign: int) -> list[str]:
-    """Return the groups of all families of points (+1) or cells (-1), empty ones, too."""
+    """Return the groups of all families of points (+1) or cells (-1), including empty ones."""
     return [name for number in sorted(families, key=abs) if number * sign > 0 for name in families[number]]
 
 
@@ -132,7 +132,7 @@ def _read_points(step: Any, mesh: Any) -> Array:
     if count == 0 or dim * count != len(flat):
         raise MeshError(f"it has {len(flat)} coordinates for {count} nodes: check that the file is complete")
     if dim == 1:
-        raise MeshError("it is in a space of one dimension: two or three are needed")
+        raise MeshError("its points have one coordinate: two or three are needed")
     return np.asarray(flat, np.float64).reshape(dim, count).T
 
 
@@ -178,7 +178,7 @@ def _read_nodes(entry: Any, code: str) -> AnyArray:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    Readers return the elements in alphabetical order of their MED codes. Names may have 64 bytes, those of groups 80.
+    Readers return the elements in alphabetical order of their MED codes. Names may have up to 64 bytes, those of groups 80.
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)
@@ -222,7 +222,7 @@ def add_mesh(file: Any, mesh: Mesh, mesh_name: str) -> None:
     """Write a mesh with its groups into an open file."""
     checked_name("mesh", mesh_name, NAME_SIZE)
     if "/" in mesh_name:
-        raise FileError(f"mesh name '{mesh_name}' holds a slash, which separates folders in a MED file: rename it")
+        raise FileError(f"mesh name '{mesh_name}' contains a slash, which separates folders in a MED file: rename it")
     group = file.create_group(f"ENS_MAA/{mesh_name}")
     _set(group, DIM=max((elements.get(name).dim for name in mesh.cells), default=mesh.dim), ESP=mesh.dim)
     _set(group, REP=0, SRT=0, TYP=0, NXT=NO_STEP, NXI=NO_STEP, UNT="", DES="fastcontact")
@@ -323,10 +323,10 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
 def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Array, Array | None]:
     """Return a field at points or cells from a file of MED 3 or later: times, values and places.
 
-    Times are (n_instants,) in the order of the file [-], values (n_instants, n, n_components), NaN where there are none [unit
-    of the field], places (n, dim) the points, None if they are in another file, or the middles of the cells [length].
-
-    Raises FileError if the file cannot be read, has no such field, or the field does not have one value per point or cell.
+    Times (n_instants,) are in the order of the file [-]. Values (n_instants, n, n_components) are NaN where there are none
+    [unit of the field]. Places (n, dim) are the points, None if they are in another file, or the middles of the cells
+    [length]. Raises FileError if the file cannot be read, has no such field, or the field does not have one value per point
+    or cell.
     """
     with opened(path) as file:
         group, name, mesh = _field_and_mesh(file, path, field)
@@ -362,7 +362,7 @@ def _middles(path: PathLike, field: str, step: Any, points: Array, support: str)
         raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
     nodes = _read_nodes(step["MAI"][code], code)
     if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)):
-        raise FileError(f"a cell of '{path}' names a point that is not there: write the file anew")
+        raise FileError(f"a cell of '{path}' refers to a missing point: write the file anew")
     return np.asarray(points[nodes].mean(axis=1))
 
 
@@ -380,7 +380,7 @@ def _read_instant(file: Any, support: Any, n_values: int, n_components: int) -> 
     for name, profile in () if support is None else support.items():
         if (count := int(attribute(profile, "NGA", 1))) != 1:
             raise FileError(
-                f"a field of '{file.filename}' has {count} values in each cell, at integration points: one a cell is needed"
+                f"a field of '{file.filename}' has {count} values per cell, at integration points: one per cell is needed"
             )
         values_of_profile = values(profile, "CO").reshape(n_components, -1).T
         if name == NO_PROFILE:
@@ -427,7 +427,7 @@ def _names_in(family: Any) -> tuple[str, ...]:
     if "GRO" not in family:
         return ()
     raw = values(family["GRO"], "NOM").tobytes()
-    # MED 2 stores one string for all names, later versions a row for each: the same bytes, except for a zero.
+    # MED 2 stores one string for all names, later versions one row per name; the bytes are equal except for a zero.
     count = -(-len(raw) // GROUP_NAME_SIZE)
     if "NBR" in family["GRO"].attrs:
         count = min(count, int(attribute(family["GRO"], "NBR")))
@@ -461,7 +461,7 @@ def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[
     labels = np.zeros(count, np.intp)
     combinations: list[tuple[str, ...]] = [()]
     for name, rows in groups.items():
-        # Only members change family: the cost is proportional to the size of the groups, not to that of the mesh.
+        # Only members change family, so that the cost is proportional to the size of the groups, not to that of the mesh.
         before, position = np.unique(labels[rows], return_inverse=True)
         labels[rows] = len(combinations) + position
         combinations += [(*combinations[label], name) for label in before]

@@ -38,7 +38,7 @@ def read_field(
     """Return a field of a file as an array over the cells or points of a mesh.
 
     The array can be a material constant: ``fc.LinearElastic(E=fc.read_field(mesh, "scan.vtu", "E"), nu=0.3)``. Points
-    and cells are matched by position, so that the file may contain further ones, in any order.
+    and cells are matched by position, so that the file may contain other points and cells, in any order.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def read_field(
     groups : str or sequence of str, optional
         Groups of solid cells for which the file has values; by default all.
     instant : float, optional
-        The time to read from a file with several [-].
+        Time at which to read a field with several instants [-].
 
     Returns
     -------
@@ -76,7 +76,7 @@ def read_field(
     name = f"field '{field}' of '{file}'"
     cells, of_file = _cells(mesh, groups), read_file_field(file, field, over)
     if instant is None and len(of_file.values) != 1:
-        raise FileError(f"{name} has {len(of_file.values)} instants: say which with instant")
+        raise FileError(f"{name} has {len(of_file.values)} instants: select one with instant")
     row = 0 if instant is None else row_of(instant, of_file.times, name)
     if over == "cells":
         middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
@@ -96,17 +96,17 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
     rows = mesh.split(np.unique(np.concatenate([mesh.cell_groups[name] for name in names])))
     blocks = [block[rows[name]] for name, block in mesh.solids.items() if name in rows]
     if not blocks:
-        raise MeshError(f"the groups {', '.join(names)} hold no solid cells")
+        raise MeshError(f"the groups {', '.join(names)} contain no solid cells")
     return blocks
 
 
 def row_of(instant: float, times: Array | None, name: str, error: type[FastcontactError] = FileError) -> int:
     """Return the row of an instant among the `times` (n_instants,) of a field; raises `error` if there is none."""
     if times is None:
-        raise error(f"{name} has no times: leave out instant")
+        raise error(f"{name} has no times: omit instant")
     row = int(np.abs(times - instant).argmin())
     if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
-        among = f"the next is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
+        among = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
         raise error(f"{name} has no instant {instant:g}, {among}")
     return row
 
@@ -159,8 +159,8 @@ def _nearest(
 ) -> tuple[Indices, float]:
     """Return the rows (n,) of a field at positions (n, dim) of a mesh, and the tolerance of the distance [length].
 
-    `numbers` (n,) are those of the points or cells at the positions; `nouns` name them, and the items on which the field
-    is to be written, in messages.
+    `numbers` (n,) are the numbers of the points or cells at the positions. In messages, `nouns` name these items, and those
+    on which the field is to be written.
     """
     assert field.places is not None
     reach = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
@@ -169,7 +169,7 @@ def _nearest(
     if len(off):
         raise MeshError(
             f"{name} has no {nouns[0]} where {len(off)} {nouns[0]}s of the mesh are (first: {nouns[0]} {numbers[off[0]]} "
-            f"{places[off[0]]}, {distance[off[0]]:.3g} from the next): write it on the {nouns[1]} of this mesh"
+            f"{places[off[0]]}, {distance[off[0]]:.3g} from the nearest): write it on the {nouns[1]} of this mesh"
         )
     return rows, reach
 
@@ -231,7 +231,7 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
         field = field[None]
     count = int(np.prod(field.shape[2:], dtype=np.int64))
     if field.ndim > 3 or count != 1:
-        single = f"one with a single number a {over.removesuffix('s')} is needed"
+        single = f"a field with a single number per {over.removesuffix('s')} is needed"
         raise FileError(f"field '{name}' of '{path}' has {count} components: {single}")
     if not len(field):
         raise FileError(f"field '{name}' of '{path}' has no instant")
@@ -244,7 +244,7 @@ def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyAr
     with opened(path) as file:
         grid = file.get("VTKHDF", {})
         if not needed <= set(grid):
-            raise FileError(f"'{path}' holds no unstructured grid of VTK")
+            raise FileError(f"'{path}' contains no unstructured grid of VTK")
         fields = grid.get("PointData" if at_points else "CellData", {})
         if name not in fields:
             raise FileError(f"'{path}': {unknown('field' if at_points else 'field of cells', name, list(fields))}")
@@ -257,7 +257,7 @@ def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyAr
         times = np.asarray(values(grid["Steps"], "Values"), np.float64)[:n_steps]
         first = np.asarray(values(grid["Steps/PointDataOffsets"], name), np.int64)[:n_steps]
         if len(np.unique(values(grid, "NumberOfPoints"))) != 1 or int(values(grid, "NumberOfPoints")[0]) != n_points:
-            raise FileError(f"'{path}' has a mesh that changes, or of several parts: write one mesh for all instants")
+            raise FileError(f"'{path}' has a mesh that changes or has several parts: write one mesh for all instants")
         check_size(f"field '{name}' of '{path}'", (n_steps, n_points), file)
         if len(first) and (first.min() < 0 or first.max() + n_points > len(field)):
             raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write it anew")
@@ -273,5 +273,5 @@ def _middles(path: Path, name: str, grid: Any, n_values: int, points: Array) -> 
         raise FileError(f"field '{name}' of '{path}' has several instants or parts: write the cells once")
     bad = not len(counts) or counts.min() < 1 or starts[0] != 0 or starts[-1] != len(nodes)
     if bad or nodes.min() < 0 or nodes.max() >= len(points):
-        raise FileError(f"a cell of '{path}' names a point that is not there: write it anew")
+        raise FileError(f"a cell of '{path}' refers to a missing point: write it anew")
     return np.asarray(np.add.reduceat(points[nodes], starts[:-1], axis=0) / counts[:, None])

@@ -1,4 +1,4 @@
-"""Reading and writing of mesh files: MED with our own reader and writer, all other formats with meshio."""
+"""Reading and writing of mesh files: MED and code_aster's text directly, all other formats with meshio."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ MAIL_SUFFIX = ".mail"
 
 @dataclass(frozen=True)
 class MeshReport:
-    """What was found in a mesh file: format (with its version), name of the mesh, and what was changed.
+    """Report on a mesh file: its format with the version, the name of the mesh, and the changes made while reading.
 
-    `n_turned` solid cells were inside out (clockwise in 2D) and got another order of nodes. `dropped` are the numbers of
-    cells left out: ``"vertex"``, cells of one node, whose groups are now groups of points, and ``"duplicate"``, cells that
-    Gmsh repeats for each of their groups.
+    The nodes of `n_turned` solid cells, which were inside out (clockwise in 2D), were reordered. `dropped` contains the
+    numbers of omitted cells: ``"vertex"``, cells of one node, whose groups became groups of points, and ``"duplicate"``,
+    cells that Gmsh repeats for each of their groups.
     """
 
     path: str
@@ -66,7 +66,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
     Raises
     ------
     FileError
-        If the file is missing, of an unknown format, damaged, or holds no mesh or several.
+        If the file is missing, damaged, of an unknown format, or contains no mesh or several meshes.
     MeshError
         If the mesh has no cells or an unknown type of cells.
 
@@ -85,7 +85,7 @@ def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bo
         mesh, file_format, name = content.mesh, f"MED {content.version}".strip(), content.name
         dropped = {"vertex": content.n_vertices}
     elif mesh_name is not None:
-        raise FileError(f"'{path}' is not a MED file, so its mesh has no name: leave out mesh_name='{mesh_name}'")
+        raise FileError(f"'{path}' is not a MED file, so its mesh has no name: omit mesh_name='{mesh_name}'")
     elif file.suffix.lower() == MAIL_SUFFIX:
         mesh, dropped = aster_mail.read(file)
         file_format, name = "code_aster", ""
@@ -109,8 +109,8 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
     - ``.vtk``, ``.vtu``, ``.xdmf``: everything, as arrays of 0 and 1 named ``cell_group:...`` and
       ``point_group:...``.
     - ``.inp`` (Abaqus): all groups as sets; element types are those of meshio for each shape.
-    - ``.msh`` (Gmsh 2.2): one group per cell, the smallest; groups of mixed dimension keep the highest; empty
-      groups and point groups with the name of a cell group are omitted. A warning states their number.
+    - ``.msh`` (Gmsh 2.2): one group per cell, the smallest; groups of mixed dimension keep the cells of the highest
+      dimension; empty groups and point groups with the name of a cell group are omitted. A warning states their number.
     - all others: no groups; a warning states their number.
 
     Parameters
@@ -121,12 +121,12 @@ def write_mesh(path: PathLike, mesh: Mesh) -> None:
     Raises
     ------
     FileError
-        If the folder is missing, the format is unknown, or it cannot hold all cells or names.
+        If the folder is missing, the format is unknown, or the format cannot store all cells or names.
 
     Warns
     -----
     FastcontactWarning
-        If the format cannot hold all groups.
+        If the format cannot store all groups.
 
     Examples
     --------

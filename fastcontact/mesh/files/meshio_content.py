@@ -1,4 +1,4 @@
-"""A Mesh from the blocks of cells of a file, and from the data read by meshio: node orders, and groups in all forms."""
+"""Conversion of blocks of cells, and of the data read by meshio, to a Mesh: node orders, and groups in all forms."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fastcontact.mesh.mesh import Mesh
 
 # Gmsh's names for entities of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
 SHAPES = ("point", "curve", "surface", "volume")
-# Cells with a different node order in meshio: our node k is its node NODE_ORDER[format][element][k]. meshio mirrors the
+# Cells with another node order in meshio: node k here is node NODE_ORDER[format][element][k] of meshio, which mirrors the
 # linear wedge of VTK, as in old documentation of VTK but not in VTK 9.7, and does not reorder Gmsh's wedge of 18 nodes.
 Orders = Mapping[str, tuple[int, ...]]
 NODE_ORDER: dict[str, Orders] = {
@@ -45,7 +45,7 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
     Raises
     ------
     MeshError
-        If it has no cells, or cells of an unknown kind. Inconsistent arrays raise one of the exceptions `UNFIT`.
+        If there are no cells, or cells of an unknown kind. Inconsistent arrays raise one of the exceptions `UNFIT`.
     """
     blocks = merged(_blocks(content, NODE_ORDER.get(file_format, {})))
     n_duplicates = sum(len(block.nodes) for block in blocks)
@@ -214,7 +214,7 @@ def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> lis
         if len(lost):
             warn(
                 f"group '{name}' mixes cells with single points: {len(lost)} points that its cells do "
-                "not have are left out; give them a group of their own"
+                "not have are left out; put them into a separate group"
             )
     return turned
 

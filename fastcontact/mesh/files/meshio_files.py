@@ -33,7 +33,7 @@ _STREAMS = threading.Lock()
 
 # Formats with named arrays, in which every group is an array.
 ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
-# Formats whose writers are known to keep all our cells; for the others the result is read back.
+# Formats whose writers are known to keep all cells; for the others the result is read back.
 COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
 # Formats that support points of two coordinates; the others get a zero, which reading drops.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
@@ -124,7 +124,7 @@ def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArr
     if at_points:
         return values[0], points
     if any(len(block) and (block.min() < 0 or block.max() >= len(points)) for block in nodes):
-        raise FileError(f"a cell of '{path}' names a point that is not there: write it anew")
+        raise FileError(f"a cell of '{path}' refers to a missing point: write it anew")
     return np.concatenate(values), np.concatenate([points[block].mean(axis=1) for block in nodes])
 
 
@@ -142,12 +142,12 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     except MeshError as error:
         raise MeshError(f"'{path}': {error}") from None
     except UNFIT as error:
-        raise FileError(f"the parts of '{path}' do not fit together: check the file, or convert it to .med") from error
+        raise FileError(f"the parts of '{path}' are inconsistent: check the file, or convert it to .med") from error
     return mesh, file_format, dropped
 
 
 def _check_before(path: Path, file_format: str) -> None:
-    """Refuse files that make meshio read other files, or of which it would drop something."""
+    """Raise FileError for files that make meshio read other files, or of which it would drop parts."""
     import h5py
 
     if file_format == "abaqus":
@@ -181,7 +181,7 @@ def _references(path: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _check_references(path: Path) -> None:
-    """Refuse an XDMF file that refers to files in other folders, or to HDF5 files that do."""
+    """Raise FileError for an XDMF file that refers to files in other folders, or to HDF5 files that do."""
     folder = path.resolve().parent
     for reference, kind in _references(path):
         if folder not in (reference.resolve().parent, reference.resolve()):
@@ -264,7 +264,7 @@ def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
     cut = {name: len(rows) - n_kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > n_kept.get(name, 0)}
     if cut:
         warn(
-            f"Gmsh files of version 2.2 hold one group a cell: {sum(cut.values())} memberships of the groups "
+            f"Gmsh files of version 2.2 store one group per cell: {sum(cut.values())} memberships of the groups "
             f"{', '.join(cut)} are left out; {KEEPS_ALL}"
         )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])

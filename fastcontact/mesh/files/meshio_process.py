@@ -1,8 +1,8 @@
-"""Read mesh files with meshio in a child process, with limits of memory and computing time.
+"""Reading of mesh files with meshio in a child process, with limits of memory and computing time.
 
-meshio allocates whatever a file announces, and several of its readers do not terminate on a truncated file. Here only
-the child process is ended, and the file is refused with the reason. Windows has no such limits: there only the elapsed
-time is limited. Frozen applications and programs with embedded Python cannot start an interpreter: they read without limits.
+meshio allocates whatever a file announces, and several of its readers do not terminate on a truncated file. In these cases
+only the child process ends, and the file is refused with the reason. On Windows only the elapsed time is limited. Frozen
+applications and programs with embedded Python, which cannot start an interpreter, read without limits.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
 def library() -> Any:
     """Return the package meshio, with two elements added that its table of dimensions lacks."""
     import meshio
-    from meshio._mesh import topological_dimension  # listed as public by meshio 5.3.5, but only to be found there
+    from meshio._mesh import topological_dimension  # a public name of meshio 5.3.5 that is only available here
 
     for name in ("pyramid13", "wedge15"):
         topological_dimension.setdefault(name, 3)
@@ -71,7 +71,7 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
 
 
 def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[str, Any]:
-    """Return the answer of the child, or the reason why it gave none."""
+    """Return the answer of the child, or the reason why there is none."""
     if done.returncode == -getattr(signal, "SIGXCPU", 0):
         return {"error": f"it was not read within {seconds:.0f} s of computing"}
     if done.returncode < 0:
@@ -98,7 +98,7 @@ def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, An
             content = library().read(path, file_format=file_format)
             return {**plain_parts(content), **(_fields(content, field) if field else {}), "said": said.getvalue()}
     except MemoryError:
-        return {"error": "it announces more than memory can hold"}
+        return {"error": "it announces more data than the memory can hold"}
     except (Exception, SystemExit) as error:
         return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
 
@@ -160,7 +160,7 @@ def main() -> None:
         _limit(resource.RLIMIT_AS, memory)
     answer = packed(plain_content(Path(path), file_format, *sys.argv[6:7]))
     if answer.nbytes > returned:
-        answer = packed({"error": "it holds more than a file of its size can mean"})
+        answer = packed({"error": "it contains more than is plausible for a file of its size"})
     sys.stdout.buffer.write(answer.tobytes())
 
 

@@ -1,6 +1,6 @@
 """Mesh generators with named groups, and operations on meshes.
 
-A generator is a function of plain numbers, strings and tuples that returns a `Mesh`; those listed in ``GENERATORS`` are
+A generator is a function of plain numbers, strings and tuples that returns a `Mesh`. The generators in ``GENERATORS`` are
 available in case files and on the command line. An argument out of range raises MeshError.
 """
 

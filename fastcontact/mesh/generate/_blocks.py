@@ -22,9 +22,9 @@ def rectangular(x: Array, y: Array) -> Array:
 def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
     """Return the grid (n + 1, m + 1, 2) [length] between four sides by bilinear blending; it has exactly their nodes.
 
-    Bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The sides are
-    `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length], whose nodes have the relative abscissae `u` (n + 1,) [-] from
-    0 to 1, and `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length] with `v` (m + 1,) [-].
+    It is the bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The
+    sides are `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length], with the relative abscissae `u` (n + 1,) [-] of
+    their nodes from 0 to 1, and `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length], with `v` (m + 1,) [-].
     """
     affordable(len(u) * len(v))
     U, V = u[:, None, None], v[None, :, None]

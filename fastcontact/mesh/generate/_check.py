@@ -12,8 +12,8 @@ from fastcontact.errors import MeshError, check_known
 TRIANGLES = ("tri3", "tri6")
 QUADRANGLES = ("quad4", "quad8", "quad9")
 FACES = TRIANGLES + QUADRANGLES
-# Largest admissible number, whose cube can still be represented. Largest numbers of segments and of cells: more are probably
-# mistakes in units or decimal points, and would not fit into memory.
+# Largest admissible number, whose cube can still be represented, and largest numbers of segments and cells. Larger numbers
+# are probably mistakes in units or decimal points, and would not fit into memory.
 LARGEST = 1e100
 MOST_ALONG = 1_000_000
 MOST_CELLS = 5_000_000
@@ -27,7 +27,7 @@ def number(name: str, value: Any) -> float:
     if not math.isfinite(result):
         raise MeshError(f"{name} must be a finite number, not {repr(value)}")
     if abs(result) > LARGEST:
-        raise MeshError(f"{name} = {result:g} is out of range: its size must be at most {LARGEST:g}")
+        raise MeshError(f"{name} = {result:g} is out of range: its magnitude must be at most {LARGEST:g}")
     return result
 
 
@@ -73,7 +73,7 @@ def segments(wanted: float) -> int:
     if not wanted <= MOST_ALONG:
         raise MeshError(
             f"a line of the mesh would be divided into {wanted:.3g} segments, more than {MOST_ALONG}: check the units of "
-            "the element sizes, or ask for larger elements"
+            "the element sizes, or request larger elements"
         )
     return max(1, math.ceil(wanted - 1e-9))
 
@@ -83,7 +83,7 @@ def affordable(n_cells: float) -> None:
     if not n_cells <= MOST_CELLS:
         raise MeshError(
             f"the mesh would have about {n_cells:.3g} cells, more than {MOST_CELLS}: check the units of the element sizes, "
-            "or ask for larger elements or fewer divisions"
+            "or request larger elements or fewer divisions"
         )
 
 
@@ -99,8 +99,8 @@ def one_of(name: str, value: str, known: Sequence[str]) -> str:
 
 
 def unused(element: str, *instead: str, **arguments: Any) -> None:
-    """Raise MeshError if an argument without effect on `element` is given (not None); suggest those that have one."""
-    remedy = f"use {', '.join(instead)}" if instead else "leave it out"
+    """Raise MeshError if an argument without effect on `element` is given (not None); suggest arguments with an effect."""
+    remedy = f"use {', '.join(instead)}" if instead else "omit it"
     for name, value in arguments.items():
         if value is not None:
-            raise MeshError(f"{name} = {repr(value)} means nothing to {element} meshes: {remedy}")
+            raise MeshError(f"{name} = {repr(value)} has no effect on {element} meshes: {remedy}")

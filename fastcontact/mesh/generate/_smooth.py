@@ -17,7 +17,7 @@ _DIRECTIONS = np.linspace(0.0, 2 * np.pi, 13)[:-1]
 _TRIALS = np.column_stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 _TRIALS = np.vstack([_TRIALS, 0.5 * _TRIALS])
 _GOOD = np.sin(np.radians(50.0))  # stars with a larger smallest angle are not changed
-_TOO_LONG = 0.5, 2.0  # penalty of a too long edge, and per relative excess, in sines of an angle
+_TOO_LONG = 0.5, 2.0  # penalty of an edge that is too long, and per relative excess, as sine of an angle
 
 
 def delaunay(points: Array) -> Indices:
@@ -62,9 +62,9 @@ def stars_of(triangles: Indices, n_points: int) -> Indices:
 def relax(points: Array, movable: Mask, size: Size, steps: int) -> Array:
     """Return points (n, 2) [length], the movable ones relaxed by repulsive bars along the edges.
 
-    The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and
-    G. Strang, A simple mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Of the `points` (n, 2) [length] those
-    `movable` (n,) of bool move, in `steps` steps; the function `size` (n,) [length] of points is the desired length of edges.
+    The bars of a truss push its nodes apart until the lengths follow the size function (P.-O. Persson and G. Strang, A simple
+    mesh generator in MATLAB, SIAM Review 46, 2004, section 2). Only the `movable` (n,) of the `points` (n, 2) [length] move,
+    in `steps` steps; the function `size` (n,) [length] of points returns the desired length of edges.
     """
     points = points.copy()
     if not movable.any():
@@ -98,8 +98,8 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
 
     A trial move is accepted if it raises the smallest angle of the star, with a penalty on edges that are too long (smart
     smoothing after L. Freitag and C. Ollivier-Gooch, Int. J. Numer. Meth. Engng 40, 1997). Points moved simultaneously share
-    no edge. Of the `points` (n, 2) [length] only those `movable` (n,) of bool move, in at most `sweeps` sweeps;
-    the function `limit` (n,) [length] of points is the longest admissible edge.
+    no edge. Only the `movable` (n,) of the `points` (n, 2) [length] move, in at most `sweeps` sweeps. The function
+    `limit` (n,) [length] of points returns the longest admissible edge.
     """
     points = points.copy()
     radius, moved = 0.1, True
@@ -115,7 +115,7 @@ def polish(points: Array, movable: Mask, limit: Size, sweeps: int) -> Array:
 
 
 def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: Array, radius: float) -> bool:
-    """Try to move every bad point once, worst first, in place; return whether any moved."""
+    """Try to move every bad point once, the worst first, in place; return whether any point moved."""
     worth = np.full(len(points), np.inf)
     worth[movable] = _star_quality(points[movable, None], points, stars[movable], limit[movable])[:, 0]
     worth[worth >= _GOOD] = np.inf
@@ -133,7 +133,7 @@ def _sweep(points: Array, movable: Mask, edges: Indices, stars: Indices, limit: 
 
 
 def _try_moves(points: Array, chosen: Indices, stars: Indices, limit: Array, radius: float) -> bool:
-    """Move each chosen point to its best trial place if that is better, in place; return whether any moved."""
+    """Move each chosen point in place to its best trial position if that is better; return whether any point moved."""
     here = points[chosen]
     trials = here[:, None] + radius * limit[chosen, None, None] * _TRIALS
     places = np.concatenate([here[:, None], trials], axis=1)

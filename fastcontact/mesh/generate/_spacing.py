@@ -1,4 +1,4 @@
-"""Positions of the nodes of a line: equal or geometric segments, or segments by a size function; straight lines and arcs."""
+"""Positions of nodes on straight lines and arcs with equal segments, geometric segments, or segments by a size function."""
 
 from __future__ import annotations
 
@@ -22,8 +22,12 @@ class Spacing:
 
     Attributes
     ----------
-    near, far, pole, plateau, reach
-        Edge lengths at the pole and far from it, coordinates of the pole, distances from it [length].
+    near, far : float
+        Edge lengths at the pole and far from it [length].
+    pole : (float, float)
+        Coordinates of the pole [length].
+    plateau, reach : float
+        Distances from the pole between which the edge length grows [length].
     """
 
     near: float
@@ -55,8 +59,8 @@ def segments_for(length: float, size: float) -> int:
 def geometric(length: float, first: float, last: float) -> Array:
     """Return relative abscissae (n + 1,) [-] from 0 to 1 of segments in geometric progression.
 
-    The ratio of the last segment to the first is exactly ``last / first``; n is the smallest number for which no segment is
-    longer than desired, so all are shorter by one common factor. From the sum of a geometric series,
+    The ratio of the last segment to the first is exactly ``last / first``, and n is the smallest number for which no segment
+    is longer than desired; all segments are shorter by a common factor. From the sum of a geometric series,
     S = (last q - first) / (q - 1), the ratio of neighbours is q = (S - first) / (S - last).
     """
     if first == last:
@@ -90,7 +94,7 @@ def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
 
 
 def graded(length: float, spacing: Spacing) -> Array:
-    """Return positions (n + 1,) [length] from 0 to `length`, at distances given by a spacing about 0."""
+    """Return positions (n + 1,) [length] from 0 to `length`, at distances given by a spacing with its pole at 0."""
     return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
 
 

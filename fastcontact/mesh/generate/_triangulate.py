@@ -1,6 +1,6 @@
 """Triangulation of bodies with a convex outline of named sides, without random numbers.
 
-Edges are at most as long as a size function prescribes. The first inner points form a lattice, or rings about the pole.
+Edges are at most as long as a size function prescribes. The initial inner points form a lattice, or rings about the pole.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ _CLEARANCE = 0.6  # smallest distance of seeds from the outline, in edge lengths
 def filled(solid: str, sides: Sequence[tuple[str, Array]], spacing: Spacing) -> Mesh:
     """Return a triangle mesh of a convex body, its cells in the group `solid`.
 
-    Its `sides` (n, 2) [length], each a name and nodes, run counter-clockwise, each from the end of the previous one.
-    `spacing` defines the longest inner edges.
+    The `sides` (n, 2) [length], each given by a name and its nodes, run counter-clockwise, each from the end of the previous
+    one. `spacing` defines the longest inner edges.
     """
     outline = np.vstack([nodes[:-1] for _, nodes in sides])
     points, triangles = triangulated(outline, spacing)
@@ -59,7 +59,7 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
             return best, _checked(delaunay(best), len(best), len(outline))
     raise MeshError(
         f"no triangulation with edges up to {spacing.near:g} at the pole and {spacing.far:g} far from it "
-        "was found: change a size a little, or let it grow over a longer distance"
+        "was found: change a size slightly, or let it grow over a longer distance"
     )
 
 
@@ -84,7 +84,7 @@ def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
             return points
         points = np.vstack([points, added])
         movable = np.arange(len(points)) >= n_fixed
-        # Only around the new points: elsewhere the positions are already good.
+        # Only points around the new ones are relaxed; the positions of the others are already good.
         near = nearest(added, points)[0] < _MOVING_RADIUS * spacing(points)
         points = relax(points, movable & near, spacing, 16)
     return None
@@ -149,7 +149,7 @@ def _depth(outline: Array, points: Array) -> Array:
 
 
 def _corner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
-    """Return a point on the bisector of each corner of about 90 degrees: an edge then halves the angle of the corner."""
+    """Return a point on the bisector of each corner of about 90 degrees, so that an edge halves the angle of the corner."""
     ahead = np.roll(outline, -1, axis=0) - outline
     behind = np.roll(outline, 1, axis=0) - outline
     ahead /= np.hypot(ahead[:, 0], ahead[:, 1])[:, None]

@@ -1,7 +1,7 @@
 """Local red-green refinement of 2D meshes of triangles and quadrangles.
 
 A forest contains every cell of an initial mesh and its descendants; cells without descendants are its leaves. Marked
-leaves are divided in four ("red"). Neighbours of smaller leaves are divided in the mesh, but not in the forest ("green":
+leaves are divided into four ("red"). Neighbours of smaller leaves are divided in the mesh, but not in the forest ("green":
 Bank, Sherman and Weiser, 1983), so that angles do not deteriorate with repeated refinement.
 """
 
@@ -98,7 +98,7 @@ class Forest:
         return sum(len(self._leaves[name].corners) for name in self.solids)
 
     def refine(self, marked: Mask) -> None:
-        """Divide the marked solid leaves in four, and others so that neighbours differ by at most one level.
+        """Divide the marked solid leaves into four, and others so that neighbours differ by at most one level.
 
         Parameters
         ----------
@@ -143,7 +143,7 @@ class Forest:
         self._middle = np.concatenate([self._middle, numbers])[order]
 
     def _quarter(self, name: str, mask: Mask) -> None:
-        """Divide the marked leaves of one element type, quadrangles and triangles in four, lines in two."""
+        """Divide the marked leaves of one element type, quadrangles and triangles into four, lines into two."""
         leaves = self._leaves[name]
         parents = leaves.corners[mask]
         keys = edges_of(name, parents)
@@ -175,7 +175,7 @@ class Forest:
         return np.asarray(twice.any(axis=1) | ((count > 1) & ~opposite))
 
     def _halve_lines(self) -> None:
-        """Divide the lines whose edge is divided, until there are none."""
+        """Divide lines until no line has a divided edge."""
         if "line2" not in self._leaves:
             return
         while True:

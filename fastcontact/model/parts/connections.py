@@ -154,7 +154,8 @@ class ModelConnections(ModelInitialStates):
         value : float
             Value of the linear combination at multiplier 1 [length times the unit of the coefficients].
         translation : sequence of float (dim,), optional
-            Vector that maps the first group onto the second; by default the vector between their centroids [length].
+            Vector that maps the first group onto the second; by default it joins the centres of their bounding boxes
+            [length].
         ramp : Ramp or iterable of (float, float), optional
             History of the value; by default that of the analysis.
 
@@ -214,7 +215,7 @@ class ModelConnections(ModelInitialStates):
             Components, such as ``"x"`` or ``"xy"``, in which the uniform relative displacement of the ends is unknown and
             results from the loads.
         translation : sequence of float (dim,), optional
-            Vector from the first end to the second one; by default the vector between their centroids [length].
+            Vector from the first end to the second one; by default it joins the centres of their bounding boxes [length].
         ramp : Ramp or iterable of (float, float), optional
             History of x, y and z; by default that of the analysis.
 
@@ -435,7 +436,8 @@ class ModelConnections(ModelInitialStates):
         direction : sequence of float (dim,), optional
             Vector of any length that replaces the direction of the line between the two nodes [-].
         translation : sequence of float (dim,), optional
-            Vector that maps the first group onto the second; by default the vector between their centroids [length].
+            Vector that maps the first group onto the second; by default it joins the centres of their bounding boxes
+            [length].
 
         Raises
         ------

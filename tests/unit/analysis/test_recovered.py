@@ -40,7 +40,7 @@ def test_with_a_kept_pairing_gaps_are_those_of_that_pairing(formulation):
 
 
 @pytest.mark.filterwarnings("ignore:contact .* is lost", "ignore:.*across its radius", "ignore:the largest")
-@pytest.mark.filterwarnings("ignore:the works of these load steps")  # what it leaves springs back at once
+@pytest.mark.filterwarnings("ignore:the energy of these load steps")  # what it leaves springs back at once
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_closed_once_is_remembered_beside_the_other_side(formulation):
     """A block slides off the end of the other one while it is closed for good, comes back, and is pulled: it holds."""

@@ -241,7 +241,7 @@ def test_solver_tolerances_and_limits_may_change():
 
 def test_a_step_without_its_state_is_refused():
     steps = fc.solve(spheres(), fc.linear_ramp(2))
-    with pytest.raises(fc.ModelError, match="step 1 does not hold the data to resume from it: take the last"):
+    with pytest.raises(fc.ModelError, match="step 1 does not contain restart data: use the last"):
         fc.solve(spheres(), fc.linear_ramp(2), resume=steps[:1])
 
 

@@ -37,7 +37,7 @@ def close(found, expected, relative=1e-10):
 
 
 def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
-    with pytest.raises(fc.ConvergenceError, match="did not settle in 3 updates"):
+    with pytest.raises(fc.ConvergenceError, match="did not converge in 3 updates"):
         analysis_of(friction=0.1, max_geometry_updates=FEW).step(1, 1.0)
     handed, model = [], spheres(friction=0.1)
     criteria = Criteria(max_geometry_updates=FEW)
@@ -61,7 +61,7 @@ def test_a_step_that_fails_whole_ends_as_if_its_parts_had_been_asked_for():
 def test_without_friction_halves_end_where_a_ramp_of_the_same_instants_does():
     limits = {"max_active_set_iterations": 2, "geometry_updates": 0}
     model = spheres(friction=0.0)
-    with pytest.raises(fc.ConvergenceError, match="did not settle in 2 iterations"):
+    with pytest.raises(fc.ConvergenceError, match="did not converge in 2 iterations"):
         fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits, max_halvings=0))
     (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct", criteria=Criteria(**limits))
     asked = fc.Ramp(tuple(step.iterations["substeps"]))
@@ -101,7 +101,7 @@ def test_progress_tells_that_a_step_is_cut(capsys):
         ),
         (
             [0.1, *[1.2e-4, 0.9e-4] * 10],
-            "More of them do not help, it goes round in circles: use more load steps",
+            "More updates do not help, since they repeat in a cycle: use more load steps",
             "1e-04",
         ),
     ],
@@ -188,7 +188,7 @@ def test_steps_that_converge_are_not_cut():
 def test_a_step_that_fails_says_which_one_it_is():
     criteria = Criteria(max_active_set_iterations=1, max_halvings=0)
     message = (
-        r"the active set did not settle in 1 iterations: 4 constraints still change, at points .* of contact 'hertz'\. Use "
+        r"the active set did not converge in 1 iterations: 4 constraints still change, at points .* of contact 'hertz'\. Use "
         r"more load steps or more iterations \(max_active_set_iterations\) \(step 1 from 0 to 0\.5\)$"
     )
     with pytest.raises(fc.ConvergenceError, match=message) as caught:

@@ -181,7 +181,7 @@ def test_a_rigid_surface_is_read_from_its_own_file(write, tool, old, new, crease
 
 
 def test_a_rigid_surface_that_looks_away_is_refused(write, tool):
-    with pytest.raises(fc.ContactError, match=r"faces in the same direction as 'CONT1'.*turn its normal"):
+    with pytest.raises(fc.ContactError, match=r"faces in the same direction as 'CONT1'.*reverse its normal"):
         read_case(write(SURFACE.replace('"tool.med"', '"turned.med"')))
 
 

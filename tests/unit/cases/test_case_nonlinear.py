@@ -52,7 +52,7 @@ def test_a_law_of_a_case_file_is_that_of_python(text: str) -> None:
     [
         ('law = "neo_hooke"\nE = 6\nnu = 0.3', "", "law.*neo_hooke.*neo_hookean"),
         ('law = "yeoh"\nC10 = 1', 'strain = "finite"', r"material\[0\] needs 'C20'"),
-        ('law = "neo_hookean"\nE = 6\nnu = 0.3', "", "NeoHookean is for finite strains"),
+        ('law = "neo_hookean"\nE = 6\nnu = 0.3', "", "NeoHookean requires finite strains"),
         (
             'law = "neo_hookean"\nE = 6\nnu = 0.3\nbulk = 3',
             'strain = "finite"',

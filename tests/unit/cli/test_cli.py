@@ -133,7 +133,7 @@ def test_no_convergence_is_exit_code_two_and_keeps_finished_steps(solved, tmp_pa
     assert code == 2
     cut, told, *history, kept = capsys.readouterr().err.splitlines()
     assert cut.startswith(
-        "step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not settle"
+        "step 2 from 0.001 to 1 does not converge, cut in halves: the contact geometry did not converge"
     )
     assert told.startswith("no convergence: ")
     assert "step 2 was cut in halves once, the part from " in told

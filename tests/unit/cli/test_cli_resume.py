@@ -131,8 +131,8 @@ def test_a_case_that_was_changed_since_is_refused(name, whole, begun, path, caps
     changed.write_text(text.replace(old, new))
     assert run(changed, path, "--resume") == 1
     assert only_line(capsys.readouterr().err) == (
-        f"error: '{path}' cannot be resumed: the steps so far belong to another case; changed since: {what}. Go on with "
-        "what they were computed for, or start anew without resuming"
+        f"error: '{path}' cannot be resumed: the steps so far belong to another case; changed since: {what}. Continue with "
+        "the model they were computed for, or start anew without resuming"
     )
     assert path.read_bytes() == before
 

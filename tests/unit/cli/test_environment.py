@@ -34,7 +34,7 @@ def test_a_working_folder_that_is_gone(tmp_path):
     script = "import os, sys; os.rmdir(os.getcwd()); os.execv(sys.executable, [sys.executable, '-m', 'fastcontact', 'cases'])"
     done = subprocess.run([sys.executable, "-c", script], cwd=gone, capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert done.stderr.startswith("error: the working folder is no longer there")
+    assert done.stderr.startswith("error: the working directory no longer exists")
     assert done.stderr.count("\n") == 1
 
 

@@ -171,7 +171,7 @@ def test_an_inconsistent_orientation_names_the_facet_to_turn():
     plate = shell(box((1.0, 1.0, 1.0), (2, 2, 2), "tet4"))
     cells = plate.cells["tri3"].copy()
     cells[7] = cells[7][[0, 2, 1]]
-    with pytest.raises(fc.ContactError, match=r"facet 7 \(tri3 near .* has the opposite orientation .*turn it"):
+    with pytest.raises(fc.ContactError, match=r"facet 7 \(tri3 near .* has the opposite orientation .*reverse it"):
         MeshedSurface(plate.replace(cells={"tri3": cells}), "SHELL")
 
 

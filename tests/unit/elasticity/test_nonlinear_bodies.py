@@ -123,8 +123,8 @@ def test_threads_do_not_change_bits(monkeypatch: pytest.MonkeyPatch) -> None:
         (lambda: fc.Yeoh(1.0, 0.0, 0.0, bulk=0.0), "the bulk modulus = 0.0 must be a positive number"),
         (lambda: fc.Ogden([1.0, 2.0], [2.0], bulk=10.0), "2 mu and 1 alpha"),
         (lambda: fc.Ogden(1.0, 0.0, bulk=10.0), "no alpha zero"),
-        (lambda: model_with(PLASTIC, "finite"), "kinematic hardening is for small strains"),
-        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: take NeoHookean"),
+        (lambda: model_with(PLASTIC, "finite"), "kinematic hardening requires small strains"),
+        (lambda: model_with(fc.LinearElastic(E=1.0, nu=0.4999), "finite"), "locks .*: use NeoHookean"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(make, text: str) -> None:

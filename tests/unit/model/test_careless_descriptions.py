@@ -41,7 +41,7 @@ def test_a_section_cut_towards_the_other_side_is_in_tension_too():
 @pytest.mark.parametrize(
     ("options", "text"),
     [
-        ({"normal": (1.0, 0.0, 0.0)}, "the normal of pretension 'bolt' is 90 degrees off that of 'CUT'"),
+        ({"normal": (1.0, 0.0, 0.0)}, "the normal of pretension 'bolt' deviates by 90 degrees from that of 'CUT'"),
         ({"locked_from": 0.0}, "its force never acts"),
         ({"locked_from": -1.0}, "its force never acts"),
     ],

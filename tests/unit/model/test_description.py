@@ -32,7 +32,7 @@ def test_every_part_is_told():
         "Material: E = 1000, nu = 0.3 in 'LOWER'.",
         "Material: E = 2000, nu = 0.499 in 'UPPER', with a mean dilatation against locking.",
         "Support: x = 0, y = 0 on 'LOWER_BOTTOM' (9 points).",
-        "Support: y = -0.1 on 'UPPER_TOP' (7 points), with a history of its own.",
+        "Support: y = -0.1 on 'UPPER_TOP' (7 points), with a separate history.",
         "Load: the pressure on 'UPPER_LEFT': a function of position.",
         "Load: the traction on 'UPPER_RIGHT': x = 3.",
         "Relation: couple('UPPER_TOP', 'x').",
@@ -103,7 +103,7 @@ def test_every_material_load_and_connection_is_told():
     lines = model.describe()
     for text in (
         "Temperature: 5 over 1 in all solid cells.",
-        "Temperature: a number for each point over 0 in 'BLOCK', with a history of its own.",
+        "Temperature: a number for each point over 0 in 'BLOCK', with a separate history.",
         "gravity",
         "Load: the centrifugal force",
         "Load: the moment on 'REF': z = 1.5.",

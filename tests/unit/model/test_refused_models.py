@@ -95,7 +95,7 @@ REFUSED = [
     (
         lambda: ring().add_gravity(x=9.81),
         fc.ModelError,
-        "has a radial component x: in axisymmetry it acts along the axis",
+        "has a radial component x: in axisymmetry it can act only along the axis",
     ),
     (lambda: ring().add_centrifugal(3.0, direction=(0.0, 0.0, 1.0)), fc.ModelError, r"its direction is \(0, 1, 0\)"),
     *((spread("ZMAX", r), fc.ModelError, f"of the force on 'ZMAX' = {r:g} must be positive") for r in (0.0, -1.0)),

@@ -207,10 +207,10 @@ def test_a_failed_run_is_tried_again_from_its_last_step(path: Path) -> None:
     assert not results.complete
     n_steps = len(results)
     assert 0 < n_steps < 3
-    assert "did not settle in 3 updates" in results.error
+    assert "did not converge in 3 updates" in results.error
     with pytest.raises(ConvergenceError):
         resumed(path, ramp, spheres(friction=0.1), criteria=few)
-    assert "did not settle in 3 updates" in open_results(path).error
+    assert "did not converge in 3 updates" in open_results(path).error
     resumed(path, ramp, spheres(friction=0.1))
     results = open_results(path)
     assert results.complete
@@ -250,7 +250,7 @@ def test_another_case_is_refused_and_changes_nothing(name: str, path: Path) -> N
     begun(path, (0.5,))
     before = path.read_bytes()
     model, ramp, message = other_cases()[name]
-    with pytest.raises(ModelError, match=rf"belong to another case; changed since: {message}\. Go on"):
+    with pytest.raises(ModelError, match=rf"belong to another case; changed since: {message}\. Continue"):
         resumed(path, ramp, model)
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
@@ -306,7 +306,7 @@ def test_steps_without_their_state_are_refused(path: Path) -> None:
     model = fc.Model(spheres().mesh, "axisymmetric")
     with (
         ResultWriter(path, MESH, resume=True) as out,
-        pytest.raises(ModelError, match="does not hold the data to resume"),
+        pytest.raises(ModelError, match="does not contain restart data"),
     ):
         fc.solve(model, resume=out.done)
 
@@ -379,7 +379,7 @@ def test_damaged_packed_data_are_noticed() -> None:
     for size in (0, 10, len(raw) - 1):
         with pytest.raises((ValueError, LookupError, TypeError)):
             unpacked(raw[:size])
-    with pytest.raises(ValueError, match="is not one of ours"):
+    with pytest.raises(ValueError, match="is not a packed array"):
         unpacked(packed({"a": np.array(["text"])}))
 
 
@@ -390,5 +390,5 @@ def test_a_damaged_state_is_no_state(path: Path) -> None:
     with h5py.File(path, "r+") as file:
         file["fastcontact/restart0"][50] ^= 255
     assert open_results(path)[-1].restart is None
-    with pytest.raises(ModelError, match="does not hold the data to resume from it"):
+    with pytest.raises(ModelError, match="does not contain restart data"):
         resumed(path, fc.linear_ramp(2))

@@ -19,7 +19,7 @@ LIMITS = {"force": 1.1 * FORCE, "pressure_max": 1.04 * PRESSURE, "C1.stress.yy":
 def made_up(level, order=2.0, theory=True, reference=None, broken=False):
     """What a run of this level gives; `broken` ones say why they failed instead."""
     if broken:
-        return {"error": "the contact geometry did not settle", "kind": "ConvergenceError", "seconds": 1.0}
+        return {"error": "the contact geometry did not converge", "kind": "ConvergenceError", "seconds": 1.0}
     h = 0.5**level
     values = {name: limit * (1.0 + 0.1 * h**order) for name, limit in LIMITS.items()}
     r = np.linspace(0.0, 9.0, 10)
@@ -102,7 +102,7 @@ def test_what_failed_is_told_and_the_rest_shown(case):
     study = gathered(case, [good, poor, [made_up(k, broken=True) for k in range(4)]], ("quad8", "quad4", "tri6"))
     assert study.best.combination.element == "quad8"
     text = "\n".join(study.lines())
-    for told in ("level 0 failed: the contact geometry did not settle", "quad8 continuous", "tri6 continuous failed"):
+    for told in ("level 0 failed: the contact geometry did not converge", "quad8 continuous", "tri6 continuous failed"):
         assert told in text
     assert len(study.as_dict()["failed_combinations"]) == 1
     assert len(study.series[1].failed) == 3

@@ -547,7 +547,7 @@ def test_meshes_of_another_kind(tmp_path, attribute, value, message):
         ("MAI/TR3/NOD", [1, 2, 3, 4, 5], "5 node numbers, which is not a multiple of 3"),
         ("MAI/TR3/FAM", [0], "1 family numbers for 2 cells"),
         ("NOE/COO", np.zeros(141), "141 coordinates for 70 nodes"),
-        ("NOE/COO", np.zeros(70), "space of one dimension"),
+        ("NOE/COO", np.zeros(70), "its points have one coordinate"),
         ("NOE/COO", None, "COO' of .* is missing"),
         ("MAI/TR3/NOD", None, "TR3 cells have no nodal connectivity"),
         ("NOE", None, "it has no nodes"),
@@ -633,7 +633,7 @@ def test_names_that_med_cannot_hold(tmp_path, name, message):
 
 
 def test_mesh_name_with_a_slash(tmp_path):
-    with pytest.raises(FileError, match="holds a slash"):
+    with pytest.raises(FileError, match="contains a slash"):
         write_med_mesh(tmp_path / "slash.med", all_elements(), mesh_name="a/b")
 
 

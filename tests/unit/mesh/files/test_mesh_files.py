@@ -303,7 +303,7 @@ def test_abaqus_files_that_meshio_reads_wrongly(tmp_path, old, new, message):
 def test_abaqus_set_of_a_later_section_only(tmp_path):
     text = ABAQUS.replace(", ELSET=square", "").replace("CPS3", "CPS3, ELSET=triangle")
     (tmp_path / "plate.inp").write_text(text)
-    with pytest.raises(FileError, match=r"names an ELSET in a later \*ELEMENT section only"):
+    with pytest.raises(FileError, match=r"names an ELSET only in a later \*ELEMENT section"):
         read_mesh(tmp_path / "plate.inp")
 
 
@@ -350,7 +350,7 @@ def test_missing_file_folder_and_suffix(tmp_path):
 
 def test_mesh_name_is_for_med_only(tmp_path):
     write_mesh(tmp_path / "mesh.vtu", patch())
-    with pytest.raises(FileError, match="leave out mesh_name='upper'"):
+    with pytest.raises(FileError, match="omit mesh_name='upper'"):
         read_mesh(tmp_path / "mesh.vtu", mesh_name="upper")
     write_mesh(tmp_path / "mesh.med", patch())
     assert read_mesh_report(tmp_path / "mesh.med", mesh_name="mesh")[1].mesh_name == "mesh"

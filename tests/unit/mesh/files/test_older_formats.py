@@ -81,8 +81,8 @@ def test_gmsh_version_4_with_cells_in_several_groups(tmp_path):
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (lambda s: s.replace("$ENDELM", ""), "has no whole section [$]ELM"),
-        (lambda s: s.replace("$ENDNOD", ""), "has no whole section [$]NOD"),
+        (lambda s: s.replace("$ENDELM", ""), "has no complete section [$]ELM"),
+        (lambda s: s.replace("$ENDNOD", ""), "has no complete section [$]NOD"),
         (lambda s: s[: s.index("$ENDELM") - 6] + "\n$ENDELM\n", "is damaged"),
     ],
 )

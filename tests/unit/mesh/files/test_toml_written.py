@@ -32,5 +32,5 @@ def test_numpy_s_numbers_and_arrays_are_plain_ones():
 
 @pytest.mark.parametrize("data", [{"value": None}, {"value": lambda x: x}, {1: 2}, {"value": {1: 2}}, {"value": 1j}])
 def test_what_toml_has_not_is_told(data):
-    with pytest.raises(ValueError, match=r"not a TOML type|no string"):
+    with pytest.raises(ValueError, match=r"not a TOML type|not a string"):
         written(data)

@@ -67,7 +67,7 @@ def test_the_contact_is_the_finely_meshed_part_of_the_top():
         ({"contact_size": 3.0}, "contact_size = 3 .* at most size = 2.5"),
         ({"size": 11.0}, "size = 11"),
         ({"growth": 2.0}, "growth = 2"),
-        ({"contact_radius_y": 1.0}, "contact_radius_y = 1.0 means nothing to quad4"),
+        ({"contact_radius_y": 1.0}, "contact_radius_y = 1.0 has no effect on quad4"),
         ({"element": "hex8", "contact_radius_y": 20.0}, "contact_radius_y = 20"),
     ],
 )

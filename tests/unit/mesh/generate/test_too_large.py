@@ -28,7 +28,11 @@ TOO_LARGE = [
     ("rings", {"divisions_inner": (100_000, 100_000)}, r"1e\+10 cells"),
     ("crowned-blocks", {"element": "quad4", "contact_size": 1e-9}, "segments, more than 1000000"),
     ("quarter-disc", {"element": "tri3", "R": 1e-200}, r"R = 1e-200 is out of range: it must be at least 1e-100"),
-    ("quarter-disc", {"element": "tri3", "R": 1e200}, r"R = 1e\+200 is out of range: its size must be at most 1e\+100"),
+    (
+        "quarter-disc",
+        {"element": "tri3", "R": 1e200},
+        r"R = 1e\+200 is out of range: its magnitude must be at most 1e\+100",
+    ),
 ]
 
 
