@@ -267,7 +267,8 @@ def cone(slope: float, tip: float = 0.0, side: str = "above") -> Height:
 
     def height(x: Array) -> tuple[Array, Array]:
         r = np.linalg.norm(x, axis=1)
-        away = np.divide(x, r[:, None], out=np.zeros_like(x), where=r[:, None] > 0)
+        beyond_tip = r > ROUND_OFF * r.max(initial=0.0)  # a point at the tip of a rotated model is off it by round-off
+        away = np.divide(x, r[:, None], out=np.zeros_like(x), where=beyond_tip[:, None])
         return tip + sign * slope * r, sign * slope * away
 
     return Height(height, side)

@@ -82,3 +82,10 @@ def test_a_flat_punch_ends_at_its_edge():
 def test_wrong_arguments_are_refused(make):
     with pytest.raises(ContactError):
         make()
+
+
+def test_at_the_tip_of_a_cone_the_normal_is_the_axis_up_to_round_off():
+    points = np.array([[1e-19, 0.0], [-1e-19, 0.0], [1.0, 0.0]])
+    normals = obstacles.cone(0.3).distance(points)[1]
+    np.testing.assert_allclose(np.abs(normals[:2]), [[0.0, 1.0]] * 2, atol=1e-15)
+    assert abs(normals[2, 0]) > 0.2
