@@ -127,8 +127,8 @@ def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Arr
     if not isinstance(side, RigidSide):
         return {}
     return {
-        "obstacle_displacement": at.obstacle.copy(),
-        "obstacle_angle": None if side.rotation is None else at.angle,
+        "obstacle_displacement": at.pose.displacement.copy(),
+        "obstacle_angle": None if side.rotation is None else at.pose.angle,
         "torque": side.torque(deformed, forces, at.pose),
     }
 

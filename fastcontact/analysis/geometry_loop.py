@@ -11,10 +11,8 @@ import numpy as np
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.convergence_messages import active_set_cycles, geometry_moves, nearest_nodes
-from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_newton import newton_step
-from fastcontact.analysis.inequalities import StepContext, solve_inequalities
-from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
+from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, Solution
@@ -90,6 +88,8 @@ class SettledContact:
         The number of updates, if it is fixed, and the relative change of the displacements in the last update.
     scatter : Scatter, optional
         Scatter of the last iterates, if round-off prevents convergence to `Criteria.geometry`.
+    nodes : SharedNodes, optional
+        Nodes of several pairs, or at both ends of a period, whose constraints are merged.
     """
 
     constraints: StackedConstraints
@@ -97,6 +97,13 @@ class SettledContact:
     iterate: Iterate
     last_change: tuple[int, float] | None = None
     scatter: Scatter | None = None
+    nodes: SharedNodes | None = None
+
+    @property
+    def gaps_and_forces(self) -> dict[str, tuple[Array, Array]]:
+        """Gaps (m,) [length] and multipliers (m,) [force] of each contact pair."""
+        gap, force = self.solution.gap, self.solution.multiplier
+        return {name: (gap[rows], force[rows]) for name, rows in self.constraints.rows().items()}
 
     @property
     def force(self) -> Array:
@@ -104,60 +111,55 @@ class SettledContact:
         return self.constraints.force(self.solution.multiplier, self.solution.tangential)
 
 
-def settle_geometry(
-    step: StepContext, extrapolation: Extrapolation, expected: float, begun: Iterate | None = None
-) -> SettledContact:
+def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
     """Alternate between pairing the surfaces and solving the contact problem until the displacements converge.
 
     Parameters
     ----------
     step : StepContext
-    extrapolation : Extrapolation
-    expected : float
-        Scale of the displacements in the first step, if only forces act [length].
-    begun : Iterate, optional
-        Converged iterate of a less accurate iteration of the same step, to continue from. By default the iteration begins
-        with the displacements at the end of the previous step.
+    iterate : Iterate
+        Iterate from which to begin, or the converged iterate of a less accurate iteration of the same step, to continue
+        from. It is modified.
 
     Raises
     ------
     ConvergenceError
         If the active set or the geometry does not converge.
     """
-    iterate = begun or Iterate.of(step.state)
     try:
-        settled = _settle(step, iterate, extrapolation, expected)
+        settled = _settle(step, iterate)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
-    nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
-    if nodes is None:
+    if settled.nodes is None:
         return settled
-    return replace(settled, solution=nodes.shared(settled.solution, settled.constraints, settled.iterate.u))
+    return replace(settled, solution=settled.nodes.shared(settled.solution, settled.constraints, iterate.u))
 
 
-def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
+def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, plan = step.problem, Plan.of(step.problem)
     if iterate.history:  # The iterate is converged already, so that extrapolation would move it away.
         plan = replace(plan, extrapolate=False)
-    tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
-    mixing, watch = _Mixing(Anderson(DEPTH, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
+    tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, step.expected)
+    mixing, watch = _Mixing(step, plan.newton), Watch()
     if plan.extrapolate:
-        iterate.u = extrapolation.displacement(iterate.u)
+        iterate.u = step.extrapolation.displacement(iterate.u)
     for update in range(plan.limit + 1):
         single = plan.semismooth and update < SEMISMOOTH_UPDATES
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
-        active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
+        active = initially_active(
+            constraints, iterate, step.extrapolation if plan.extrapolate and update == 0 else None
+        )
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
-        nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces)
+        nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces) if problem.shares_nodes else None
         solution, displacement = _solve_once(step, constraints, nodes, iterate, active, accuracy)
         moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
         if not plan.until_settled:
             continue
-        settled = SettledContact(constraints, solution, iterate)
+        settled = SettledContact(constraints, solution, iterate, nodes=nodes)
         if not solution.settled or tolerances.inexact:
             watch.forget()
         elif moved.change <= tolerances.enough(moved.size):
@@ -165,12 +167,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
             return replace(settled, scatter=scatter)
-        mixed, enough = None, tolerances.enough(moved.size)
-        if mixing.newton(moved.change, enough) and solution.settled:
-            stepped = newton_step(step, constraints, solution, moved.before, displacement, enough / moved.change, nodes)
-            mixed = None if stepped is None else mixing.stepped(*stepped)
-        if mixed is None:
-            mixed = mixing.next(moved.before, displacement, solution, tolerances.inexact, constraints)
+        mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if plan.extrapolate and update == PATIENT_UPDATES:
@@ -187,7 +184,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
     fixed = plan.limit and not problem.criteria.keep_pairing
-    return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None)
+    return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None, nodes=nodes)
 
 
 def _solve_once(
@@ -270,59 +267,44 @@ class _Mixing:
 
     Parameters
     ----------
-    accelerated : Anderson
+    step : StepContext
     newton : bool
         Whether to use Newton's method for the geometry.
     """
 
-    def __init__(self, accelerated: Anderson, newton: bool) -> None:
-        self._accelerated = accelerated
+    def __init__(self, step: StepContext, newton: bool) -> None:
+        self._step, self._accelerated = step, None
         self._known: AnyArray | None = None
         self._newton, self._change, self._contraction = newton, np.inf, np.inf
 
-    def newton(self, change: float, enough: float) -> bool:
-        """Return whether to take a step of Newton's method, after a `change` of the displacements [length].
-
-        Newton's method is given up once changes increase, because it does not converge if nodes alternate between facets. It
-        is also not used if the next solution alone is expected to change displacements by no more than `enough` [length],
-        because a solution without a Newton step costs less.
-        """
-        self._newton, self._change = self._newton and change <= self._change, change
-        return self._newton and SAFETY * self._contraction * change > enough
-
-    def stepped(self, next_pairing: Array, contraction: float) -> Array:
-        """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
-        self._contraction = contraction
-        return next_pairing
+    _accelerated: Anderson | None
 
     def restart(self) -> None:
         """Discard the earlier iterates."""
-        self._accelerated.restart()
+        self._accelerated = None
 
-    def next(
-        self, before: Array, displacement: Array, solution: Solution, inexact: bool, constraints: StackedConstraints
-    ) -> Array | None:
-        """Return the displacements for the next pairing by Anderson acceleration.
+    def next(self, settled: SettledContact, moved: _Moved, displacement: Array, tolerances: Tolerances) -> Array | None:
+        """Return the displacements (k,) for the next pairing, of the components of `StepContext.dofs` [length].
 
-        Parameters
-        ----------
-        before, displacement : ndarray (k,)
-            Displacements of the components of `StepContext.dofs`, at which the surfaces were paired, and of the solution
-            [length].
-        solution : Solution
-        inexact : bool
-            Whether the linear solution was inexact.
-        constraints : StackedConstraints
-
-        Returns
-        -------
-        ndarray (k,) or None
-            Displacements [length]; None means that the next pairing uses the displacements of the solution.
+        None means those of the solution, `displacement` (k,). Newton's method is given up once changes increase, because it
+        does not converge if nodes alternate between facets. It is also not used if the next solution alone is expected to
+        converge, because a solution without a Newton step costs less.
         """
-        state = constraints.state(solution.active)
+        solution, enough = settled.solution, tolerances.enough(moved.size)
+        self._newton, self._change = self._newton and moved.change <= self._change, moved.change
+        if self._newton and solution.settled and SAFETY * self._contraction * moved.change > enough:
+            arguments = self._step, settled.constraints, solution, moved.before, displacement
+            stepped = newton_step(*arguments, enough / moved.change, settled.nodes)
+            if stepped is not None:
+                next_pairing, self._contraction = stepped
+                return next_pairing
+        state = settled.constraints.state(solution.active)
         same = self._known is not None and np.array_equal(self._known, state)
         self._known = state if solution.settled else None
-        if inexact or not same:
-            self._accelerated.restart()
-        # An inexact solution may hardly change although it is not accurate yet.
-        return None if inexact else self._accelerated.mixed(before, displacement)
+        if tolerances.inexact or not same:
+            self.restart()
+        if tolerances.inexact:
+            return None
+        if self._accelerated is None:
+            self._accelerated = Anderson(DEPTH, self._step.dofs.compared, self._step.problem.solver.iterative)
+        return self._accelerated.mixed(moved.before, displacement)

@@ -60,7 +60,7 @@ def newton_step(
         respond = solution.response()
     except LinAlgError:
         return None
-    dim, n_dofs, where = step.problem.model.mesh.dim, len(step.load.lift), step.dofs.compared
+    n_dofs, where = len(step.load.lift), step.dofs.compared
     gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def along(v: Array) -> Array:
@@ -68,7 +68,7 @@ def newton_step(
         active = np.zeros_like(image)
         active[where] = v
         u = step.dofs.put(np.zeros(n_dofs), active)
-        force, nodal = np.zeros(n_dofs), u[: step.problem.model.n_dofs].reshape(-1, dim)
+        force, nodal = np.zeros(n_dofs), step.problem.displacement(u)
         for rows, part in parts:
             varied, changed = part.along(nodal)
             gaps[: len(changed), rows] = changed

@@ -15,16 +15,14 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.iterate import Iterate
+from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium, solve_displacements, with_loads
+from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium, balance, solve_displacements, with_loads
 from fastcontact.analysis.terms import Fluid, Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
@@ -281,12 +279,13 @@ class _Newton:
         settled = None
         if problem.pairs:
             dofs = problem.dofs.for_step(self._iterate.u, load.lift)
-            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs)
-            settled = settle_geometry(step, extrapolation, self._begin.expected, self._iterate)
+            expected = self._begin.expected
+            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs, extrapolation, expected)
+            settled = settle_geometry(step, self._iterate)
             if problem.criteria.friction_while_touching is not None and self._terms.prepared:
                 from fastcontact.analysis.touching import along_path
 
-                settled = along_path(step, settled, self._begin.expected)
+                settled = along_path(step, settled)
                 self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled

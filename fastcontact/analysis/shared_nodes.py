@@ -52,8 +52,6 @@ class SharedNodes:
     @classmethod
     def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
         """Return the shared nodes of all pairs; None if no node is in several pairs, or at both ends of a period."""
-        if len(constraints.parts) < 2 and not interfaces:
-            return None
         first, second, behind = _alike(constraints)
         ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:

@@ -10,8 +10,7 @@ import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import Plan, SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import StepContext, solve_inequalities
-from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path
 from fastcontact.arrays import Array
@@ -25,13 +24,12 @@ log = logging.getLogger("fastcontact")
 MOST = 128
 
 
-def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
+def along_path(step: StepContext, settled: SettledContact) -> SettledContact:
     """Return the contact of a step whose friction is solved in increments, where its nodes slide while they close.
 
     Increments are solved with the geometry converged without them. If they do not converge the step is left unchanged.
-    `expected` is that of `settle_geometry`.
     """
-    nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
+    nodes = settled.nodes
     path = _path(step, settled, nodes)
     if path is None:
         return settled
@@ -47,7 +45,7 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
         if not solution.settled:
             return settled
         begun.u = step.dofs.put(begun.u, there)
-        along = settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
+        along = settle_geometry(replace(step, path=solution.slid, extrapolation=Extrapolation()), begun)
         if not Plan.of(step.problem).until_settled:  # fixed number of updates
             del begun.history[: len(old.history)]
         return along

@@ -72,7 +72,7 @@ class MaterialField:
     rows: dict[str, Numbers]
     inside: dict[str, Numbers]
 
-    @property
+    @cached_property
     def loops(self) -> dict[str, Numbers]:
         """Rows of moduli for the element loops, by solid element: `inside` if materials vary inside cells, else `rows`."""
         return {**self.rows, **self.inside}

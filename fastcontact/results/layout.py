@@ -18,7 +18,7 @@ The second contains everything that VTK does not support:
     fastcontact/runs                                a row for each run (RUN_ROW), with the position of its notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
-A new array at the nodes: an attribute of `step.StepResult`, filled in `analysis.step_result`, named in POINT_FIELDS, checked
+A new array at the nodes: an attribute of `step.StepResult`, filled in `analysis.load_step`, named in POINT_FIELDS, checked
 in `check_step`, read in `reader`. A new one of contact pairs:
 `step.ContactResult`, `analysis.contact_result`, and the row here.
 """

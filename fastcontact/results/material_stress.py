@@ -38,7 +38,7 @@ class MaterialStress:
 
 def by_largest_von_mises(
     sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
-) -> tuple[Array, MaterialStress | None]:
+) -> tuple[Array, MaterialStress]:
     """Return the nodal stress (n_points, n_components), and that of each side of material interfaces [pressure].
 
     At interfaces the nodal stress is that of the side with the largest von Mises stress.
@@ -52,10 +52,7 @@ def by_largest_von_mises(
         Stress at the slots of `sides` [pressure].
     n_points : int
     """
-    stress = at_places[:n_points].copy() if len(sides.points) else at_places
-    if not len(sides.points):
-        return stress, None
-    values = at_places[sides.place]
+    stress, values = at_places[:n_points].copy(), at_places[sides.place]
     order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
     stress[sides.points[order]] = values[order]
     return stress, MaterialStress(cells, sides.points, sides.material, values)

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_array, eye_array
 
 from fastcontact.analysis.contact_result import nodal_pressure
-from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State

@@ -386,7 +386,7 @@ class Formulation(ABC):
         moved, turning = at.displacement - at.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
-            total -= at.obstacle - at.obstacle_start
+            total -= at.obstacle_motion
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
             turned = self.primary.turning(now, before, at.pose, at.pose_start)
             if turned is not None:  # The motion by rotation is an affine function of the positions.
@@ -420,7 +420,7 @@ class Formulation(ABC):
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0: Array | None = None
         if isinstance(self.primary, RigidSide):
-            slip0 = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            slip0 = -np.stack([t @ at.obstacle_motion for t in directions])
             turning = self.turning(candidates, at)
             if turning is not None:
                 slip0 -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
@@ -516,7 +516,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
         if isinstance(self.primary, RigidSide):
-            moved = moved - (at.obstacle - at.obstacle_start)
+            moved = moved - at.obstacle_motion
             turning = self.turning(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
             moved = moved if turning is None else moved - turning
         else:
