@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from typing import NoReturn
 
 import numpy as np
@@ -15,9 +15,9 @@ from fastcontact.analysis.geometry_newton import newton_step
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Accuracy, Solution
+from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
-from fastcontact.arrays import AnyArray, Array, Mask
+from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
@@ -153,7 +153,8 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
         )
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
         nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces) if problem.shares_nodes else None
-        solution, displacement = _solve_once(step, constraints, nodes, iterate, active, accuracy)
+        once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
+        solution, displacement = solve_inequalities(step, once, iterate, closed & once.usable, accuracy)
         moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
@@ -165,7 +166,10 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
         elif moved.change <= tolerances.enough(moved.size):
             return settled
         elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size):
-            _log_scatter(scatter, problem.criteria.geometry)
+            log.info(
+                "the contact geometry settled as far as round-off allows: displacements scatter by %.1e of the largest one, "
+                "contact forces by %.1e (Criteria.geometry = %g)", *astuple(scatter), problem.criteria.geometry,
+            )  # fmt: skip
             return replace(settled, scatter=scatter)
         mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
@@ -187,21 +191,6 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
     return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None, nodes=nodes)
 
 
-def _solve_once(
-    step: StepContext, constraints: StackedConstraints, nodes: SharedNodes | None, iterate: Iterate, active: Mask,
-    accuracy: Accuracy,
-) -> tuple[Solution, Array]:  # fmt: skip
-    """Solve the inequalities of one pairing; see `solve_inequalities` for the values returned.
-
-    `nodes` are the nodes that belong to several pairs, or to both ends of a period: their constraints are merged. None
-    means that there are none.
-    """
-    if nodes is None:
-        return solve_inequalities(step, constraints, iterate, active & constraints.usable, accuracy)
-    once = nodes.once(constraints)
-    return solve_inequalities(step, once, iterate, nodes.closed(active) & once.usable, accuracy)
-
-
 @dataclass(frozen=True, eq=False)
 class _Moved:
     """Change of the displacements in one geometry update, in the components of `StepContext.dofs`.
@@ -214,15 +203,14 @@ class _Moved:
         Largest change of a component [length].
     size : float
         Largest displacement, to which the change is compared [length].
+    relative : float
+        The ratio of both, zero without displacements [-].
     """
 
     before: Array
     change: float
     size: float
-
-    @property
-    def relative(self) -> float:
-        return self.change / self.size if self.size else 0.0
+    relative: float
 
 
 def _move(
@@ -233,7 +221,8 @@ def _move(
     iterate.u = step.dofs.put(iterate.u, displacement)
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
-    moved = _Moved(before, largest_difference(displacement, before), size)
+    change = largest_difference(displacement, before)
+    moved = _Moved(before, change, size, change / size if size else 0.0)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {
@@ -245,13 +234,6 @@ def _move(
         }
     )
     return moved
-
-
-def _log_scatter(scatter: Scatter, criterion: float) -> None:
-    log.info(
-        "the contact geometry settled as far as round-off allows: displacements scatter by %.1e of the largest one, contact "
-        "forces by %.1e (Criteria.geometry = %g)", scatter.displacement, scatter.force, criterion,
-    )  # fmt: skip
 
 
 def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: Solution, iterate: Iterate) -> NoReturn:

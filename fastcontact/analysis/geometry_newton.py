@@ -24,9 +24,10 @@ from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
+from fastcontact.round_off import SINGLE_PRECISION
 
-# Relative residual of the change, that over what suffices at the end, and the largest number of iterations.
-ACCURACY, AT_END, MOST = 1e-6, 0.01, 20
+# Relative residual of the change over what suffices at the end, and the largest number of iterations.
+AT_END, MOST = 0.01, 20
 
 
 def newton_step(
@@ -79,7 +80,9 @@ def newton_step(
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(system, changed / size, rtol=max(ACCURACY, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
+    v, _ = gmres(
+        system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1
+    )
     responding = largest_difference(size * v, changed)
     # Far from the solution a step in which the response adds more than the change itself leads anywhere.
     if not responding <= size:

@@ -28,7 +28,7 @@ from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.protocol import Loaded
-from fastcontact.round_off import SINGLE_PRECISION
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Largest number of Newton iterations of a load step, and of halvings of one that inverts cells.
@@ -46,7 +46,7 @@ FORCING = 1e-3
 # Relative error of the displacement at which iterations end. A change that is small enough to be round-off
 # (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction STAYS of the previous
 # one.
-UNCHANGED, STAYS = 1e-10, 0.3
+UNCHANGED, STAYS = 100 * ROUND_OFF, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +220,10 @@ class _Newton:
         not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
         """
         if self._terms.prepared:
-            return self._prepared_contact(u)
+            begin = self._begin
+            first = self._load is begin.load and self._settled is None
+            loaded = begin.loaded if first else with_loads(self._problem, self._load)
+            return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         failed: Exception | None = None
         for by in self._regularisations():
             if self._held and by.geometric == WHOLE and not by.held:
@@ -246,13 +249,6 @@ class _Newton:
         whole = [Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + floats]]
         held = [Regularisation(held=stiffness, stiff=floats) for stiffness in HELD] if closed else []
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
-
-    def _prepared_contact(self, u: Array) -> tuple[Array, Array]:
-        """Return the result of `_solve` where all tangents are the prepared ones."""
-        begin = self._begin
-        first = self._load is begin.load and self._settled is None
-        loaded = begin.loaded if first else with_loads(self._problem, self._load)
-        return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
 
     def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
+from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
@@ -27,7 +27,7 @@ from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
-from fastcontact.round_off import TINY
+from fastcontact.round_off import ROUND_OFF, TINY
 
 # Bound of the stiffness of the spring perpendicular to the slip, relative to the stiffness of the constraint. Without a bound
 # it tends to infinity as the slip vanishes. The solution does not depend on it, because its slip is parallel to d.
@@ -84,7 +84,7 @@ def solve(
         y, gaps = problem.step(y, gaps, *state)
         if not state[0].any():  # all were open: close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
-        exact = max(EXACT, ENOUGH * tolerance)
+        exact = max(ROUND_OFF, ENOUGH * tolerance)
         iterate = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
         if problem.finish():
             y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)

@@ -29,9 +29,16 @@ from fastcontact.contact.linearised_geometry import (
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
+from fastcontact.contact.pairing import OVERHANG, Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
-from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
+from fastcontact.contact.projection import (
+    CORNER,
+    at_nodes_of_facets,
+    interpolated,
+    nodal_normals,
+    places,
+    smooth_normals,
+)
 from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
@@ -40,12 +47,8 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Default of `projection_tolerance` in 3D, in facet lengths. When a body slides beyond an edge or a plane of symmetry, its
-# nodes lose contact one after the other. With a smaller tolerance, nodes near the edge alternate between paired and
-# unpaired.
-LEAVING = 0.5
 # Sine of the angle between the normal of a surface and a plane of symmetry above which the surface has a corner at the plane.
-LEANING = 0.38
+LEANING = float(np.sin(np.radians(0.5 * CORNER)))
 
 
 @dataclass(eq=False)
@@ -69,7 +72,7 @@ class Formulation(ABC):
     projection_tolerance : float, optional
         Largest distance beyond the end of the primary side at which a point is paired, in facet lengths [-]. In 2D the
         default is small, but large enough that points at the end of the primary side stay paired as the bodies deform. In
-        3D it is 0.5, see LEAVING.
+        3D it is 0.5, see OVERHANG.
     normals : str or sequence of float, optional
         Normals along which the gap is measured.
 
@@ -121,7 +124,7 @@ class Formulation(ABC):
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if self.projection_tolerance is None:
-            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else LEAVING
+            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else OVERHANG
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
