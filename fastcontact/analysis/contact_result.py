@@ -47,7 +47,7 @@ def contact_results(
             name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
             problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
         )
-        for name, rows in settled.constraints.rows().items()
+        for name, rows in settled.constraints.rows.items()
     }  # fmt: skip
     results = _joined(problem, results)
     if problem.model.strain == "small":

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import fields_table
-from fastcontact.analysis.slip import worn_in_step
+from fastcontact.analysis.wear import worn_in_step
 from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation

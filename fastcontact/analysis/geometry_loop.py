@@ -22,56 +22,11 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
-# Number of pairings with one active-set iteration each. This is cheapest near the solution, but it may cycle; in later
-# pairings the active set therefore converges before the surfaces are paired again.
-SEMISMOOTH_UPDATES = 8
 # Number of pairings after which nodes are assumed to alternate between facets: the iteration then restarts without
 # extrapolation, or with rounded edges.
 PATIENT_UPDATES = 25
 # Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
 SAFETY = 3.0
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Options of the iteration of the contact geometry in a load step.
-
-    Attributes
-    ----------
-    until_settled : bool
-        Whether to update the geometry until the displacements converge. Otherwise the number of updates is fixed.
-    limit : int
-        Largest number of updates, or the fixed number of updates.
-    semismooth : bool
-        Whether the first pairings take one active-set iteration each, instead of iterating the active set to convergence.
-    extrapolate : bool
-        Whether to begin with displacements extrapolated along the load, and with inexact linear solutions.
-    newton : bool
-        Whether to use Newton's method for the geometry, see `geometry_newton`.
-    """
-
-    until_settled: bool
-    limit: int
-    semismooth: bool
-    extrapolate: bool
-    newton: bool
-
-    @classmethod
-    def of(cls, problem: Problem) -> Plan:
-        """Return the options that suit the criteria, the formulations and the linear solver of a problem."""
-        criteria, iterative = problem.criteria, problem.solver.iterative
-        fixed = 0 if criteria.keep_pairing else criteria.geometry_updates
-        pairs = problem.pairs.values()
-        # Newton's method for the geometry is not available for pairs with fluid pressure.
-        known = not any(pair.options.source is not None for pair in pairs)
-        newton = known and not iterative and problem.floating_bodies is None
-        return cls(
-            until_settled=fixed is None,
-            limit=criteria.max_geometry_updates if fixed is None else fixed,
-            semismooth=fixed is None and not newton and any(pair.geometry_in_loop for pair in pairs),
-            extrapolate=fixed is None and iterative,
-            newton=newton,
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +58,7 @@ class SettledContact:
     def gaps_and_forces(self) -> dict[str, tuple[Array, Array]]:
         """Gaps (m,) [length] and multipliers (m,) [force] of each contact pair."""
         gap, force = self.solution.gap, self.solution.multiplier
-        return {name: (gap[rows], force[rows]) for name, rows in self.constraints.rows().items()}
+        return {name: (gap[rows], force[rows]) for name, rows in self.constraints.rows.items()}
 
     @property
     def force(self) -> Array:
@@ -138,27 +93,26 @@ def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
 
 def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
-    problem, plan = step.problem, Plan.of(step.problem)
-    if iterate.history:  # The iterate is converged already, so that extrapolation would move it away.
-        plan = replace(plan, extrapolate=False)
-    tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, step.expected)
-    mixing, watch = _Mixing(step, plan.newton), Watch()
-    if plan.extrapolate:
+    problem, criteria = step.problem, step.problem.criteria
+    limit = 0 if criteria.keep_pairing else criteria.geometry_updates
+    limit = criteria.max_geometry_updates if limit is None else limit
+    # A converged iterate is not moved away by extrapolation, and all its solutions are accurate.
+    extrapolates = problem.until_settled and problem.solver.iterative and not iterate.history
+    tolerances = Tolerances(problem.solver, criteria, extrapolates, step.state.gap_round_off, step.expected)
+    mixing, watch = _Mixing(step), Watch()
+    if extrapolates:
         iterate.u = step.extrapolation.displacement(iterate.u)
-    for update in range(plan.limit + 1):
-        single = plan.semismooth and update < SEMISMOOTH_UPDATES
+    for update in range(limit + 1):
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
-        active = initially_active(
-            constraints, iterate, step.extrapolation if plan.extrapolate and update == 0 else None
-        )
-        accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
+        active = initially_active(constraints, iterate, step.extrapolation if extrapolates and update == 0 else None)
+        accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift))
         nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces) if problem.shares_nodes else None
         once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
         solution, displacement = solve_inequalities(step, once, iterate, closed & once.usable, accuracy)
         moved = _move(step, iterate, constraints, solution, displacement)
-        if not (solution.settled or single or tolerances.inexact):
+        if not (solution.settled or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
-        if not plan.until_settled:
+        if not problem.until_settled:
             continue
         settled = SettledContact(constraints, solution, iterate, nodes=nodes)
         if not solution.settled or tolerances.inexact:
@@ -174,21 +128,19 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
         mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        if plan.extrapolate and update == PATIENT_UPDATES:
-            # Whether nodes alternate between facets without end depends on the initial guess: try a different one.
-            iterate.begin_again(step.state)
-            mixing.restart()
-            watch.forget()
-        if update == max(plan.limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
+        faceted = any(pair.faceted for pair in problem.pairs.values())
+        if update == max(limit // 2, PATIENT_UPDATES) and (extrapolates or faceted):
             log.info("nodes flip between facets: from now on the edges of facets are rounded")
-            iterate.rounded = True
+            if extrapolates:  # whether they alternate without end depends on the initial guess
+                iterate.begin_again(step.state)
+            iterate.rounded = iterate.rounded or faceted
             mixing.restart()
             watch.forget()
-    if plan.until_settled:
+    if problem.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
-        raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
-    fixed = plan.limit and not problem.criteria.keep_pairing
-    return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None, nodes=nodes)
+        raise ConvergenceError(geometry_moves(problem, iterate.history, changed, limit), iterate.history)
+    fixed = limit and not criteria.keep_pairing
+    return SettledContact(constraints, solution, iterate, (limit, moved.relative) if fixed else None, nodes=nodes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,12 +202,13 @@ class _Mixing:
     Parameters
     ----------
     step : StepContext
-    newton : bool
-        Whether to use Newton's method for the geometry.
     """
 
-    def __init__(self, step: StepContext, newton: bool) -> None:
+    def __init__(self, step: StepContext) -> None:
         self._step, self._accelerated = step, None
+        problem = step.problem
+        fluid = any(pair.options.source is not None for pair in problem.pairs.values())
+        newton = not (fluid or problem.solver.iterative or problem.floating_bodies is not None)
         self._known: AnyArray | None = None
         self._newton, self._change, self._contraction = newton, np.inf, np.inf
 

@@ -97,7 +97,7 @@ def _linearised(
 ) -> list[tuple[slice, Linearised]]:
     """Return the linearised geometry of pairs in contact with the rows of each; empty if a pair has none."""
     parts = []
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         tangential = np.zeros((len(part), 0))
         if solution.tangential is not None:

@@ -72,7 +72,7 @@ class Iterate:
 
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
         """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
-        for name, rows in constraints.rows().items():
+        for name, rows in constraints.rows.items():
             self.active[name] = solution.wanted[rows]
             forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
             self.pressure[name] = constraints.parts[name].pressure(forces)
@@ -171,7 +171,7 @@ class StepContext:
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
-            for name, rows in constraints.rows().items():
+            for name, rows in constraints.rows.items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
                     # If the obstacle moves along the normals, its slips are round-off of this motion.

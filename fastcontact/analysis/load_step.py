@@ -20,11 +20,11 @@ from fastcontact.analysis.contact_result import contact_results
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.slip import Worn, slip_in_step
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
+from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
@@ -190,10 +190,13 @@ def keep_path(
     """
     displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
     worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
-    for name, rows in settled.constraints.rows().items():
+    for name, rows in settled.constraints.rows.items():
         pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
         at = problem.configuration(name, start, load, displacement, end.u)
-        slip = slip_in_step(pair, at, contact)
+        slip = np.zeros_like(contact.coordinates)
+        if contact.active.any() and not pair.options.tied:
+            held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
+            slip = np.where((contact.active & ~held)[:, None], pair.nodal_slip(at), 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
         if pair.options.wear is not None:
@@ -232,7 +235,7 @@ def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> 
 def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
     """Return, for each pair without separation, the positions (m, dim) of its constraints and which (m,) have closed."""
     positions = dict(start.never_opening)
-    for name, rows in settled.constraints.rows().items():
+    for name, rows in settled.constraints.rows.items():
         if problem.pairs[name].options.kind == "bilateral_once_closed":
             constraints, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
             if constraints.equality is not None:  # points that have slid beyond the other side may return to it
@@ -244,7 +247,7 @@ def never_opening(problem: Problem, start: State, settled: SettledContact) -> di
 def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
     """Return the positions and elastic slips of each pair with tangential compliance, see `State.elastic_slip`."""
     given, solution = {}, settled.solution
-    for name, rows in settled.constraints.rows().items():
+    for name, rows in settled.constraints.rows.items():
         constraints = settled.constraints.parts[name]
         compliant = constraints.compliance is not None or constraints.tangential_softness is not None
         if compliant and constraints.tangents and isinstance(solution, FrictionalEquilibrium):

@@ -14,8 +14,8 @@ from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import SOFT, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
-from fastcontact.analysis.slip import at_points
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
@@ -154,6 +154,11 @@ class Problem:
     def material_of_cells(self) -> Numbers:
         """Number (n_solids,) of the material of each solid cell; equal materials have the same number."""
         return np.concatenate(list(self.field.distinct.values()))
+
+    @property
+    def until_settled(self) -> bool:
+        """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
+        return self.criteria.geometry_updates is None and not self.criteria.keep_pairing
 
     @property
     def extrapolates(self) -> bool:

@@ -183,7 +183,7 @@ def _at_periodic_interfaces(
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
-    for rows in constraints.rows().values() if interfaces else ():
+    for rows in constraints.rows.values() if interfaces else ():
         usable_rows = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
         last = max(int(end.max()) for interface in interfaces for end in interface[:2])
         row = np.full(max(last, int(nodes.max())) + 1, -1)

@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import RigidPosition
-from fastcontact.analysis.slip import Worn
+from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond

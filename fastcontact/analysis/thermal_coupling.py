@@ -153,7 +153,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
     matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
     obstacles, given = csr_array((n, n)), np.zeros(n)
-    for name, rows in settled.constraints.rows().items():
+    for name, rows in settled.constraints.rows.items():
         pair, law = problem.pairs[name], laws.get(name)
         if law is None and not pair.options.friction_heat:
             continue

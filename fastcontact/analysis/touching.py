@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.geometry_loop import Plan, SettledContact, settle_geometry
+from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path
@@ -46,7 +46,7 @@ def along_path(step: StepContext, settled: SettledContact) -> SettledContact:
             return settled
         begun.u = step.dofs.put(begun.u, there)
         along = settle_geometry(replace(step, path=solution.slid, extrapolation=Extrapolation()), begun)
-        if not Plan.of(step.problem).until_settled:  # fixed number of updates
+        if not step.problem.until_settled:  # fixed number of updates
             del begun.history[: len(old.history)]
         return along
     except ConvergenceError as error:
@@ -88,7 +88,7 @@ def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> 
     The constraints leave out those of the gaps that their own geometry, of the end of the step, has at its beginning.
     """
     closing = np.zeros_like(constraints.positions)
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         if constraints.slip0 is not None and isinstance(step.problem.pairs[name].primary, Surface):
             tangents = np.stack([tangent[rows] for tangent in constraints.directions])
             now = constraints.parts[name].gaps(step.state.u)
@@ -103,7 +103,7 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
     Forces of equations are not needed.
     """
     normal, traction = np.zeros(len(constraints)), np.zeros_like(constraints.positions)
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         part, before = constraints.parts[name], step.state.forces.get(name)
         if before is not None and part.areas is not None and part.wetted is None:
             pressure, shear = before.at(part.positions)

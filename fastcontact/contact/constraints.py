@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -380,6 +381,7 @@ class StackedConstraints(Constraints):
         branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
         return np.concatenate([active.astype(np.int8), *branches])
 
+    @cached_property
     def rows(self) -> dict[str, slice]:
         """Return the range of rows of each pair, by the name of the pair."""
         ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()

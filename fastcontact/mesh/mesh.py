@@ -150,7 +150,7 @@ class Mesh:
         """Number of cells of all dimensions."""
         return sum(map(len, self.cells.values()))
 
-    @property
+    @cached_property
     def dim(self) -> int:
         """Number of coordinates of a point, 2 or 3."""
         return int(self.points.shape[1])

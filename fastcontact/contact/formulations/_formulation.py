@@ -111,7 +111,6 @@ class Formulation(ABC):
 
     name: ClassVar[str]
     # Whether the surfaces are paired again after each active-set iteration, or only after the active set has converged.
-    geometry_in_loop: ClassVar[bool]
     # Whether the primary side may be a rigid obstacle.
     against_obstacles: ClassVar[bool] = True
 
@@ -628,6 +627,20 @@ class Formulation(ABC):
             gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
+
+    def nodal_slip(self, at: Configuration) -> Array:
+        """Return the slip increment (m, dim) of the secondary nodes [length].
+
+        Nodes beyond the other side may still carry pressure, by parts of their facets.
+        """
+        nodes = Candidates.nodes_of(self.secondary)
+        pairing = self.facing(nodes, at, np.inf)
+        directions = tangents(pairing.normal)
+        rows, slip0 = self.slips(nodes, pairing, directions, at)
+        along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
+        along += 0.0 if slip0 is None else slip0
+        slip = np.einsum("kn,knd->nd", along, np.stack(directions))
+        return np.where(pairing.paired[:, None], slip, 0.0)
 
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:

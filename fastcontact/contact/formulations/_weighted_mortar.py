@@ -87,7 +87,6 @@ class WeightedMortar(Formulation):
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
-    geometry_in_loop: ClassVar[bool] = True
     _whole: list[Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
