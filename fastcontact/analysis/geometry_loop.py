@@ -22,8 +22,7 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
-# Number of pairings after which nodes are assumed to alternate between facets: the iteration then restarts without
-# extrapolation, or with rounded edges.
+# Smallest number of pairings after which nodes are assumed to alternate between facets: edges are then rounded.
 PATIENT_UPDATES = 25
 # Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
 SAFETY = 3.0
@@ -128,12 +127,9 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
         mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        faceted = any(pair.faceted for pair in problem.pairs.values())
-        if update == max(limit // 2, PATIENT_UPDATES) and (extrapolates or faceted):
+        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
             log.info("nodes flip between facets: from now on the edges of facets are rounded")
-            if extrapolates:  # whether they alternate without end depends on the initial guess
-                iterate.begin_again(step.state)
-            iterate.rounded = iterate.rounded or faceted
+            iterate.rounded = True
             mixing.restart()
             watch.forget()
     if problem.until_settled:

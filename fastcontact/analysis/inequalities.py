@@ -65,11 +65,6 @@ class Iterate:
         """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
-    def begin_again(self, state: State) -> None:
-        """Reset the iterate to the state at the beginning of the load step; the history is kept."""
-        self.u, self.active, self.pressure = state.u.copy(), dict(state.active), dict(state.pressure)
-        self.frictional = self.rigid = None
-
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
         """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
         for name, rows in constraints.rows.items():

@@ -44,9 +44,9 @@ HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement at which iterations end. A change that is small enough to be round-off
-# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction STAYS of the previous
+# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction FALL of the previous
 # one.
-UNCHANGED, STAYS = 100 * ROUND_OFF, 0.3
+UNCHANGED = 100 * ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +194,7 @@ class _Newton:
         """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
         error = last * min(last / before, 1.0) if before else last
-        return error <= self._enough or (last <= SINGLE_PRECISION and last > STAYS * before)
+        return error <= self._enough or (last <= SINGLE_PRECISION and last > FALL * before)
 
     def _serves_again(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.
