@@ -258,7 +258,8 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     first, second = _of_one_node(constraints)
     if not len(first):
         return first, first, first
-    alike = _row_differences(constraints.B, first, second) <= LENGTH_ROUND_OFF
+    difference = abs(constraints.B[first] - constraints.B[second]).max(axis=1).toarray().ravel()
+    alike = difference <= LENGTH_ROUND_OFF
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
@@ -286,10 +287,3 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
         shift += 1
     first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second
-
-
-def _row_differences(rows: csr_array, first: Indices, second: Indices) -> Array:
-    """Return the largest difference (k,) between entries of rows."""
-    if not len(first):
-        return np.empty(0)
-    return np.asarray(abs(rows[first] - rows[second]).max(axis=1).toarray().ravel())

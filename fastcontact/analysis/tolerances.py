@@ -31,8 +31,6 @@ FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 # With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
 # residual of the friction law from decreasing.
 LEAST_FALL = 0.2
-# Largest number of Newton iterations with friction while linear solutions are inexact, because their errors reverse slips.
-INEXACT_NEWTON_STEPS = 3
 # Number of updates in the window.
 WINDOW = 8
 # The iteration counts as converging if the changes in the second half of the window are below this fraction of those in the
@@ -85,7 +83,7 @@ class Tolerances:
             multiplier=noise,
             residual=max(self._residual, self._solver.tolerance),
             max_iterations=self._criteria.max_active_set_iterations,
-            max_newton_steps=INEXACT_NEWTON_STEPS if self.inexact else None,
+            inexact=self.inexact,
         )
 
     def enough(self, size: float) -> float:

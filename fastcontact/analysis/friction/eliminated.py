@@ -70,8 +70,8 @@ def solve(
     forces : ndarray (1 + k, m), optional
         Initial guess of the forces: normal ones, then those along each of k tangents [force].
     """
-    tolerance, steps = accuracy.residual or 0.0, accuracy.max_newton_steps
-    problem = Eliminated(loaded, constraints, u, tolerance, inexact=steps is None)
+    tolerance = accuracy.residual or 0.0
+    problem = Eliminated(loaded, constraints, u, tolerance, inexact=not accuracy.inexact)
     y, gaps = problem.start(forces)
     try:
         if forces is None or not forces.any():
@@ -85,11 +85,11 @@ def solve(
         if not state[0].any():  # all were open: close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
         exact = max(ROUND_OFF, ENOUGH * tolerance)
-        iterate = newton(problem, y, gaps, exact, None if steps is None else steps - 1)
+        iterate = newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
         if problem.finish():
             y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
             iterate = newton(problem, y, gaps, exact)
-        if steps is None and not iterate.settled:
+        if not (accuracy.inexact or iterate.settled):
             iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
                 return None
