@@ -118,7 +118,7 @@ def friction(settled, sizes: Sizes) -> tuple[float, float]:
 
 def carried(model: fc.Model, step: fc.StepResult, settled, sizes: Sizes, name: str) -> float:
     """Return by how much the integral of the reported pressure misses the normal forces of a pair, over their sizes."""
-    part, rows = settled.constraints.parts[name], settled.constraints.rows()[name]
+    part, rows = settled.constraints.parts[name], settled.constraints.rows[name]
     forces = part.normal_forces(settled.solution.multiplier[rows])
     areas = part.nodal.nodal_areas  # by the rule of the formulation, which differs on coarse curved facets
     total = max(float(np.abs(forces).sum()), sizes.force)

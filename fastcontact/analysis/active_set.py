@@ -55,31 +55,45 @@ def solve(
     Equilibrium
         The solution. Its `settled` is False if the iteration has reached ``accuracy.max_iterations``.
     """
-    signs = _Signs(constraints, accuracy)
-    active = (active & signs.usable) | signs.equations
+    equations = np.zeros(len(active), bool)
+    if constraints.equality is not None:
+        equations = constraints.usable & constraints.equality
+    active = (active & constraints.usable) | equations
     seen: set[bytes] = set()
     changed = np.zeros(len(active), bool)  # constraints that a monitored, unconverged solution has changed
-    one_by_one = False
-    iteration = 1
+    one_by_one, iteration, wanted = False, 1, None
+
+    def monitor(u: Array, forces: Array, error: float) -> bool:
+        """Return whether signs beyond the relative `error` of the unconverged solution require a different set.
+
+        A set that would undo an earlier change of one of the constraints `changed` is ignored.
+        """
+        nonlocal wanted
+        sets = _with_next_set(constraints, accuracy, equations, u, forces, active, error)
+        again = (sets.wanted != active) & changed
+        wanted = None if sets.settled or again.any() else sets.wanted
+        return wanted is not None
+
     while True:
-        watch = _Watch(signs, active, changed)
-        rows, compliance = np.flatnonzero(active), constraints.normal_compliance
+        rows, compliance, wanted = np.flatnonzero(active), constraints.normal_compliance, None
         C = None if compliance is None else compliance.among(rows)
         nodes = None if constraints.nodes is None else constraints.nodes[rows]
-        u, forces = loaded.solve(
-            constraints.B[rows], -constraints.gap0[rows], C, guess, watch, accuracy.residual, nodes
-        )
+        B, right = constraints.B[rows], -constraints.gap0[rows]
+        u, forces = loaded.solve(B, right, C, guess, monitor, accuracy.residual, nodes)
         guess = u
-        if watch.wanted is not None:
-            changed |= active != watch.wanted
-            active = watch.wanted
+        if wanted is not None:
+            changed |= active != wanted
+            active = wanted
             continue
-        sets = signs.of(u, forces, active, iteration)
+        sets = _with_next_set(constraints, accuracy, equations, u, forces, active)
         if sets.settled or iteration == accuracy.max_iterations:
-            return replace(sets, response=partial(_response, loaded, constraints, rows))
+            return replace(sets, iterations=iteration, response=partial(_response, loaded, constraints, rows))
         seen.add(active.tobytes())
         one_by_one = one_by_one or sets.wanted.tobytes() in seen
-        active = _first_changed(active, sets.wanted) if one_by_one else sets.wanted
+        if one_by_one:
+            first = np.flatnonzero(active != sets.wanted)[0]
+            sets.wanted[:first], sets.wanted[first + 1 :] = active[:first], active[first + 1 :]
+        active = sets.wanted
         iteration += 1
 
 
@@ -96,81 +110,32 @@ def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Respon
     return response(loaded, R, rows, lambda gaps: -lu_solve(factors, gaps))
 
 
-def _first_changed(active: Mask, wanted: Mask) -> Mask:
-    """Return the active set (m,), changed only at the first constraint at which it differs from `wanted` (m,)."""
-    active = active.copy()
-    first = np.flatnonzero(active != wanted)[0]
-    active[first] = wanted[first]
-    return active
+def _with_next_set(
+    constraints: Constraints, accuracy: Accuracy, equations: Mask, u: Array, forces: Array, active: Mask, error: float = 0.0
+) -> Equilibrium:  # fmt: skip
+    """Return the solution with its next active set, by the signs of gaps and multipliers.
 
-
-class _Signs:
-    """Rule for the next active set, by the signs of gaps and multipliers.
-
-    Attributes
+    Parameters
     ----------
-    usable : ndarray of bool (m,)
-        Constraints that can become active.
+    constraints : Constraints
+    accuracy : Accuracy
     equations : ndarray of bool (m,)
         Constraints that are equations, which are always active.
+    u : ndarray (n,)
+        Unknowns [length].
+    forces : ndarray (q,)
+        Multipliers of the q active constraints [force].
+    active : ndarray of bool (m,)
+        Active set of the solution.
+    error : float
+        Relative error of an unconverged solution; signs of values within this error are ignored [-].
     """
-
-    def __init__(self, constraints: Constraints, accuracy: Accuracy) -> None:
-        self._constraints, self._accuracy = constraints, accuracy
-        self.usable = constraints.usable
-        none = np.zeros(len(constraints), bool)
-        self.equations: Mask = none if constraints.equality is None else self.usable & constraints.equality
-
-    def of(self, u: Array, forces: Array, active: Mask, iteration: int, error: float = 0.0) -> Equilibrium:
-        """Return the solution with its next active set.
-
-        Parameters
-        ----------
-        u : ndarray (n,)
-            Unknowns [length].
-        forces : ndarray (q,)
-            Multipliers of the q active constraints [force].
-        active : ndarray of bool (m,)
-            Active set of the solution.
-        iteration : int
-            Number of linear solutions so far.
-        error : float
-            Relative error of an unconverged solution; signs of values within this error are ignored [-].
-        """
-        multiplier = np.zeros(len(active))
-        multiplier[active] = forces
-        gap = self._constraints.gap0 + self._constraints.B @ u
-        compliance = self._constraints.normal_compliance
-        if compliance is not None:
-            gap += compliance.apply(multiplier)
-        pull = max(self._accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
-        penetration = max(self._accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else self._accuracy.gap
-        wanted = np.where(active, multiplier > -pull, gap < -penetration) & self.usable | self.equations
-        return Equilibrium(u, multiplier, gap, active, wanted, iteration)
-
-
-class _Watch:
-    """Monitor that stops an iterative linear solver when signs require a different active set.
-
-    See `linear.protocol.Monitor`. `active` (m,) is the current active set, and `changed` (m,) are the constraints that an
-    unconverged solution has changed before.
-
-    Attributes
-    ----------
-    wanted : ndarray of bool (m,) or None
-        The next active set that the last monitored solution requires; None if the solver should continue.
-    """
-
-    def __init__(self, signs: _Signs, active: Mask, changed: Mask) -> None:
-        self._signs, self._active, self._changed = signs, active, changed
-        self.wanted: Mask | None = None
-
-    def __call__(self, u: Array, forces: Array, error: float) -> bool:
-        """Return whether signs beyond the relative `error` of the unconverged solution require a different set.
-
-        A set that would undo an earlier change of one of the constraints `changed` is ignored.
-        """
-        signs = self._signs.of(u, forces, self._active, 0, error)
-        again = (signs.wanted != self._active) & self._changed
-        self.wanted = None if signs.settled or again.any() else signs.wanted
-        return self.wanted is not None
+    multiplier, compliance = np.zeros(len(active)), constraints.normal_compliance
+    multiplier[active] = forces
+    gap = constraints.gap0 + constraints.B @ u
+    if compliance is not None:
+        gap += compliance.apply(multiplier)
+    pull = max(accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
+    penetration = max(accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else accuracy.gap
+    wanted = np.where(active, multiplier > -pull, gap < -penetration) & constraints.usable | equations
+    return Equilibrium(u, multiplier, gap, active, wanted, 0)

@@ -47,7 +47,7 @@ def contact_results(
             name, problem.pairs[name], settled.constraints.parts[name], settled.solution, rows,
             problem.configuration(name, start, load, paired_at, end.u), end.first_contact.get(name), displacement,
         )
-        for name, rows in settled.constraints.rows().items()
+        for name, rows in settled.constraints.rows.items()
     }  # fmt: skip
     results = _joined(problem, results)
     if problem.model.strain == "small":
@@ -87,10 +87,13 @@ def contact_result(
     closed = closed_nodes.nodes
     if pair.options.tied:  # in the undeformed configuration
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
-    along = _along_the_surface(constraints, solution, rows, normal, closed_nodes)
-    forces = _forces(pair, constraints, multiplier, along)
+    shear, sticking, tangential = _along_the_surface(constraints, solution, rows, normal, closed_nodes)
+    forces, total, primary_points, primary_forces = _forces(pair, constraints, multiplier, tangential)
     faced = np.where(np.isfinite(normal), normal, 0.0)
-    middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces.secondary, faced), closed, gap)
+    middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces, faced), closed, gap)
+    fluid = None if pair.options.source is None else np.zeros(len(points))
+    if constraints.wetted is not None:
+        fluid = constraints.wetted.pressure
     return ContactResult(
         name=name,
         formulation=pair.name,
@@ -100,26 +103,21 @@ def contact_result(
         gap=gap,
         pressure=closed_nodes.pressure,
         multiplier=closed_nodes.multiplier,
-        force_vectors=forces.secondary,
+        force_vectors=forces,
         normal=normal,
         active=closed,
-        force=forces.total,
+        force=total,
         radius=half_width(middle.places(constraints.positions), active, middle.across(constraints.positions)),
-        shear=along.shear,
-        sticking=closed & along.sticking,
+        shear=shear,
+        sticking=closed & sticking,
         middle=middle.position,
         place=middle.places(coordinates),
         tangent=middle.tangent,
-        primary_points=forces.primary_points,
-        primary_force_vectors=forces.primary,
-        fluid_pressure=None if pair.options.source is None else _fluid(constraints, len(points)),
-        **_obstacle(pair, at, coordinates + at.displacement[points], forces.secondary),
+        primary_points=primary_points,
+        primary_force_vectors=primary_forces,
+        fluid_pressure=fluid,
+        **_obstacle(pair, at, coordinates + at.displacement[points], forces),
     )
-
-
-def _fluid(constraints: Constraints, count: int) -> Array:
-    """Return the pressure of fluid at the nodes (count,) [pressure]."""
-    return np.zeros(count) if constraints.wetted is None else constraints.wetted.pressure
 
 
 def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
@@ -128,60 +126,40 @@ def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Arr
     if not isinstance(side, RigidSide):
         return {}
     return {
-        "obstacle_displacement": at.obstacle.copy(),
-        "obstacle_angle": None if side.rotation is None else at.angle,
+        "obstacle_displacement": at.pose.displacement.copy(),
+        "obstacle_angle": None if side.rotation is None else at.pose.angle,
         "torque": side.torque(deformed, forces, at.pose),
     }
 
 
-@dataclass(frozen=True, eq=False)
-class _Forces:
-    """Contact forces on secondary nodes, their sum, and those on primary nodes if nodes carry them on both sides [force]."""
-
-    secondary: Array
-    total: Array
-    primary_points: Numbers
-    primary: Array
-
-
-def _forces(pair: Formulation, constraints: Constraints, multiplier: Array, along: _AlongTheSurface) -> _Forces:
-    """Return the contact forces on both sides of a pair."""
-    everywhere = constraints.force(multiplier, along.force).reshape(-1, pair.points.shape[1])
+def _forces(
+    pair: Formulation, constraints: Constraints, multiplier: Array, tangential: Array | None
+) -> tuple[Array, Array, Numbers, Array]:
+    """Return forces on secondary nodes, their sum, and primary nodes with their forces if nodes carry them there [force]."""
+    everywhere = constraints.force(multiplier, tangential).reshape(-1, pair.points.shape[1])
     opposite = pair.primary.points if isinstance(pair.primary, Surface) else np.empty(0, np.int32)
     forces = np.where(np.isin(pair.secondary.points, opposite)[:, None], 0.0, everywhere[pair.secondary.points])
     total = forces.sum(axis=0)
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
-    return _Forces(forces, total, opposite, everywhere[opposite])
-
-
-@dataclass(frozen=True, eq=False)
-class _AlongTheSurface:
-    """Nodal traction (n_nodes, dim) [pressure], nodes that stick, tangential forces (m, k) [force]."""
-
-    shear: Array
-    sticking: Mask
-    force: Array | None = None
+    return forces, total, opposite, everywhere[opposite]
 
 
 def _along_the_surface(
     constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed_nodes: _Closed
-) -> _AlongTheSurface:
-    """Return the tangential results of a pair; empty without friction or tie."""
+) -> tuple[Array, Mask, Array | None]:
+    """Return nodal tractions (n_nodes, dim) [pressure], nodes that stick, and forces (m, k) of friction [force]."""
     multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
     if constraints.tied is not None and constraints.tied.directions:
         _, tangential = constraints.tied.forces(multiplier)
         shear = _nodal_shear(constraints, constraints.tied.directions, tangential, normal)
-        return _AlongTheSurface(np.where(closed_nodes.nodes[:, None], shear, 0.0), everywhere)
+        return np.where(closed_nodes.nodes[:, None], shear, 0.0), everywhere, None
     if not (isinstance(solution, FrictionalEquilibrium) and constraints.tangents):
-        return _AlongTheSurface(np.zeros_like(normal), everywhere)
+        return np.zeros_like(normal), everywhere, None
     tangential = solution.tangential[rows]
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
-    return _AlongTheSurface(
-        shear * closed_nodes.kept[:, None],
-        _mostly_sticking(constraints, solution.sticking[rows], multiplier, constraints.pressure(multiplier)),
-        tangential,
-    )
+    sticking = _mostly_sticking(constraints, solution.sticking[rows], multiplier, constraints.pressure(multiplier))
+    return shear * closed_nodes.kept[:, None], sticking, tangential
 
 
 @dataclass(frozen=True, eq=False)

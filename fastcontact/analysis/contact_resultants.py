@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.html_table import fields_table
-from fastcontact.analysis.slip import worn_in_step
+from fastcontact.analysis.wear import worn_in_step
 from fastcontact.arrays import Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
+from fastcontact.contact.obstacles.rigid_side import Pose
 from fastcontact.errors import ContactError, unknown, warn
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
@@ -334,18 +335,16 @@ def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: floa
 
 def end_of(before: StepResult | None, step: StepResult, name: str) -> Configuration:
     """Return the configuration of a contact pair at the end of a step that follows the step `before`, or starts at rest."""
-    start = np.zeros_like(step.displacement) if before is None else before.displacement
-    (now, angle), (then, angle_start) = _pose(step, name), (np.zeros(start.shape[1]), 0.0)
-    if before is not None:
-        then, angle_start = _pose(before, name)
-    return Configuration(step.displacement, start, now, then, angle=angle, angle_start=angle_start)
+    end = Configuration.displaced(step.displacement)
+    end = replace(end, pose=_pose(step, name))
+    return end if before is None else replace(end, start=before.displacement, pose_start=_pose(before, name))
 
 
-def _pose(step: StepResult, name: str) -> tuple[Array, float]:
-    """Return the displacement (dim,) [length] and the rotation [radian] of the obstacle of a pair, zero without one."""
+def _pose(step: StepResult, name: str) -> Pose:
+    """Return the position of the obstacle of a pair, zero without one."""
     contact, still = step.contact[name], np.zeros(step.displacement.shape[1])
     moved = still if contact.obstacle_displacement is None else np.asarray(contact.obstacle_displacement)
-    return moved, contact.obstacle_angle or 0.0
+    return Pose(moved, contact.obstacle_angle or 0.0)
 
 
 def _of_pair(pair: Formulation, step: StepResult, name: str) -> ContactResult:

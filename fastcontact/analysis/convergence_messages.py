@@ -113,7 +113,7 @@ def limit_load(problem: Problem, state: State) -> str:
 def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indices) -> Nodes:
     """Return, by contact pair, the secondary nodes nearest to constraints, numbered through the pairs."""
     nodes: Nodes = {}
-    for name, rows_of_pair in constraints.rows().items():
+    for name, rows_of_pair in constraints.rows.items():
         rows_in_pair = rows[(rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)] - rows_of_pair.start
         if len(rows_in_pair):
             points = problem.pairs[name].secondary.points

@@ -15,7 +15,7 @@ from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import fine_rule
-from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
+from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.results.step import ContactResult, StepResult
@@ -71,7 +71,7 @@ def _sag_at_points(pair: Formulation, at: Configuration, active: Mask) -> Array:
     closed[pair.secondary.points[active]] = True
     if isinstance(pair.primary, RigidSide):
         rows = np.flatnonzero(closed[points.nodes].all(axis=1))
-        nodes, pose = points.nodes[rows], Pose(at.obstacle, at.angle)
+        nodes, pose = points.nodes[rows], at.pose
         at_nodes = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
         inside = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
         return np.einsum("nk,nk->n", points.shape[rows], at_nodes) - inside

@@ -24,9 +24,10 @@ from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
+from fastcontact.round_off import SINGLE_PRECISION
 
-# Smallest relative residual of GMRES, its ratio to the requested accuracy, and the largest number of iterations.
-ACCURACY, AT_END, MOST = 1e-6, 0.01, 20
+# Largest number of iterations for one change of the displacements.
+MOST = 20
 
 
 def newton_step(
@@ -60,7 +61,7 @@ def newton_step(
         respond = solution.response()
     except LinAlgError:
         return None
-    dim, n_dofs, where = step.problem.model.mesh.dim, len(step.load.lift), step.dofs.compared
+    n_dofs, where = len(step.load.lift), step.dofs.compared
     gaps = np.zeros((1 + len(constraints.tangents), len(constraints)))
 
     def varied(v: Array) -> Array:
@@ -68,7 +69,7 @@ def newton_step(
         active = np.zeros_like(image)
         active[where] = v
         u = step.dofs.put(np.zeros(n_dofs), active)
-        force, nodal = np.zeros(n_dofs), u[: step.problem.model.n_dofs].reshape(-1, dim)
+        force, nodal = np.zeros(n_dofs), step.problem.displacement(u)
         for rows, part in parts:
             varied, changed = part.along(nodal)
             gaps[: len(changed), rows] = changed
@@ -79,7 +80,7 @@ def newton_step(
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(system, changed / size, rtol=max(ACCURACY, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
+    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, accuracy), atol=0.0, restart=MOST, maxiter=1)
     responding = largest_difference(size * v, changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not responding <= size:
@@ -97,7 +98,7 @@ def _linearised(
 ) -> list[tuple[slice, Linearised]]:
     """Return the linearised geometry of pairs in contact with the rows of each; empty if a pair has none."""
     parts = []
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
         tangential = np.zeros((len(part), 0))
         if solution.tangential is not None:

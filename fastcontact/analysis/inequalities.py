@@ -1,13 +1,15 @@
-"""Solve the contact problem with fixed geometry, by the active set method or by the solver for Coulomb friction.
+"""One iteration of the geometry loop: pair the contact surfaces, and solve the contact problem of this pairing.
 
-Floating bodies, which only contact restrains, are held by springs, whose positions are iterated; see `floating_bodies`.
+The inequalities are solved by the active set method, or by the solver for Coulomb friction. Floating bodies, which only
+contact restrains, are held by springs, whose positions are iterated; see `floating_bodies`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +17,98 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
 from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
-from fastcontact.analysis.floating_bodies import FloatingBodies, Freed
-from fastcontact.analysis.iterate import Iterate
+from fastcontact.analysis.extrapolation import Extrapolation
+from fastcontact.analysis.floating_bodies import FloatingBodies, Freed, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, Path, Response, Slid, Solution
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Mask
-from fastcontact.contact.constraints import Constraints, StackedConstraints
+from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
+
+
+@dataclass(eq=False)
+class Iterate:
+    """Iterate of a load step between two pairings of the contact surfaces; `geometry_loop` modifies it.
+
+    Attributes
+    ----------
+    u : ndarray (n_dofs,)
+        Displacements; components that are condensed keep their values from the beginning of the step [length].
+    active : dict of str to ndarray of bool (m,)
+        For each contact pair, the active set that the last solution predicts for the next one.
+    pressure : dict of str to ndarray (n_nodes,)
+        Last nodal pressures of each contact pair [pressure].
+    frictional : FrictionalEquilibrium, optional
+        The last solution with friction.
+    rigid : RigidPosition, optional
+        The last position of floating bodies.
+    history : list of dict
+        Convergence data of each pairing, see `StepResult.iterations`.
+    rounded : bool
+        Whether edges between facets are rounded, because nodes alternated between facets.
+    """
+
+    u: Array
+    active: dict[str, Mask]
+    pressure: dict[str, Array]
+    frictional: FrictionalEquilibrium | None = None
+    rigid: RigidPosition | None = None
+    history: list[dict[str, Any]] = field(default_factory=list)
+    rounded: bool = False
+
+    @classmethod
+    def of(cls, state: State) -> Iterate:
+        """Return the initial iterate of a load step."""
+        return cls(state.u.copy(), dict(state.active), dict(state.pressure))
+
+    def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
+        """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
+        for name, rows in constraints.rows.items():
+            self.active[name] = solution.wanted[rows]
+            forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
+            self.pressure[name] = constraints.parts[name].pressure(forces)
+
+
+def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
+    """Pair both sides of every contact pair on the deformed configuration, with `keep_pairing` on the undeformed one."""
+    displacement, u = problem.displacement(iterate.u).copy(), iterate.u  # which later iterations overwrite
+    if problem.force_driven.pairs:
+        u = np.where(problem.system.fixed, load.lift, u)
+    paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
+    parts = {}
+    for name, pair in problem.pairs.items():
+        at = problem.configuration(name, state, load, paired_at, u)
+        at = replace(at, pressure=iterate.pressure.get(name), rounded=iterate.rounded)
+        parts[name] = pair.constraints(at)
+        if problem.force_driven.pairs:
+            rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
+            moved = at.obstacle_motion if rotates else None
+            parts[name] = problem.force_driven.constraints(name, parts[name], at.pose.displacement, moved)
+    return stacked(parts)
+
+
+def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+    """Return the initial active set (m,): the one predicted by the last solution, or extrapolated at the first pairing."""
+    sets = [_start_of(name, part, iterate, extrapolation) for name, part in constraints.parts.items()]
+    return np.concatenate(sets)
+
+
+def _start_of(name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
+    """Return the initial active set of the contact pair `name`; see `initially_active`."""
+    if constraints.equality is not None and constraints.equality.all():
+        return constraints.equality
+    if name not in iterate.active:
+        return np.zeros(len(constraints), bool)
+    active = constraints.initially_active(iterate.u, iterate.pressure[name])
+    if active is not None:
+        return active
+    last = iterate.active[name]
+    return last if extrapolation is None else extrapolation.active(name, last)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +125,10 @@ class StepContext:
         The prepared matrix with the right-hand side of the step, in the unknowns of `dofs`.
     dofs : ActiveDofs
         Unknowns of the contact problem: all of them, or those of the contact surfaces after static condensation.
+    extrapolation : Extrapolation
+        Extrapolation of earlier steps, with which the step begins.
+    expected : float
+        Scale of the displacements in the first step, if only forces act [length].
     path : Path or Slid, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -53,6 +139,8 @@ class StepContext:
     load: StepLoad
     loaded: Loaded
     dofs: ActiveDofs
+    extrapolation: Extrapolation = field(default_factory=Extrapolation)
+    expected: float = 0.0
     path: Path | Slid | None = None
 
     @cached_property
@@ -79,7 +167,7 @@ class StepContext:
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
         if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
-            for name, rows in constraints.rows().items():
+            for name, rows in constraints.rows.items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
                     slips[:, rows] += constraints.slip0[:, rows]
                     # If the obstacle moves along the normals, its slips are round-off of this motion.

@@ -17,21 +17,26 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.contact_result import contact_results
+from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
-from fastcontact.analysis.step_history import keep_path, save_contact_history
-from fastcontact.analysis.step_result import recover
-from fastcontact.analysis.thermal_coupling import (
-    Heated,
-    expanded,
-    expansion_as_force,
-    first_rise,
-    settle_heat,
-)
+from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
+from fastcontact.analysis.wear import Worn
+from fastcontact.analysis.work import contact_work
+from fastcontact.arrays import Array, Mask
+from fastcontact.contact.cohesion import Bond
+from fastcontact.contact.cohesive_layer import Layer
+from fastcontact.elasticity import recovery
+from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
+from fastcontact.model.pretension import section_results
+from fastcontact.model.ramp import multiplier
 from fastcontact.model.rigid_motions import generalised
+from fastcontact.results.material_stress import by_largest_von_mises
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.units import units_of_results
 
 
 @parallel.on_one_blas_thread
@@ -53,14 +58,15 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     ConvergenceError
         If the step does not converge.
     """
-    cold = problem.load_at(instant)
-    rise = first_rise(problem, state, instant)
-    load = expanded(problem, cold, rise)
+    load = cold = problem.load_at(instant)
+    if problem.heat is not None:
+        rise = first_rise(problem, problem.heat, state, instant)
+        load = expanded(problem, cold, rise)
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     begin = prepare_start(problem, state, index, load)
     heated, solution = None, newton(problem, begin, load)
-    if rise is not None:
+    if problem.heat is not None:
         solve = partial(newton, problem, begin)
         heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, solve)
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
@@ -99,11 +105,15 @@ def _ended(
         end = save_contact_history(problem, start, load, settled, end)
         contact = contact_results(problem, start, load, settled, end)
         end, contact = keep_path(problem, start, load, settled, end, contact, balanced.energy)
-        end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
-    else:
-        end = replace(end, extrapolation=start.extrapolation.converged(u, {}))
-    if settled is None and start.work is not None:
+        touched = start.touched.union(name for name, pair in contact.items() if pair.active.any())
+        met = {name: positions for name, positions in end.first_contact.items() if name in touched}
+        end = replace(end, touched=touched, first_contact=met)
+    elif start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
+    if problem.extrapolates:
+        end = replace(
+            end, extrapolation=start.extrapolation.converged(u, {} if settled is None else settled.gaps_and_forces)
+        )
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
@@ -120,7 +130,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     If only forces act in the first step, no displacement is known. The solution without contact then provides the scale of
     the displacements, `Beginning.expected`.
     """
-    pushing = expansion_as_force(problem, load)
+    pushing = load if load.rise is None else expansion_as_force(problem, load)
     loaded = with_loads(problem, pushing)
     round_off, rigid_force, expected = state.gap_round_off, state.largest_rigid_force, 0.0
     zero = np.zeros(len(load.lift))
@@ -134,11 +144,174 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
-    # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads.
-    motions = [] if problem.bodies is None else load.obstacles.values()
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
         largest_force=max(state.largest_force, largest(pushing.force)),
-        extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions),
     )  # fmt: skip
+    if problem.extrapolates:
+        # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads.
+        motions = [] if problem.bodies is None else load.obstacles.values()
+        start = replace(start, extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions))
     return Beginning(start, index, load, loaded, expected)
+
+
+def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
+    """Return the state `end` with the contact data that later steps need.
+
+    These are active sets, pressures, bonds, elastic slips, points of first contact, and the data for extrapolation.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        State at the beginning of the step.
+    load : StepLoad
+    settled : SettledContact
+        Contact solution of the step.
+    end : State
+        State at the end of the step, with its displacements.
+    """
+    return replace(
+        end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
+        last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
+        never_opening=never_opening(problem, start, settled), elastic_slip=elastic_slips(settled),
+        bonds=bonds(settled, end.u),
+    )  # fmt: skip
+
+
+def keep_path(
+    problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State, results: dict[str, ContactResult],
+    energy: tuple[float, float],
+) -> tuple[State, dict[str, ContactResult]]:  # fmt: skip
+    """Return the state `end` and the contact results with accumulated slip, wear and work added.
+
+    `start`, `load`, `settled` and `end` are those of `save_contact_history`; `results` are the contact results of each
+    pair, and `energy` the elastic strain energy and the plastic work [energy].
+    """
+    displacement, results_so_far, works = problem.displacement(end.u), dict(results), np.zeros(3)
+    worn, slipped, forces = dict(start.worn), dict(start.slipped), dict(start.forces)
+    for name, rows in settled.constraints.rows.items():
+        pair, contact, constraints = problem.pairs[name], results[name], settled.constraints.parts[name]
+        at = problem.configuration(name, start, load, displacement, end.u)
+        slip = np.zeros_like(contact.coordinates)
+        if contact.active.any() and not pair.options.tied:
+            held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
+            slip = np.where((contact.active & ~held)[:, None], pair.nodal_slip(at), 0.0)
+        slipped[name] = slip + start.slipped.get(name, 0.0)
+        results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
+        if pair.options.wear is not None:
+            before = start.worn.get(name, Worn.nothing(len(contact.points)))
+            worn[name] = before.after(pair, at, contact, pair.options.wear)
+            results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
+        if name in end.bonds:
+            results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
+        elif not (pair.options.tied or pair.options.gap_only):
+            given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
+            forces[name], work_of_pair = contact_work(pair, *given)
+            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0])
+            works += work_of_pair
+    stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
+    released = sum(entry.released for entry in end.bonds.values())
+    work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
+    return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), results_so_far
+
+
+def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
+    """Return the point of first contact (dim,) [length] of each contact pair in 3D, and the unit normal (dim,) there [-].
+
+    The point is constant after the bodies have touched. Before that it is the node with the smallest gap at the current
+    positions of obstacles and clearances.
+    """
+    if problem.model.mesh.dim == 2:
+        return {}
+    return {
+        name: start.first_contact[name]
+        if name in start.first_contact
+        else pair.first_contact(problem.configuration(name, start, load, problem.displacement(u), u))
+        for name, pair in problem.pairs.items()
+    }
+
+
+def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
+    """Return, for each pair without separation, the positions (m, dim) of its constraints and which (m,) have closed."""
+    positions = dict(start.never_opening)
+    for name, rows in settled.constraints.rows.items():
+        if problem.pairs[name].options.kind == "bilateral_once_closed":
+            constraints, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
+            if constraints.equality is not None:  # points that have slid beyond the other side may return to it
+                closed |= constraints.equality
+            positions[name] = constraints.positions, closed
+    return positions
+
+
+def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
+    """Return the positions and elastic slips of each pair with tangential compliance, see `State.elastic_slip`."""
+    given, solution = {}, settled.solution
+    for name, rows in settled.constraints.rows.items():
+        constraints = settled.constraints.parts[name]
+        compliant = constraints.compliance is not None or constraints.tangential_softness is not None
+        if compliant and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
+            slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
+            given[name] = constraints.positions, slips
+    return given
+
+
+def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:
+    """Return the state of the cohesive layer, for each contact pair that has one, at displacements u (n_dofs,) [length]."""
+    parts = settled.constraints.parts.items()
+    return {name: part.tied.after(part, u) for name, part in parts if isinstance(part.tied, Layer)}
+
+
+def recover(
+    problem: Problem, end: State, contact: dict[str, ContactResult], reaction: Array, iterations: dict[str, Any],
+    instant: tuple[int, float], bodies: DeformedBodies | None = None,
+) -> StepResult:  # fmt: skip
+    """Return the result of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    end : State
+        State at the end of the step.
+    contact : dict of str to ContactResult
+        Results of each contact pair.
+    reaction : ndarray (n_dofs of the mesh,)
+        Reactions [force].
+    iterations : dict
+        Numbers of iterations, see `StepResult`.
+    instant : (int, float)
+        Number of the step, and pseudo-time at its end.
+    bodies : DeformedBodies, optional
+        The nonlinear bodies at the end of the step; None if bodies are linear.
+    """
+    mesh, u = problem.model.mesh, problem.displacement(end.u)
+    temperature, initial = (
+        problem.factors(load, instant[1]) for load in (problem.model.temperatures, problem.model.initial_states)
+    )
+    pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
+    factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
+    iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
+    heat = None if end.rise is None else problem.model.reference_temperature + end.rise
+    sections = problem.model.pretensions
+    if sections:
+        pulls = [multiplier(load.ramp, problem.ramp, instant[1]) for load in sections]
+        pretension = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
+        iterations = {**iterations, "pretension": pretension}
+    if bodies is not None:
+        stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
+    else:
+        offset, field = None, problem.field
+        if temperature or initial or heat is not None:
+            offset = problem.model.stress_offset(temperature, initial, field, heat)
+        materials = field.moduli, field.loops, u, field.treatment
+        stress = recovery.nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
+    by_material = None
+    if len(problem.sides.points):
+        stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, stress, mesh.n_points)
+    von_mises, named = recovery.von_mises(stress), problem.model.units
+    return StepResult(
+        *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
+        contact, iterations, material_stress=by_material,
+        cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
+        temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
+    )  # fmt: skip

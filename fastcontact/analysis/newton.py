@@ -15,22 +15,20 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
-from fastcontact.analysis.balance import Balance, balance
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import StepContext
-from fastcontact.analysis.iterate import Iterate
+from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium, solve_displacements, with_loads
+from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium, balance, solve_displacements, with_loads
 from fastcontact.analysis.terms import Fluid, Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.protocol import Loaded
-from fastcontact.round_off import SINGLE_PRECISION
+from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
 # Largest number of Newton iterations of a load step, and of halvings of an iteration that inverts cells.
@@ -46,9 +44,9 @@ HELD = 5e-5, 2e-4, 1e-3
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement at which iterations end. A change that is small enough to be round-off
-# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction STAYS of the previous
+# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction FALL of the previous
 # one.
-UNCHANGED, STAYS = 1e-10, 0.3
+UNCHANGED = 100 * ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,7 +194,7 @@ class _Newton:
         """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
         error = last * min(last / before, 1.0) if before else last
-        return error <= self._enough or (last <= SINGLE_PRECISION and last > STAYS * before)
+        return error <= self._enough or (last <= SINGLE_PRECISION and last > FALL * before)
 
     def _serves_again(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.
@@ -222,7 +220,10 @@ class _Newton:
         not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
         """
         if self._terms.prepared:
-            return self._prepared_contact(u)
+            begin = self._begin
+            first = self._load is begin.load and self._settled is None
+            loaded = begin.loaded if first else with_loads(self._problem, self._load)
+            return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         failed: Exception | None = None
         for by in self._regularisations():
             if self._held and by.geometric == WHOLE and not by.held:
@@ -251,13 +252,6 @@ class _Newton:
         held = [Regularisation(held=stiffness, stiff=floats) for stiffness in HELD] if closed else []
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
-    def _prepared_contact(self, u: Array) -> tuple[Array, Array]:
-        """Return the result of `_solve` where all tangents are the prepared ones."""
-        begin = self._begin
-        first = self._load is begin.load and self._settled is None
-        loaded = begin.loaded if first else with_loads(self._problem, self._load)
-        return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
-
     def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
@@ -282,15 +276,15 @@ class _Newton:
         """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
         settled = None
         if problem.pairs:
-            u0, bodies = self._iterate.u, problem.floating_bodies
+            u0, bodies, expected = self._iterate.u, problem.floating_bodies, self._begin.expected
             lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
             dofs = problem.dofs.for_step(u0, lift)
-            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs)
-            settled = settle_geometry(step, extrapolation, self._begin.expected, self._iterate)
+            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs, extrapolation, expected)
+            settled = settle_geometry(step, self._iterate)
             if problem.criteria.friction_while_touching is not None and self._terms.prepared:
                 from fastcontact.analysis.touching import along_path
 
-                settled = along_path(step, settled, self._begin.expected)
+                settled = along_path(step, settled)
                 self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled

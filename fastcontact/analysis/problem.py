@@ -14,14 +14,14 @@ from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies
 from fastcontact.analysis.heat import Heat, prepared_heat
-from fastcontact.analysis.slip import at_points
 from fastcontact.analysis.state import State
+from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
-from fastcontact.contact.obstacles.rigid_side import RigidSide
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.elasticity.following_pressure import FollowingPressure
@@ -156,9 +156,25 @@ class Problem:
         return np.concatenate(list(self.field.distinct.values()))
 
     @property
+    def until_settled(self) -> bool:
+        """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
+        return self.criteria.geometry_updates is None and not self.criteria.keep_pairing
+
+    @property
+    def extrapolates(self) -> bool:
+        """Whether load steps start from an extrapolation of earlier ones."""
+        return self.solver.iterative or self.bodies is not None
+
+    @property
+    def shares_nodes(self) -> bool:
+        """Whether constraints of several contact pairs, or of both ends of a period, may be at one node."""
+        return len(self.pairs) > 1 or bool(self.model.periodic_interfaces)
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Number of points, including one for each force-driven obstacle, and dimension."""
-        return self.force_driven.n_dofs // self.model.mesh.dim, self.model.mesh.dim
+        n_points, dim = self.model.mesh.points.shape
+        return n_points + len(self.force_driven.pairs), dim
 
     def load_at(self, instant: float) -> StepLoad:
         """Return the loads at an instant of the ramp."""
@@ -193,7 +209,8 @@ class Problem:
 
     def displacement(self, u: Array) -> Array:
         """Return the displacements (n_points, dim) of the mesh, given all displacements u (n_dofs,) [length]."""
-        return u[: self.model.n_dofs].reshape(-1, self.model.mesh.dim)
+        points = self.model.mesh.points
+        return u[: points.size].reshape(points.shape)
 
     def accurate_to(self, u: Array) -> Array:
         """Return the lengths (n_dofs,) whose round-off limits the accuracy of displacements u (n_dofs,) [length].
@@ -212,7 +229,7 @@ class Problem:
 
         Prescribed displacements are those of `load`. Displacements of force-driven obstacles are taken from u (n_dofs,).
         """
-        return {**load.obstacles, **self.force_driven.positions(u)}
+        return {**load.obstacles, **self.force_driven.positions(u)} if self.force_driven.pairs else dict(load.obstacles)
 
     def configuration(self, name: str, state: State, load: StepLoad, displacement: Array, u: Array) -> Configuration:
         """Return the configuration of a contact pair.
@@ -233,13 +250,11 @@ class Problem:
         return Configuration(
             displacement,
             self.displacement(state.u),
-            self.obstacles_at(load, u).get(name, still),
-            state.obstacles.get(name, still),
+            Pose(self.obstacles_at(load, u).get(name, still), load.angles.get(name, 0.0)),
+            Pose(state.obstacles.get(name, still), state.angles.get(name, 0.0)),
             load.clearance_factors.get(name, 1.0),
             state.never_opening.get(name),
             state.elastic_slip.get(name),
-            load.angles.get(name, 0.0),
-            state.angles.get(name, 0.0),
             None
             if worn is None
             else at_points(self.pairs[name].secondary.points, worn.depth, self.model.mesh.n_points),

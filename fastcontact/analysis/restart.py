@@ -69,7 +69,7 @@ def taken(problem: Problem, state: State, case: dict[str, Any]) -> dict[str, Any
     kept = state.to_dict(problem.model.n_dofs)
     extrapolation, memory = kept.pop("extrapolation"), kept.pop("solver")
     kept = {"format": FORMAT, "case": case, **kept, "solver": {"kind": _kind(problem.solver), "memory": memory}}
-    if _extrapolates(problem):
+    if problem.extrapolates:
         kept["extrapolation"] = extrapolation
     return kept
 
@@ -87,7 +87,7 @@ def put_back(problem: Problem, step: StepResult, touched: frozenset[str]) -> Sta
             problem.solver.put_back(kept["solver"]["memory"])
         state = State.from_dict(kept, step.displacement, touched)
         state = replace(state, elastic_slip={**state.elastic_slip, **_of_tractions(problem, kept["pairs"])})
-    if not _extrapolates(problem):
+    if not problem.extrapolates:
         state = replace(state, extrapolation=Extrapolation())
     return replace(state, solver=problem.solver.snapshot())
 
@@ -113,11 +113,6 @@ def _whole(step: StepResult) -> Iterator[None]:
             f"the restart data of step {step.index} are damaged ({type(error).__name__}: {error}): resume from another file, "
             "or start anew without resuming"
         ) from error
-
-
-def _extrapolates(problem: Problem) -> bool:
-    """Return whether load steps start from an extrapolation."""
-    return problem.solver.iterative or problem.bodies is not None
 
 
 def remaining(ramp: Ramp, last: StepResult | None) -> list[float]:

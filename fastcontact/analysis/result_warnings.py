@@ -12,10 +12,10 @@ from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.slip import too_fast
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import nonlinear_scatter_warnings, scatter_warnings
 from fastcontact.analysis.volumetric_locking import locking_warning
+from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
@@ -129,8 +129,7 @@ def _loose(problem: Problem, last: StepResult) -> Iterator[str]:
     if not history:
         return
     change, residual = history[-1]["displacement_change"], history[-1]["residual"]
-    until_settled = criteria.geometry_updates is None and not criteria.keep_pairing
-    if until_settled and change > LOOSE:
+    if problem.until_settled and change > LOOSE:
         yield (
             f"the contact geometry counts as converged although the displacement still changed by {change:.1e} of its "
             f"largest component (Criteria.geometry = {criteria.geometry:g}): results are no more accurate than that"

@@ -52,8 +52,6 @@ class SharedNodes:
     @classmethod
     def of(cls, constraints: StackedConstraints, interfaces: Sequence[PeriodicInterface] = ()) -> SharedNodes | None:
         """Return the shared nodes of all pairs; None if no node is in several pairs, or at both ends of a period."""
-        if len(constraints.parts) < 2 and not interfaces:
-            return None
         first, second, behind = _alike(constraints)
         ends = _at_periodic_interfaces(constraints, interfaces, behind)
         if not len(second) + len(behind) + ends.shape[1]:
@@ -185,7 +183,7 @@ def _at_periodic_interfaces(
     nodes, usable = _nodes(constraints), np.isfinite(_areas(constraints)) & constraints.usable
     usable[behind] = False
     pairs = [np.empty((2, 0), np.intp)]
-    for rows in constraints.rows().values() if interfaces else ():
+    for rows in constraints.rows.values() if interfaces else ():
         usable_rows = rows.start + np.flatnonzero(usable[rows] & (nodes[rows] >= 0))
         last = max(int(end.max()) for interface in interfaces for end in interface[:2])
         row = np.full(max(last, int(nodes.max())) + 1, -1)
@@ -263,7 +261,8 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     first, second = _of_one_node(constraints)
     if not len(first):
         return first, first, first
-    alike = _row_differences(constraints.B, first, second) <= LENGTH_ROUND_OFF
+    difference = abs(constraints.B[first] - constraints.B[second]).max(axis=1).toarray().ravel()
+    alike = difference <= LENGTH_ROUND_OFF
     if constraints.equality is not None:
         alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
@@ -288,10 +287,3 @@ def _of_one_node(constraints: StackedConstraints) -> tuple[Indices, Indices]:
         shift += 1
     first, second = np.concatenate(pairs[::-1], axis=1)
     return first, second
-
-
-def _row_differences(rows: csr_array, first: Indices, second: Indices) -> Array:
-    """Return the largest difference (k,) between entries of rows."""
-    if not len(first):
-        return np.empty(0)
-    return np.asarray(abs(rows[first] - rows[second]).max(axis=1).toarray().ravel())

@@ -27,16 +27,15 @@ class Accuracy:
         Relative residual at which iterative linear solvers stop, if it is larger than their tolerance [-].
     max_iterations : int
         Largest number of linear solutions without friction. The iteration stops at this number even if it has not converged.
-    max_newton_steps : int, optional
-        Number of Newton steps with friction after which the iteration stops, and its result is accepted even if it has not
-        converged. None means that only converged results are accepted.
+    inexact : bool
+        Whether linear solutions are inexact. Friction then takes a single Newton step, because their errors reverse slips.
     """
 
     gap: float
     multiplier: float = 1e-12
     residual: float | None = None
     max_iterations: int = 200
-    max_newton_steps: int | None = None
+    inexact: bool = False
 
 
 # Linear map to the change of the unknowns (n,) [length] from additional forces (n,) [force] on them, and from additional

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import RigidPosition
-from fastcontact.analysis.slip import Worn
+from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import ContactForces, Work
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.cohesion import Bond
@@ -119,15 +119,6 @@ class State:
     instant: float = 0.0
     halved: int = 0
     solver: Mapping[str, Any] = field(default_factory=dict)
-
-    def after_touching(self, pairs: Iterable[str]) -> State:
-        """Return the state in which the contact `pairs` are also marked as touched.
-
-        Points of first contact are kept only for pairs that have touched in this or in an earlier step.
-        """
-        touched = self.touched.union(pairs)
-        met = {name: positions for name, positions in self.first_contact.items() if name in touched}
-        return dataclasses.replace(self, touched=touched, first_contact=met)
 
     def to_dict(self, n_dofs: int) -> dict[str, Any]:
         """Return the data of a restart.

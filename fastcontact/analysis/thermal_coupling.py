@@ -15,14 +15,13 @@ from scipy.sparse import csr_array
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
-from fastcontact.analysis.balance import Balance
 from fastcontact.analysis.contact_result import areas
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.heat import Temperatures
+from fastcontact.analysis.heat import Heat, Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium
+from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium
 from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing
@@ -62,12 +61,10 @@ class Heated(Temperatures):
         )  # fmt: skip
 
 
-def first_rise(problem: Problem, state: State, instant: float) -> Array | None:
-    """Return the initial temperature rise (n_points,) of a load step [temperature]; None without conduction of heat."""
-    if problem.heat is None:
-        return None
-    if not (problem.heat.depends_on_contact or problem.heat.finite):
-        return problem.heat.temperatures(instant).rise
+def first_rise(problem: Problem, heat: Heat, state: State, instant: float) -> Array:
+    """Return the initial temperature rise (n_points,) of a load step [temperature]."""
+    if not (heat.depends_on_contact or heat.finite):
+        return heat.temperatures(instant).rise
     return np.zeros(problem.model.mesh.n_points) if state.rise is None else state.rise
 
 
@@ -127,12 +124,12 @@ def _pushes_little(problem: Problem, rise: Array, balance: Balance, enough: floa
     return largest(forces.ravel()) <= max(enough * balance.largest, balance.noise)
 
 
-def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
+def expanded(problem: Problem, load: StepLoad, rise: Array) -> StepLoad:
     """Return the load with thermal expansion by a temperature rise (n_points,) [temperature].
 
     For linear bodies its nodal forces are added to the forces of the load.
     """
-    if rise is None or not problem.model.expands:
+    if not problem.model.expands:
         return load
     load = replace(load, rise=rise)
     return load if problem.bodies is not None else expansion_as_force(problem, load)
@@ -140,8 +137,7 @@ def expanded(problem: Problem, load: StepLoad, rise: Array | None) -> StepLoad:
 
 def expansion_as_force(problem: Problem, load: StepLoad) -> StepLoad:
     """Return the load in which the nodal forces of thermal expansion replace the temperature rise."""
-    if load.rise is None:
-        return load
+    assert load.rise is not None
     forces = problem.model.expansion_forces(problem.field, load.rise).ravel()
     return replace(load, force=load.force + np.pad(forces, (0, len(load.force) - len(forces))), rise=None)
 
@@ -157,7 +153,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
     n, solution, laws = problem.model.mesh.n_points, settled.solution, problem.model.conductances()
     matrix, rubbed, crossings = csr_array((n, n)), np.zeros(n), {}
     obstacles, given = csr_array((n, n)), np.zeros(n)
-    for name, rows in settled.constraints.rows().items():
+    for name, rows in settled.constraints.rows.items():
         pair, law = problem.pairs[name], laws.get(name)
         if law is None and not pair.options.friction_heat:
             continue

@@ -12,6 +12,7 @@ window then differ by hardly more than one change.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,13 +31,8 @@ FIRST_RESIDUAL, RESIDUAL = 1e-2, 0.03
 # With friction the tolerance decreases at least by this factor, because inaccurate linear solutions may prevent the
 # residual of the friction law from decreasing.
 LEAST_FALL = 0.2
-# Largest number of Newton iterations with friction while linear solutions are inexact, because their errors reverse slips.
-INEXACT_NEWTON_STEPS = 3
-# Number of updates in the window, and largest difference of their displacements relative to the median change. The ratio is
-# about WINDOW if the displacements move in one direction.
-WINDOW, APART = 8, 4.0
-# Largest admissible scatter of nodal contact forces, relative to the largest one.
-FORCE = 1e-5
+# Number of updates in the window.
+WINDOW = 8
 # The iteration counts as converging if the changes in the second half of the window are below this fraction of those in the
 # first.
 DECLINE = 0.5
@@ -79,24 +75,15 @@ class Tolerances:
             worth = min(RESIDUAL * law_residual, LEAST_FALL * self._residual)
         self._residual = max(self._solver.tolerance, worth)
 
-    def accuracy(self, scale: float, single_iteration: bool) -> Accuracy:
-        """Return the tolerances and limits of the next contact solution.
-
-        Parameters
-        ----------
-        scale : float
-            Scale of the displacements [length].
-        single_iteration : bool
-            Whether the surfaces are paired again after each active-set iteration.
-        """
+    def accuracy(self, scale: float) -> Accuracy:
+        """Return the tolerances and limits of the next contact solution; `scale` is that of the displacements [length]."""
         noise = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
-        limit = 1 if single_iteration else self._criteria.max_active_set_iterations
         return Accuracy(
             gap=max(noise * (scale or self._expected), self._round_off),
             multiplier=noise,
             residual=max(self._residual, self._solver.tolerance),
-            max_iterations=limit,
-            max_newton_steps=1 if limit == 1 else INEXACT_NEWTON_STEPS if self.inexact else None,
+            max_iterations=self._criteria.max_active_set_iterations,
+            inexact=self.inexact,
         )
 
     def enough(self, size: float) -> float:
@@ -130,9 +117,7 @@ class Watch:
     """Window of the last displacements and contact forces, to detect whether they only scatter by round-off."""
 
     def __init__(self) -> None:
-        self._parts: list[Array] = []
-        self._forces: list[Array] = []
-        self._changes: list[float] = []
+        self._window: deque[tuple[Array, Array, float]] = deque(maxlen=WINDOW)
 
     def seen(
         self, unknowns: Array, force: Array, change: float, size: float, contraction: float = np.inf
@@ -160,27 +145,24 @@ class Watch:
         if not change <= SINGLE_PRECISION * size:
             self.forget()
             return None
-        self._parts.append(unknowns.copy())
-        self._forces.append(force.copy())
-        self._changes.append(change)
+        self._window.append((unknowns.copy(), force.copy(), change))
         window = WINDOW if contraction > DECLINE else WINDOW // 2
-        del self._parts[:-window], self._forces[:-window], self._changes[:-window]
-        if len(self._changes) < window:
+        if len(self._window) < window:
             return None
-        changes, half = self._changes, window // 2
-        scatter = Scatter(_last_change(self._parts) / size, _last_change(self._forces) / (largest(force) or 1.0))
+        (parts, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2
+        scatter = Scatter(_last_change(parts) / size, _last_change(forces) / (largest(force) or 1.0))
         declining = np.median(changes[half:]) < DECLINE * np.median(changes[:half])
-        if declining or scatter.displacement * size > APART * float(np.median(changes)):
+        # Displacements that move in one direction are apart by about WINDOW changes.
+        if declining or scatter.displacement * size > half * float(np.median(changes)):
             return None
-        return scatter if scatter.displacement <= SINGLE_PRECISION and scatter.force <= FORCE else None
+        acceptable = scatter.displacement <= SINGLE_PRECISION and scatter.force <= 10 * SINGLE_PRECISION
+        return scatter if acceptable else None
 
     def forget(self) -> None:
         """Discard the updates in the window."""
-        self._parts.clear()
-        self._forces.clear()
-        self._changes.clear()
+        self._window.clear()
 
 
-def _last_change(vectors: list[Array]) -> float:
+def _last_change(vectors: tuple[Array, ...]) -> float:
     """Return the largest difference, in any component, between the last vector and the others."""
     return max(float(largest_difference(vectors[-1], other)) for other in vectors[:-1])

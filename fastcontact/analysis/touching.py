@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.geometry_loop import Plan, SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import StepContext, solve_inequalities
-from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
+from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces, solve_inequalities
 from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path
 from fastcontact.arrays import Array
@@ -25,13 +24,13 @@ log = logging.getLogger("fastcontact")
 MOST = 128
 
 
-def along_path(step: StepContext, settled: SettledContact, expected: float) -> SettledContact:
+def along_path(step: StepContext, settled: SettledContact) -> SettledContact:
     """Return the contact of a step, with friction solved in increments if nodes slide while they close.
 
     Increments are solved on the converged geometry of the step without increments. If they do not converge, the step is left
-    unchanged. See `settle_geometry` for `expected`.
+    unchanged.
     """
-    nodes = SharedNodes.of(settled.constraints, step.problem.model.periodic_interfaces)
+    nodes = settled.nodes
     path = _path(step, settled, nodes)
     if path is None:
         return settled
@@ -47,8 +46,8 @@ def along_path(step: StepContext, settled: SettledContact, expected: float) -> S
         if not solution.settled:
             return settled
         begun.u = step.dofs.put(begun.u, there)
-        along = settle_geometry(replace(step, path=solution.slid), Extrapolation(), expected, begun)
-        if not Plan.of(step.problem).until_settled:  # fixed number of updates
+        along = settle_geometry(replace(step, path=solution.slid, extrapolation=Extrapolation()), begun)
+        if not step.problem.until_settled:  # fixed number of updates
             del begun.history[: len(old.history)]
         return along
     except ConvergenceError as error:
@@ -91,7 +90,7 @@ def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> 
     scaled here to the actual gaps.
     """
     closing = np.zeros_like(constraints.positions)
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         if constraints.slip0 is not None and isinstance(step.problem.pairs[name].primary, Surface):
             tangents = np.stack([tangent[rows] for tangent in constraints.directions])
             now = constraints.parts[name].gaps(step.state.u)
@@ -106,7 +105,7 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
     Forces of equality constraints are not needed.
     """
     normal, traction = np.zeros(len(constraints)), np.zeros_like(constraints.positions)
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         part, before = constraints.parts[name], step.state.forces.get(name)
         if before is not None and part.areas is not None and part.wetted is None:
             pressure, shear = before.at(part.positions)

@@ -21,8 +21,8 @@ class Configuration:
         Current displacements of all points of the mesh [length].
     start : ndarray (n_points, dim)
         Displacements at the beginning of the load step, from which slip is measured [length].
-    obstacle, obstacle_start : ndarray (dim,)
-        Current displacement of a rigid obstacle, and its displacement at the beginning of the load step [length].
+    pose, pose_start : Pose
+        Current position and rotation of a rigid obstacle, and those at the beginning of the load step.
     clearance_factor : float
         Factor of the clearances of the pair [-].
     never_opening : (ndarray (k, dim), ndarray of bool (k,)), optional
@@ -31,8 +31,6 @@ class Configuration:
     elastic_slip : (ndarray (k, dim), ndarray (k, dim)), optional
         Reference positions of the k constraints at the end of the previous load step, and their elastic slips [length]; None
         without tangential compliance.
-    angle, angle_start : float
-        Current rotation angle of a rigid obstacle, and its angle at the beginning of the load step [radian].
     worn : ndarray (n_points,), optional
         Wear depth at the secondary nodes at the beginning of the load step [length]; None without wear.
     bond : Bond, optional
@@ -51,13 +49,11 @@ class Configuration:
 
     displacement: Array
     start: Array
-    obstacle: Array
-    obstacle_start: Array
+    pose: Pose
+    pose_start: Pose
     clearance_factor: float = 1.0
     never_opening: tuple[Array, Mask] | None = None
     elastic_slip: tuple[Array, Array] | None = None
-    angle: float = 0.0
-    angle_start: float = 0.0
     worn: Array | None = None
     bond: Bond | None = None
     fluid_pressure: float = 0.0
@@ -67,19 +63,14 @@ class Configuration:
     friction_factor: float = 1.0
 
     @property
-    def pose(self) -> Pose:
-        """Current position and rotation of a rigid obstacle."""
-        return Pose(self.obstacle, self.angle)
-
-    @property
-    def pose_start(self) -> Pose:
-        """Position and rotation of a rigid obstacle at the beginning of the load step."""
-        return Pose(self.obstacle_start, self.angle_start)
+    def obstacle_motion(self) -> Array:
+        """Displacement (dim,) of a rigid obstacle in the load step [length]."""
+        return self.pose.displacement - self.pose_start.displacement
 
     @classmethod
     def displaced(cls, displacement: Array) -> Configuration:
         """Return the configuration with displacements (n_points, dim) [length] that begins with the undeformed state."""
-        still = np.zeros(displacement.shape[1])
+        still = Pose(np.zeros(displacement.shape[1]))
         return cls(displacement, np.zeros_like(displacement), still, still)
 
     @classmethod

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -380,6 +381,7 @@ class StackedConstraints(Constraints):
         branches = (pair.branches for pair in self.parts.values() if pair.branches is not None)
         return np.concatenate([active.astype(np.int8), *branches])
 
+    @cached_property
     def rows(self) -> dict[str, slice]:
         """Return the range of rows of each pair, by the name of the pair."""
         ends = np.cumsum([0, *(len(pair) for pair in self.parts.values())]).tolist()
@@ -392,7 +394,7 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
     if len(pairs) == 1:
         values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
         return StackedConstraints(**values, parts=by_pair)
-    count = max(len(pair.tangents) for pair in pairs)
+    count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
     numbers, still = [np.zeros(len(pair)) for pair in pairs], [np.zeros((count, len(pair))) for pair in pairs]
     return StackedConstraints(
         csr_array(vstack([pair.B for pair in pairs], format="csr")),
@@ -411,7 +413,7 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
         _stacked_low_rank(pairs, count),
         _stacked_values([pair.tangential_softness for pair in pairs], numbers),
         _stacked_values([pair.elastic_slip for pair in pairs], still),
-        nodes=_stacked_nodes(pairs),
+        nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
     )
@@ -424,12 +426,6 @@ def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
     return np.concatenate(
         [zero if value is None else value for value, zero in zip(values, zeros, strict=True)], axis=-1
     )
-
-
-def _stacked_nodes(pairs: list[Constraints]) -> Indices | None:
-    """Return the nodes (m,) of the constraints of all pairs; None if the constraints of any pair have no nodes."""
-    nodes = [pair.nodes for pair in pairs if pair.nodes is not None]
-    return np.concatenate(nodes) if len(nodes) == len(pairs) else None
 
 
 def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tuple[Array, ...]:

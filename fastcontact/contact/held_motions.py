@@ -14,11 +14,12 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.projection import CORNER
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION, TINY
 
 # Cosine of the largest angle between directions at different nodes that are treated as one direction, such as along a
 # curved rim.
-TOGETHER = 0.94
+TOGETHER = float(np.cos(np.radians(0.5 * CORNER)))
 # Power of the inverse distance in the weights by which directions are interpolated to other nodes.
 NEAREST = 4
 

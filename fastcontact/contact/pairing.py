@@ -29,8 +29,10 @@ from fastcontact.contact.surface import Surface
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly.
-FOLDED = 0.5
+# Largest overhang, in facet lengths, at which a point is still paired with a facet end where the surface continues smoothly,
+# and with any edge in 3D by default. When a body slides beyond an edge or a plane of symmetry, its nodes lose contact one
+# after the other. With a smaller tolerance, nodes near the edge alternate between paired and unpaired.
+OVERHANG = 0.5
 # Fraction of each of the two facets at an edge over which the normals vary if edges are rounded.
 ROUNDED = 0.1
 
@@ -181,7 +183,7 @@ def pair(
     closest = closest_of_kinds(candidates, primary.corners(coordinates))
     if normals == "facet" and not rounded:
         inner = _at_smooth_ends(primary, coordinates, closest)
-        paired = closest.overhang <= np.where(inner, max(projection_tolerance, FOLDED), projection_tolerance)
+        paired = closest.overhang <= np.where(inner, max(projection_tolerance, OVERHANG), projection_tolerance)
         outside = paired & ~inner & (closest.overhang > LENGTH_ROUND_OFF)
         return _straight_on(
             Pairing(closest.facet, closest.xi, closest.normal, paired), candidates, primary, coordinates, outside

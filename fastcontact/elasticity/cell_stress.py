@@ -59,7 +59,8 @@ class CellStress:
         offset: StressOffset | None = None,
     ) -> None:
         self._mesh, self._axisymmetric, self._moduli = mesh, kinematics == "axisymmetric", moduli
-        self._displacement, self._averaged = np.ascontiguousarray(displacement), averaged
+        self._displacement = np.ascontiguousarray(displacement)
+        self._averaged = averaged if np.any(averaged) else None
         self._offset = offset
 
     def at(self, name: str, xi: Array, cells: Numbers, material: Numbers, rows: Indices) -> Array:
@@ -78,7 +79,9 @@ class CellStress:
         The points `xi` (n, dim) [-], the `cells` (n_cells, n_nodes) of int, `material` (n_cells,) of int or (n_cells, n_q),
         and the numbers `rows` (n_cells,) of int of the cells are as for `at`.
         """
-        element, split = elements.get(name), dilatation.split(name, self._moduli, self._averaged)
+        element, split = elements.get(name), None
+        if self._averaged is not None:
+            split = dilatation.split(name, self._moduli, self._averaged)
         moduli = self._moduli if split is None else split.moduli
         if xi is element.quadrature[0]:
             N, dN, _ = element.tables
@@ -99,7 +102,8 @@ class CellStress:
                 dilatation_kernels.add_pressure(
                     points, nodes, *element.tables, polynomials, split.bulk, *shared, basis, stress
                 )
-            self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
+            if self._averaged is not None:
+                self._add_modes((name, xi, dN), nodes, numbers, stress, rows[portion])
 
         parallel.shared(fill_rows, parallel.portions(len(out), cells.shape[1]))
         if self._offset is not None:

@@ -1,9 +1,11 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
 """Dispatch to the element loops of two or three dimensions."""
 
+from functools import cache
 from types import ModuleType
 
 
+@cache
 def loops(dim: int) -> ModuleType:
     """Return the module with `add_stiffness`, `stress`, `largest_rotation` and `add_internal_force` for `dim` coordinates."""
     if dim == 2:

@@ -73,7 +73,7 @@ class MaterialField:
     rows: dict[str, Numbers]
     inside: dict[str, Numbers]
 
-    @property
+    @cached_property
     def loops(self) -> dict[str, Numbers]:
         """Rows of moduli for the element loops, by solid element: `inside` if materials vary in cells, otherwise `rows`."""
         return {**self.rows, **self.inside}

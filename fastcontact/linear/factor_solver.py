@@ -17,7 +17,7 @@ from fastcontact.linear.cholesky.symmetric_factors import SymmetricFactors
 from fastcontact.linear.delassus import InverseColumns, check_rows, solve_multipliers, symmetric
 from fastcontact.linear.field_compliance import FieldCompliance
 from fastcontact.linear.protocol import Counters, LinearSolver, Monitor
-from fastcontact.round_off import SUM_ROUND_OFF
+from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
 
 log = logging.getLogger("fastcontact")
 # Largest number of unknowns that are eliminated last. For more of them, the dense block of K^-1 costs more than it saves.
@@ -25,7 +25,7 @@ LAST_UP_TO = 4000
 # Largest number of unknowns for which a factorisation is affordable, by the dimension.
 AFFORDABLE = {1: 3_000_000, 2: 3_000_000, 3: 150_000}
 # Relative residual of direct solutions.
-ATTAINABLE = 1e-14
+ATTAINABLE = ROUND_OFF / 100
 # Number of stored right-hand sides: loads and supports seldom have more independent ramps.
 KEPT = 4
 

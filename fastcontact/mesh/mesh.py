@@ -150,7 +150,7 @@ class Mesh:
         """Number of cells of all dimensions."""
         return sum(map(len, self.cells.values()))
 
-    @property
+    @cached_property
     def dim(self) -> int:
         """Number of coordinates of a point, 2 or 3."""
         return int(self.points.shape[1])
@@ -160,10 +160,10 @@ class Mesh:
         """Number of the first cell of each element type."""
         return starts_of(self.cells)
 
-    @property
-    def solids(self) -> dict[str, AnyArray]:
+    @cached_property
+    def solids(self) -> Mapping[str, AnyArray]:
         """Connectivity (n_cells, n_nodes) of the cells of dimension `dim`, by element type."""
-        return {name: block for name, block in self.cells.items() if elements.get(name).dim == self.dim}
+        return MappingProxyType({name: c for name, c in self.cells.items() if elements.get(name).dim == self.dim})
 
     @property
     def facets(self) -> dict[str, AnyArray]:

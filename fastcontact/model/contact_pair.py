@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from fastcontact.contact.obstacles import Obstacle
@@ -53,12 +54,12 @@ class ContactPair:
         """The formulation and the kind of its multipliers, if the pair specifies one, for messages."""
         return method(self.formulation, self.options)
 
-    @property
+    @cached_property
     def clearance_ramp(self) -> Table | None:
         """Ramp of the clearance; None if it is constant."""
         return clearance_ramp(self.name, self.options)
 
-    @property
+    @cached_property
     def friction_ramp(self) -> Table | None:
         """Ramp of the coefficient of friction; None if it is constant."""
         return friction_ramp(self.name, self.options)

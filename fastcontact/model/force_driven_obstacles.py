@@ -28,7 +28,7 @@ from fastcontact.model.rigid_motions import FreeMotions
 
 @dataclass(frozen=True, eq=False)
 class ForceDrivenObstacles:
-    """The force-driven obstacles of a model; without any, all methods return their arguments unchanged.
+    """The force-driven obstacles of a model; without any, all methods but `constraints` return their arguments.
 
     Parameters
     ----------
@@ -138,8 +138,6 @@ class ForceDrivenObstacles:
         Rows then have columns for all obstacles, and slip includes the motion of the obstacle. If the obstacle also rotates,
         `moved` (dim,) is the motion in the step that `constraints` already includes as slip [length].
         """
-        if not self.pairs:
-            return constraints
         number = self.number(name)
         if number is None:
             wider = tuple(self._wider(tangent) for tangent in constraints.tangents)

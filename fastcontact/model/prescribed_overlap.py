@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
+from fastcontact.contact.obstacles.rigid_side import Pose
 from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
 from fastcontact.errors import ModelError
 from fastcontact.model.contact_pair import ContactPair
@@ -108,13 +109,12 @@ def _at(
 ) -> Overlap:  # fmt: skip
     """Return the overlap of some secondary nodes (m,) at an instant, from their gaps `before` (m,) all displacements."""
     displacement, ramp = supports.at(instant), supports.ramp
-    still = np.zeros(displacement.shape[1])
-    obstacle = still
+    obstacle = np.zeros(displacement.shape[1])
     if contact.obstacle is not None:
         obstacle = multiplier(contact.ramp, ramp, instant) * np.array(contact.motion)
     factor = 1.0 if contact.clearance_ramp is None else multiplier(contact.clearance_ramp, ramp, instant)
-    angle = angle_at(contact, ramp, instant)
-    at = Configuration(displacement, np.zeros_like(displacement), obstacle, still, factor, angle=angle)
+    pose = Pose(obstacle, angle_at(contact, ramp, instant))
+    at = replace(Configuration.displaced(displacement), pose=pose, clearance_factor=factor)
     if formulation.options.tied:
         depth, paired = _torn(formulation, candidates, displacement, supports.fixed)
     else:

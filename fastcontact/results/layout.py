@@ -18,7 +18,7 @@ The second group contains the data that VTKHDF does not support:
     fastcontact/runs                                a row for each run (RUN_ROW), with the position of its notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
-A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.step_result`, its name in POINT_FIELDS, a
+A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in POINT_FIELDS, a
 check in `check_step`, and code in `reader`. A new array of contact pairs needs an attribute of `step.ContactResult`, its
 value in `analysis.contact_result`, and a column in `contact_row` or `contact_step`.
 """

@@ -52,7 +52,7 @@ class MaterialStress:
 
 def by_largest_von_mises(
     sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
-) -> tuple[Array, MaterialStress | None]:
+) -> tuple[Array, MaterialStress]:
     """Return the nodal stress (n_points, n_components) [pressure] and the stress of each material at interfaces.
 
     At a node on an interface, the nodal stress is that of the material with the largest von Mises stress.
@@ -72,13 +72,10 @@ def by_largest_von_mises(
     -------
     stress : ndarray (n_points, n_components)
         Nodal stress [pressure].
-    material_stress : MaterialStress or None
-        Stress of each material at interfaces; None if there are no interfaces.
+    material_stress : MaterialStress
+        Stress of each material at interfaces.
     """
-    stress = at_places[:n_points].copy() if len(sides.points) else at_places
-    if not len(sides.points):
-        return stress, None
-    values = at_places[sides.place]
-    order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of a node has the largest
+    stress, values = at_places[:n_points].copy(), at_places[sides.place]
+    order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
     stress[sides.points[order]] = values[order]
     return stress, MaterialStress(cells, sides.points, sides.material, values)

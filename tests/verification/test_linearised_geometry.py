@@ -7,7 +7,7 @@ import pytest
 from models import elastic_model
 
 import fastcontact as fc
-from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import prepare
 from fastcontact.contact.pairing import normals
 

@@ -19,9 +19,8 @@ import numpy as np
 
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Mask
+from fastcontact.round_off import ROUND_OFF
 
-# Tolerance of the residual, relative to the largest force.
-EXACT = 1e-12
 # Largest number of Newton iterations, smallest damping factor, and largest number of full steps that do not decrease the
 # residual.
 PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
@@ -79,7 +78,7 @@ class Linearised(Protocol):
 
 
 def newton(
-    problem: Linearised, y: Array, gaps: Array, exact: float = EXACT, patience: int | None = None,
+    problem: Linearised, y: Array, gaps: Array, exact: float = ROUND_OFF, patience: int | None = None,
     line_search: bool = True, least: int = 0,
 ) -> Forces:  # fmt: skip
     """Return the zero of the residual, or the best iterate.

@@ -24,21 +24,16 @@ from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# Largest accepted residual, relative to the largest force, if round-off prevents a smaller one.
-ACCEPTABLE = 1e-9
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
 EDGES, LARGEST = (8, 16, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique; examples are nodes that belong to several surfaces, and
 # nodes that supports hold on one side. F counts as dependent if a squared pivot of its scaled Cholesky factor is below
 # DEPENDENT. All slips then get the first compliance YIELDING, relative to the compliance of the gaps, and the second one if
-# the first does not suffice. If the elastic slip due to this compliance exceeds JAMMED, relative to the scale of gaps and
-# slips without forces, the forces are not in equilibrium: the bodies jam.
-JAMMED = 1e-6
-YIELDING, DEPENDENT = (1e-11, 1e-9), 1e-8
-# The linear complementarity problem of a polyhedral cone is degenerate. Its right-hand side is perturbed by this amount,
-# relative to the scale of gaps and slips without forces.
-SHIFT = 1e-6
+# the first does not suffice. If the elastic slip due to this compliance exceeds SINGLE_PRECISION, relative to the scale of
+# gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
+YIELDING, DEPENDENT = (10 * ROUND_OFF, LENGTH_ROUND_OFF), 1e-8
 
 
 def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
@@ -80,11 +75,12 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
                 best, yielded = forces, yielding * float(np.abs(forces.y[1:]).max(initial=0.0))
             if forces.settled:
                 break
-        if best is not None and best.settled and yielded <= JAMMED:
+        if best is not None and best.settled and yielded <= SINGLE_PRECISION:
             break
     assert best is not None
-    settled = (best.settled or best.residual <= ACCEPTABLE) and yielded <= JAMMED
-    residual = best.residual if yielded <= JAMMED else max(best.residual, yielded)
+    jammed = yielded > SINGLE_PRECISION
+    settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
+    residual = max(best.residual, yielded) if jammed else best.residual
     gaps = best.gaps * length / unit
     return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, residual, iterations)
 
@@ -222,7 +218,10 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     M[last:, :m] = np.diag(problem.mu)
     M[last:, m:last] = -np.tile(np.eye(m), edges)
     M[m:last, last:] = np.tile(np.eye(m), edges).T
-    q = SHIFT * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)  # multiples of the golden ratio: all are different
+    # The problem of a polyhedral cone is degenerate: its right-hand side is perturbed.
+    q = SINGLE_PRECISION * (
+        0.5 + np.arange(size) * 0.6180339887498949 % 1.0
+    )  # multiples of the golden ratio: all are different
     q[:last] += X.T @ problem.free.ravel()
     z, _ = lemke.solved(M, q, 5 * size)
     return None if z is None else (X @ z[:last]).reshape(1 + k, m)

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import EXACT, Forces, newton
+from fastcontact.analysis.friction.cone_newton import Forces, newton
 from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
@@ -27,7 +27,7 @@ from fastcontact.linear.choice import LOOSEST
 from fastcontact.linear.protocol import MILD, FrictionTerms, LoadedNonsymmetric
 from fastcontact.linear.sparse_rows import scaled, taken
 from fastcontact.linear.springs import Springs
-from fastcontact.round_off import TINY
+from fastcontact.round_off import ROUND_OFF, TINY
 
 # Bound of the stiffness of the spring perpendicular to the slip, relative to the stiffness of the constraint. Without a bound
 # it tends to infinity as the slip vanishes. The solution does not depend on it, because its slip is parallel to d.
@@ -38,10 +38,10 @@ STIFFEST = 100.0
 # ratio; otherwise Newton's method reverses a few slips repeatedly (with nu = 0.4999 and 161 442 unknowns, 588 iterations
 # did not converge; nu = 0.499 was not affected).
 SOFTER = 0.2
-# Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, the larger tolerance that
-# is accepted after PATIENCE steps, and this number of steps. If contact forces are a small fraction of all forces, they
-# cannot be more accurate.
-ENOUGH, ACCEPTABLE, PATIENCE = 10.0, 300.0, 12
+# Tolerance of the residual of the friction law relative to the tolerance of the linear solutions, and the larger tolerance
+# that is accepted where it cannot be reached. If contact forces are a small fraction of all forces, they cannot be more
+# accurate.
+ENOUGH, ACCEPTABLE = 10.0, 300.0
 
 
 def solve(
@@ -70,8 +70,8 @@ def solve(
     forces : ndarray (1 + k, m), optional
         Initial guess of the forces: normal ones, then those along each of k tangents [force].
     """
-    tolerance, steps = accuracy.residual or 0.0, accuracy.max_newton_steps
-    problem = Eliminated(loaded, constraints, u, tolerance, inexact=steps is None)
+    tolerance = accuracy.residual or 0.0
+    problem = Eliminated(loaded, constraints, u, tolerance, inexact=not accuracy.inexact)
     y, gaps = problem.start(forces)
     try:
         if forces is None or not forces.any():
@@ -84,15 +84,13 @@ def solve(
         y, gaps = problem.step(y, gaps, *state)
         if not state[0].any():  # all were open: close those that penetrate in the solution without contact
             y, gaps = problem.step(y, gaps, gaps[0] < 0.0, gaps[0] < 0.0)
-        exact = max(EXACT, ENOUGH * tolerance)
-        iterate = newton(problem, y, gaps, exact, PATIENCE if steps is None else steps - 1)
+        exact = max(ROUND_OFF, ENOUGH * tolerance)
+        iterate = newton(problem, y, gaps, exact, 0 if accuracy.inexact else None)
         if problem.finish():
             y, gaps = problem.step(iterate.y, iterate.gaps, iterate.closed, iterate.sticking)
-            iterate = newton(problem, y, gaps, exact, PATIENCE)
-        if steps is None and not iterate.settled:
-            if iterate.residual > ACCEPTABLE * tolerance:
-                iterate = newton(problem, iterate.y, iterate.gaps, exact)
-            iterate = replace(iterate, settled=iterate.settled or iterate.residual <= ACCEPTABLE * tolerance)
+            iterate = newton(problem, y, gaps, exact)
+        if not (accuracy.inexact or iterate.settled):
+            iterate = replace(iterate, settled=iterate.residual <= ACCEPTABLE * tolerance)
             if not iterate.settled:
                 return None
         if iterate.y is not problem.reached:  # a damped step: displacements are only known at the ends of full steps

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import block_diag, bsr_array, csr_array, diags_array, vstack
 
 from fastcontact.analysis.contact_resultants import end_of
-from fastcontact.analysis.slip import at_points
+from fastcontact.analysis.wear import at_points
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -102,8 +102,9 @@ def held_contact(model: Model, step: StepResult | None, held: HeldMotions, hold_
         at = Configuration.undeformed(model.mesh.points) if step is None else end_of(step, step, pair.name)
         if contact is not None and contact.wear is not None:
             at = replace(at, worn=at_points(contact.points, contact.wear, model.mesh.n_points))
-        position = at.obstacle if contact is not None else np.zeros(model.mesh.dim)
-        constraints = model.force_driven.constraints(pair.name, bound.constraints(at), position)
+        constraints = bound.constraints(at)
+        if model.force_driven.pairs:
+            constraints = model.force_driven.constraints(pair.name, constraints, at.pose.displacement)
         conditions += _conditions(bound, constraints, contact, hold_sliding)
     return conditions
 

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_array, eye_array
 
 from fastcontact.analysis.contact_result import nodal_pressure
-from fastcontact.analysis.iterate import Iterate, pair_surfaces
+from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
@@ -126,7 +126,7 @@ class MovingContact:
             return np.empty(0)
         constraints = constraints or self.constraints
         assert self.closed is not None
-        forces = multiplier[constraints.rows()[self.pair]]
+        forces = multiplier[constraints.rows[self.pair]]
         return nodal_pressure(self.problem.pairs[self.pair], constraints.parts[self.pair], forces, self.closed)
 
     def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
@@ -207,7 +207,7 @@ class MovingContact:
         tied = [name for name, pair in self.problem.pairs.items() if pair.options.tied]
         moves = np.ones(len(self.active))
         for name in tied:  # paired once, before any load
-            rows = self.constraints.rows()[name]
+            rows = self.constraints.rows[name]
             moves[(self.active >= rows.start) & (self.active < rows.stop)] = 0.0
         return _ones(csr_array((self._involved * moves[:, None]) @ near))
 

@@ -13,7 +13,7 @@ from fastcontact.analysis.sensitivity.adjoint import Change
 from fastcontact.analysis.sensitivity.material_constants import CONSTANTS, by_constant, check_constant
 from fastcontact.analysis.sensitivity.moving_contact import MovingContact
 from fastcontact.analysis.sensitivity.quantities import Label
-from fastcontact.analysis.slip import Worn
+from fastcontact.analysis.wear import Worn
 from fastcontact.arrays import Array
 from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.loads import Load, evaluated

@@ -131,7 +131,7 @@ def _pressure(contact: MovingContact, none: Gradient, step: StepResult, asked: L
         )
     contact = replace(contact, pair=name, closed=result.active)
     multiplier, by_multiplier = contact.solution.multiplier, none.multiplier
-    rows_of_pair, rows = contact.constraints.rows()[name], contact.active
+    rows_of_pair, rows = contact.constraints.rows[name], contact.active
     change = CHANGED * (float(np.abs(multiplier[rows_of_pair]).max(initial=0.0)) or 1.0)
     base = contact.pressure(multiplier)[row]
     for k in np.flatnonzero((rows >= rows_of_pair.start) & (rows < rows_of_pair.stop)):

@@ -92,7 +92,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
     size = float(np.abs(contact.u).max(initial=0.0))
     gap = constraints.gap0 + constraints.B @ contact.u
     near = np.full(len(constraints), np.inf)
-    for name, rows in constraints.rows().items():
+    for name, rows in constraints.rows.items():
         active, usable = solution.active[rows], constraints.usable[rows]
         # Forces are divided by areas, since the force of a constraint with a small area is small.
         areas = constraints.parts[name].areas

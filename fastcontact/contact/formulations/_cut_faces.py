@@ -23,9 +23,9 @@ from fastcontact.contact.surface_smoothing import Smoothing, frames
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements, quadrature
 
-# Facets are clipped up to a distance of DISTANCES times the distance of the closest primary facet plus RADII times the
-# radius of the secondary facet.
-DISTANCES, RADII = 2.0, 3.0
+# Facets are clipped up to a distance of REACH times the sum of the distance of the closest primary facet and the radius of
+# the secondary facet.
+REACH = 3.0
 # Work per secondary facet relative to the unit of work in `parallel.portions`, for the choice of the number of threads.
 EFFORT = 400
 # Degree, by the number of nodes of a facet, of its shape functions as polynomials of both reference coordinates.
@@ -60,7 +60,7 @@ def face_overlap(
     masses, couplings, closer, first = [], [], [], 0
     for of_secondary in secondary_polygons:
         size, nodes = of_secondary.block.facets.shape
-        reach = DISTANCES * away[first : first + size] + RADII * of_secondary.radius
+        reach = REACH * (away[first : first + size] + of_secondary.radius)
         mass, depth, first_other = np.zeros((size, nodes, nodes)), np.zeros((size, nodes)), 0
         for of_primary in primary_polygons:
             pairs = _facing(of_secondary, of_primary, reach)

@@ -29,9 +29,16 @@ from fastcontact.contact.linearised_geometry import (
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
-from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
+from fastcontact.contact.pairing import OVERHANG, Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
 from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
-from fastcontact.contact.projection import at_nodes_of_facets, interpolated, nodal_normals, places, smooth_normals
+from fastcontact.contact.projection import (
+    CORNER,
+    at_nodes_of_facets,
+    interpolated,
+    nodal_normals,
+    places,
+    smooth_normals,
+)
 from fastcontact.contact.search.closest import BESIDE
 from fastcontact.contact.surface import Surface
 from fastcontact.contact.surface_smoothing import Smoothing, frames
@@ -40,12 +47,8 @@ from fastcontact.errors import ContactError, unknown
 from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 
 SLIPS = ("symmetric", "primary")
-# Default of `projection_tolerance` in 3D, in facet lengths. When a body slides beyond an edge or a plane of symmetry, its
-# nodes lose contact one after the other. With a smaller tolerance, nodes near the edge alternate between paired and
-# unpaired.
-LEAVING = 0.5
 # Sine of the angle between the normal of a surface and a plane of symmetry above which the surface has a corner at the plane.
-LEANING = 0.38
+LEANING = float(np.sin(np.radians(0.5 * CORNER)))
 
 
 @dataclass(eq=False)
@@ -69,7 +72,7 @@ class Formulation(ABC):
     projection_tolerance : float, optional
         Largest distance beyond the end of the primary side at which a point is paired, in facet lengths [-]. In 2D the
         default is small, but large enough that points at the end of the primary side stay paired as the bodies deform. In
-        3D it is 0.5, see LEAVING.
+        3D it is 0.5, see OVERHANG.
     normals : str or sequence of float, optional
         Normals along which the gap is measured.
 
@@ -108,7 +111,6 @@ class Formulation(ABC):
 
     name: ClassVar[str]
     # Whether the surfaces are paired again after each active-set iteration, or only after the active set has converged.
-    geometry_in_loop: ClassVar[bool]
     # Whether the primary side may be a rigid obstacle.
     against_obstacles: ClassVar[bool] = True
 
@@ -121,7 +123,7 @@ class Formulation(ABC):
         if not (np.isfinite(self.friction) and self.friction >= 0):
             raise ContactError(f"the coefficient of friction {self.friction} must be a number >= 0")
         if self.projection_tolerance is None:
-            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else LEAVING
+            self.projection_tolerance = BESIDE if self.points.shape[1] == 2 else OVERHANG
         if not self.projection_tolerance >= 0:
             raise ContactError(f"projection_tolerance = {self.projection_tolerance} must not be negative")
         if self.surface_smoothing and not isinstance(self.primary, Surface):
@@ -386,7 +388,7 @@ class Formulation(ABC):
         moved, turning = at.displacement - at.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
-            total -= at.obstacle - at.obstacle_start
+            total -= at.obstacle_motion
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
             turned = self.primary.turning(now, before, at.pose, at.pose_start)
             if turned is not None:  # The motion by rotation is an affine function of the positions.
@@ -420,7 +422,7 @@ class Formulation(ABC):
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0: Array | None = None
         if isinstance(self.primary, RigidSide):
-            slip0 = -np.stack([t @ (at.obstacle - at.obstacle_start) for t in directions])
+            slip0 = -np.stack([t @ at.obstacle_motion for t in directions])
             turning = self.turning(candidates, at)
             if turning is not None:
                 slip0 -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
@@ -516,7 +518,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
         if isinstance(self.primary, RigidSide):
-            moved = moved - (at.obstacle - at.obstacle_start)
+            moved = moved - at.obstacle_motion
             turning = self.turning(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
             moved = moved if turning is None else moved - turning
         else:
@@ -625,6 +627,20 @@ class Formulation(ABC):
             gap0 += self.added_gap(nodes, pairing, at)
         u = at.displacement if displacement is None else displacement
         return np.where(pairing.paired, gap0 + G @ u.ravel(), np.inf), pairing.normal
+
+    def nodal_slip(self, at: Configuration) -> Array:
+        """Return the slip increment (m, dim) of the secondary nodes [length].
+
+        Nodes beyond the other side may still carry pressure, by parts of their facets.
+        """
+        nodes = Candidates.nodes_of(self.secondary)
+        pairing = self.facing(nodes, at, np.inf)
+        directions = tangents(pairing.normal)
+        rows, slip0 = self.slips(nodes, pairing, directions, at)
+        along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
+        along += 0.0 if slip0 is None else slip0
+        slip = np.einsum("kn,knd->nd", along, np.stack(directions))
+        return np.where(pairing.paired[:, None], slip, 0.0)
 
 
 def _without_whole_facets(held: Array, side: Surface) -> Array:

@@ -25,7 +25,6 @@ as many points with an area as it has nodes. Integrals are taken over the undefo
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_array, diags_array
@@ -206,8 +205,6 @@ class PressureFieldFormulation(Formulation):
     """
 
     augmentation: float = 1.0
-
-    geometry_in_loop: ClassVar[bool] = True
 
     @property
     def eliminable(self) -> bool:

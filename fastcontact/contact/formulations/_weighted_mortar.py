@@ -87,7 +87,6 @@ class WeightedMortar(Formulation):
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
-    geometry_in_loop: ClassVar[bool] = True
     _whole: list[Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -247,7 +246,7 @@ class WeightedMortar(Formulation):
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            moved = np.tile(at.obstacle - at.obstacle_start, (len(closing), 1))
+            moved = np.tile(at.obstacle_motion, (len(closing), 1))
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
             turning = self.primary.turning(now, before, at.pose, at.pose_start)
             moved = moved if turning is None else moved + turning

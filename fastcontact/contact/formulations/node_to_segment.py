@@ -47,7 +47,6 @@ class NodeToSegment(Formulation):
     opposite: str = "facet"
 
     name: ClassVar[str] = "node_to_segment"
-    geometry_in_loop: ClassVar[bool] = False
     _candidates: Candidates = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

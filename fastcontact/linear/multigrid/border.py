@@ -17,9 +17,6 @@ from fastcontact.arrays import Array
 from fastcontact.linear.krylov.iterations import Multiply, Precondition
 from fastcontact.round_off import ROUND_OFF
 
-# Estimated compliance of an unknown relative to the reciprocal of its diagonal entry: neighbouring nodes deform as well.
-SOFTER = 2.0
-
 
 class Border:
     """Equations that are not eliminated.
@@ -43,7 +40,7 @@ class Border:
     def prepare(self, diagonal: Array) -> None:
         """Factorise the preconditioner of the multipliers, given the diagonal (n,) of A [force / length]."""
         yielding = np.divide(1.0, diagonal, out=np.zeros(len(diagonal)), where=diagonal > 0.0)
-        S = self.compliance + SOFTER * (self.rows @ diags_array(yielding) @ self.rows.T)
+        S = self.compliance + self.rows @ diags_array(yielding) @ self.rows.T
         diagonal_of_S = S.diagonal()
         # Factor that converts the residuals of the equations to forces.
         self.stiffness = 1.0 / diagonal_of_S

@@ -27,10 +27,8 @@ from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointe
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
-# Number of unknowns up to which a level is not coarsened, and largest ratio of the numbers of unknowns of a level and the
-# next finer one. If aggregation does not reach this ratio, coarsening stops.
+# Number of unknowns up to which a level is not coarsened.
 COARSEST = 200
-STAGNANT = 0.7
 
 
 class Hierarchy:
@@ -91,7 +89,7 @@ class Hierarchy:
         ones = np.ones(len(near), np.int8)
         aggregates, _ = standard_aggregation(csr_matrix((ones, near, start), shape=(n, n)))
         n_coarse, n_modes = aggregates.shape[1], modes.shape[1]
-        if n_coarse == 0 or n_coarse * n_modes > STAGNANT * level.n:
+        if not 0 < n_coarse * n_modes < level.n:
             return None
         T, coarse_modes = fit_candidates(aggregates, modes)
         aggregate = np.full(n, -1, np.int32)

@@ -16,7 +16,7 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
-from fastcontact.linear.krylov.krylov_kernels import WORK_OF_NUMBER
+from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
 
 Storage = tuple[Numbers, Numbers, Numbers, int]
@@ -28,8 +28,6 @@ ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int
 PARTS, SHORTEST = 32, 1024
 # Work of kernels for a row of blocks and for a single block, see `_jit.parallel.portions`.
 WORK_OF_ROW, WORK_OF_BLOCK = 20, 4
-# Numbers of rows and of single numbers that are stored in one thread where they may overwrite those of others.
-FEW_ROWS, FEW_NUMBERS = 256, 4096
 
 
 @dataclass(eq=False)
@@ -263,7 +261,7 @@ def _keep_stored(indptr: Numbers, indices: Numbers, storage: Storage, numbers: A
     while end < n:  # rows whose stored blocks lie before unread ones: in parallel; otherwise few rows
         first = end
         behind = int(np.searchsorted(start, indptr[first], side="right")) - 1
-        end = max(behind, min(n, first + FEW_ROWS))
+        end = max(behind, min(n, first + SHORTEST))
         work = WORK_OF_ROW if end == behind else 0
         spread(
             symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, numbers,
@@ -275,7 +273,7 @@ def _halve(unit: float, numbers: AnyArray, high: AnyArray) -> None:
     """Fill the high parts (n,) of ``unit numbers``; the low parts overwrite the first half of the numbers."""
     end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
     while end < n:
-        first, end = end, min(n, max(2 * end, end + FEW_NUMBERS))
+        first, end = end, min(n, max(2 * end, end + CHUNK))
         work = WORK_OF_NUMBER if end <= 2 * first else 0
         spread(split_matrix_kernels.split, end - first, work, first, unit, numbers, high, low)
 

@@ -5,6 +5,8 @@ Every module of this package whose name has no leading underscore contains the e
 
 from __future__ import annotations
 
+from functools import cache
+
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh.elements import hexahedra, lines, pyramids, quadrangles, tetrahedra, triangles, wedges
 from fastcontact.mesh.elements._element import Element
@@ -16,6 +18,7 @@ BY_MED = {element.med: element for element in ELEMENTS.values()}
 BY_VTK = {element.vtk: element for element in ELEMENTS.values()}
 
 
+@cache
 def get(name: str) -> Element:
     """Return the element called `name`; MeshError if there is none, with the most similar names."""
     try:

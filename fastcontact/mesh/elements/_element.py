@@ -83,12 +83,12 @@ class Element:
         """Return the shape functions (m, n_corners) [-] of the linear element on the same corners."""
         return (self.corner_element or self).shape
 
-    @property
+    @cached_property
     def dim(self) -> int:
         """Dimension of the reference cell: 1 for lines, 2 for faces, 3 for solids."""
         return int(self.nodes.shape[1])
 
-    @property
+    @cached_property
     def order(self) -> int:
         """Polynomial order: 1 for linear, 2 for quadratic elements."""
         return 1 if self.corner_element is None else 2

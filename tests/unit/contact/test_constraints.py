@@ -53,7 +53,7 @@ def stack(parts):
 def test_one_part_stays_what_it_is(parts):
     whole = stack(parts[:1])
     assert whole.B is parts[0].B
-    assert whole.rows() == {"pair 0": slice(0, 2)}
+    assert whole.rows == {"pair 0": slice(0, 2)}
 
 
 def test_rows_and_numbers_follow_each_other(parts):

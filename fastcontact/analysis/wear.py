@@ -1,4 +1,4 @@
-"""Slip of the secondary nodes of a contact pair in a load step, and the wear that it causes.
+"""Wear of the secondary nodes of a contact pair by slip.
 
 By the law of Archard (J. Appl. Phys. 24, 1953), the depth of wear is proportional to the product of pressure and sliding
 distance. In this module m is the number of secondary nodes.
@@ -13,32 +13,8 @@ import numpy as np
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
-from fastcontact.contact.pairing import Candidates, tangents
 from fastcontact.mesh import elements
 from fastcontact.results.step import ContactResult
-
-
-def slip_in_step(pair: Formulation, at: Configuration, contact: ContactResult) -> Array:
-    """Return the slip (m, dim) of the closed nodes in a step that ends at the configuration `at` [length]."""
-    if pair.options.tied or not contact.active.any():
-        return np.zeros_like(contact.coordinates)
-    held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
-    return np.where((contact.active & ~held)[:, None], slip_of_nodes(pair, at), 0.0)
-
-
-def slip_of_nodes(pair: Formulation, at: Configuration) -> Array:
-    """Return the slip increment (m, dim) of the secondary nodes [length].
-
-    Nodes beyond the other side may still carry pressure, by parts of their facets.
-    """
-    nodes = Candidates.nodes_of(pair.secondary)
-    pairing = pair.facing(nodes, at, np.inf)
-    directions = tangents(pairing.normal)
-    rows, slip0 = pair.slips(nodes, pairing, directions, at)
-    along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
-    along += 0.0 if slip0 is None else slip0
-    slip = np.einsum("kn,knd->nd", along, np.stack(directions))
-    return np.where(pairing.paired[:, None], slip, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +64,7 @@ def worn_in_step(
     coefficient : float
         Archard's coefficient divided by the hardness [1 / pressure].
     """
-    distance = np.linalg.norm(slip_of_nodes(pair, at), axis=1)
+    distance = np.linalg.norm(pair.nodal_slip(at), axis=1)
     if pair.friction:
         distance = np.where(contact.sticking, 0.0, distance)
     pressure = np.maximum(contact.pressure + before, 0.0)
