@@ -24,6 +24,8 @@ from fastcontact.errors import ConvergenceError
 log = logging.getLogger("fastcontact")
 # Smallest number of pairings after which nodes are assumed to alternate between facets: edges are then rounded.
 PATIENT_UPDATES = 25
+# Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
+SAFETY = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,7 +228,7 @@ class _Mixing:
         """
         solution, enough = settled.solution, tolerances.enough(moved.size)
         self._newton, self._change = self._newton and moved.change <= self._change, moved.change
-        if self._newton and solution.settled and self.contraction * moved.change > enough:
+        if self._newton and solution.settled and SAFETY * self.contraction * moved.change > enough:
             arguments = self._step, settled.constraints, solution, moved.before, displacement
             stepped = newton_step(*arguments, enough / moved.change, settled.nodes)
             if stepped is not None:

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fastcontact._jit.parallel import spread
+from fastcontact._jit.parallel import NODES, spread
 from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
-from fastcontact.linear.multigrid.matrix import WORK_OF_BLOCK, WORK_OF_ROW, BlockMatrix
+from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
@@ -87,9 +87,7 @@ class Level:
     ) -> None:
         """Apply `cycle_kernels.relax` to the last step `d` (n,) and the iterate `x` (n,), in place, without corrections."""
         rows = self.A.rows
-        spread(
-            cycle_kernels.relax, self.n // len(rows), WORK_OF_BLOCK, self.inverse, r, first, second, d, x, rows, begin
-        )
+        spread(cycle_kernels.relax, self.n // len(rows), NODES, self.inverse, r, first, second, d, x, rows, begin)
 
     def residual(self) -> None:
         """Fill `r` with ``b - A x``."""

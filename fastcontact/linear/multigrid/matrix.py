@@ -26,8 +26,8 @@ ALL: Storage = (np.empty(0, np.int32), np.empty(0, np.int32), np.empty(0, np.int
 # Number of parts of the rows of a symmetric matrix, and their smallest size: enough parts for many threads, and small
 # enough for their results to stay in the cache. More parts store more blocks twice.
 PARTS, SHORTEST = 32, 1024
-# Work of kernels for a row of blocks and for a single block, see `_jit.parallel.portions`.
-WORK_OF_ROW, WORK_OF_BLOCK = 20, 4
+# Work of kernels for a row of blocks, see `_jit.parallel.portions`.
+WORK_OF_ROW = 20
 
 
 @dataclass(eq=False)
