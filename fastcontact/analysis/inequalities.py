@@ -24,6 +24,7 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
+from fastcontact.model.model import gaps_at_rest
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -175,7 +176,8 @@ def _with_floating_bodies(
     rigid = bodies.settle(solve_at, start, state.largest_rigid_force, noise, state.gap_round_off)
     if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
-        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
+        gaps = gaps_at_rest(problem.model, bodies.motions)
+        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing, gaps)
         raise ConvergenceError(text, iterate.history)
     iterate.rigid = rigid
     at = lift + bodies.rigid(rigid.position)
