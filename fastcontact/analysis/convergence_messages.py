@@ -21,6 +21,8 @@ from fastcontact.model.rigid_motions import least_held
 Nodes = dict[str, list[int]]
 # Change of closed gaps by a motion relative to that by others below which a failure is ascribed to this motion.
 SLACK = 0.05
+# Fraction of the friction of all pairs that floating bodies use when they are about to slide.
+NEARLY_SLIDING = 0.9
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
@@ -120,6 +122,22 @@ def limit_load(problem: Problem, state: State) -> str:
     return (
         f"; before it the largest plastic strain is {strain:.2g}{beyond}. Bodies that yield may bear no larger forces: "
         "prescribe displacements in their place to find the largest"
+    )
+
+
+def friction_used(problem: Problem, state: State) -> str:
+    """Return an addition to the message of a failed load step after `state` if floating bodies nearly slide."""
+    if problem.floating_bodies is None:
+        return ""
+    used = []
+    for name, forces in state.forces.items():
+        capacity = float((problem.pairs[name].friction or 0.0) * np.maximum(forces.pressure, 0.0).sum())
+        used += [float(np.linalg.norm(forces.traction, axis=1).sum()) / capacity] if capacity else []
+    if not used or min(used) < NEARLY_SLIDING:
+        return ""
+    return (
+        f"; before it {min(used):.0%} of the friction that contact can bear is used: more may not hold "
+        f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements in place of forces"
     )
 
 
