@@ -136,8 +136,8 @@ def friction_used(problem: Problem, state: State) -> str:
     if not used or min(used) < NEARLY_SLIDING:
         return ""
     return (
-        f"; before it {min(used):.0%} of the friction that contact can bear is used: more may not hold "
-        f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements in place of forces"
+        f"; before it {min(used):.0%} of the friction that contact can bear is used, and more may not hold "
+        f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements instead of forces"
     )
 
 

@@ -67,7 +67,8 @@ class Model(ModelSupports):
         and large rotations. Pressures follow the deformed surface; other loads keep their directions and reference areas.
         Stresses are Cauchy stresses.
     reference_temperature : float
-        Initial temperature of the bodies with heat conduction, at which the thermal strain is zero [temperature].
+        Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` is given another
+        one [temperature].
     units : str or mapping of str to str, optional
         Names of the units of length, force and pressure, either in this order as a text such as ``"mm, N, MPa"``, or by
         the keys ``"length"``, ``"force"`` and ``"pressure"``. Tables, reports, plots and result files show them, and a
