@@ -57,8 +57,8 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
     def checking(*args: Any, **kwargs: Any) -> Any:
         try:
             values, annotations = signature.bind(*args, **kwargs).arguments, types_of(call)
-        except TypeError:  # Python itself has the best message for missing and unknown arguments
-            return call(*args, **kwargs)
+        except TypeError:
+            raise _refusal(call, signature, _called(call, name, args), args, kwargs) from None
         for key, value in values.items():
             parameter = signature.parameters[key]
             annotation = annotations.get(key, Any)
@@ -78,6 +78,25 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 
     checking.__signature__ = _named(signature, call)  # type: ignore[attr-defined]
     return checking
+
+
+def _refusal(
+    call: Callable[..., Any], signature: inspect.Signature, called: str, args: tuple[Any, ...], kwargs: dict[str, Any]
+) -> TypeError:
+    """Return the error for missing, unknown and misplaced arguments: Python's, with the name that the user knows."""
+    parameters = signature.parameters.values()
+    by_place = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+    if len(args) > len(by_place) and by_name:
+        required = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.default is p.empty]
+        example = ", ".join(f"{key}=..." for key in (required or by_name)[:3])
+        places = ", ".join([p.name for p in by_place if p.name != "self"]) or "nothing"
+        return TypeError(f"{called} takes {places} by position and all else by name: write {example}")
+    try:
+        call(*args, **kwargs)
+    except TypeError as failure:
+        return TypeError(str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1))
+    raise AssertionError(called)
 
 
 def _named(signature: inspect.Signature, call: Callable[..., Any]) -> inspect.Signature:

@@ -16,8 +16,13 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
+from fastcontact.model.rigid_motions import least_held
 
 Nodes = dict[str, list[int]]
+# Change of closed gaps by a motion relative to that by others below which a failure is ascribed to this motion.
+SLACK = 0.05
+# Fraction of the friction of all pairs that floating bodies use when they are about to slide.
+NEARLY_SLIDING = 0.9
 
 
 def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Array, limit: int) -> str:
@@ -79,8 +84,18 @@ def friction_exceeded(bodies: FloatingBodies, work: Array, friction: tuple[float
     )
 
 
-def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool) -> str:
-    """Return the message for bodies whose springs still carry force under a load [force], with `friction` or without."""
+def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, friction: bool, gaps: Array) -> str:
+    """Return the message for bodies whose springs still carry force under a load [force], with `friction` or without.
+
+    `gaps` (m, k) are the changes of the gaps for each free motion, which show a motion that contact hardly resists.
+    """
+    if len(bodies.names) > 1:
+        (weakest,), ratio = least_held(bodies.motions, gaps)
+        if ratio < SLACK:
+            return (
+                f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as others "
+                "do: fix or prescribe a displacement component that stops it"
+            )
     more = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
     return (
         f"contact does not hold {'; '.join(bodies.moving(rigid))}: after {rigid.positions} positions "
@@ -107,6 +122,22 @@ def limit_load(problem: Problem, state: State) -> str:
     return (
         f"; before it the largest plastic strain is {strain:.2g}{beyond}. Bodies that yield may bear no larger forces: "
         "prescribe displacements in their place to find the largest"
+    )
+
+
+def friction_used(problem: Problem, state: State) -> str:
+    """Return an addition to the message of a failed load step after `state` if floating bodies nearly slide."""
+    if problem.floating_bodies is None:
+        return ""
+    used = []
+    for name, forces in state.forces.items():
+        capacity = float((problem.pairs[name].friction or 0.0) * np.maximum(forces.pressure, 0.0).sum())
+        used += [float(np.linalg.norm(forces.traction, axis=1).sum()) / capacity] if capacity else []
+    if not used or min(used) < NEARLY_SLIDING:
+        return ""
+    return (
+        f"; before it {min(used):.0%} of the friction that contact can bear is used, and more may not hold "
+        f"{', '.join(problem.floating_bodies.motions.by_body())}. Add a support, or prescribe displacements instead of forces"
     )
 
 

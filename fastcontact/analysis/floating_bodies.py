@@ -202,7 +202,7 @@ class FloatingBodies:
         if not weightless[dof]:
             return f"point {dof // self._dim}"
         column = int(np.argmax(np.abs(motions.displacement[dof])))
-        return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))][0]
+        return motions.labels[int(np.argmax(np.abs(motions.parts[:, column])))].body
 
     def moving(self, rigid: RigidPosition) -> list[str]:
         """Return the names of the free rigid-body modes with the largest generalised forces of the springs."""

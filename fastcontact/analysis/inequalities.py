@@ -27,6 +27,7 @@ from fastcontact.contact.constraints import Constraints, StackedConstraints, sta
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
+from fastcontact.model.model import gaps_at_rest
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
 
@@ -268,7 +269,8 @@ def _with_floating_bodies(
     )
     if rigid.state.settled and not rigid.slack:
         rubbing = bool(constraints.coefficients.any())
-        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing)
+        gaps = gaps_at_rest(problem.model, bodies.motions)
+        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing, gaps)
         raise ConvergenceError(text, iterate.history)
     iterate.rigid = rigid
     solution = rigid.state

@@ -11,6 +11,7 @@ import numpy as np
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
+from fastcontact.analysis.neglected_rotation import neglected_rotation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
 from fastcontact.analysis.stress_scatter import nonlinear_scatter_warnings, scatter_warnings
@@ -31,6 +32,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 STRAIN = 0.1
 # Rotation [radian] beyond which linear kinematics give a warning: they neglect a strain of half its square.
 ROTATION = 0.3
+# Rotation [radian] from which its effect is compared with that of the strains.
+NOTICED = 0.02
 # Largest factor on the number of steps that is recommended; a larger one indicates a wrong coefficient.
 MANY_STEPS = 1000
 # Number of elements across the radius of a contact that resolve its pressure.
@@ -52,7 +55,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
     """Return the warnings about an analysis whose `last` step ended in a state."""
     warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state)]
     if problem.model.strain == "small":
-        warnings += [*_large_strain(problem, last), *_large_rotation(problem, state)]
+        warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     if problem.bodies is None:
         warnings += locking_warning(problem, state.u) or scatter_warnings(problem, last)
     else:
@@ -215,13 +218,15 @@ def _large_stress_free_strain(problem: Problem, last: StepResult) -> Iterator[st
         )
 
 
-def _large_rotation(problem: Problem, state: State) -> Iterator[str]:
+def _large_rotation(problem: Problem, state: State, last: StepResult) -> Iterator[str]:
     angle, where = largest_rotation(problem.model.mesh, problem.displacement(state.u))
     if angle > ROTATION:
         yield (
             f"the largest rotation is {angle:.3f} radian, near {np.array2string(where, precision=4)}: linear kinematics "
             f"treat it as small, which neglects strains of about {0.5 * angle**2:.3f}"
         )
+    elif angle > NOTICED:
+        yield from neglected_rotation(problem, last, angle)
 
 
 def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:

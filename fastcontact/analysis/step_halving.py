@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fastcontact.analysis.convergence_messages import limit_load
+from fastcontact.analysis.convergence_messages import friction_used, limit_load
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
@@ -65,7 +65,7 @@ def _parts(
             part = (
                 f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
             )
-            limit = limit_load(problem, state)
+            limit = limit_load(problem, state) + friction_used(problem, state)
             final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
             # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
             raise final.with_traceback(error.__traceback__) from None

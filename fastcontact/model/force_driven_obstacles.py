@@ -23,7 +23,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.ramp import PartHistory, Table
-from fastcontact.model.rigid_motions import FreeMotions
+from fastcontact.model.rigid_motions import FreeMotions, Label
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class ForceDrivenObstacles:
         displacement[free, count + np.arange(len(free))] = 1.0
         n, dim = self.shape
         labels = [
-            (f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
+            Label(f"obstacle '{self.pairs[dof // dim - n].name}'", f"translation along {'xyz'[dof % dim]}")
             for dof in free.tolist()
         ]
         matrix = np.asarray(block_diag(motions.parts, np.eye(len(free))), float)

@@ -29,7 +29,7 @@ from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
-from fastcontact.model.rigid_motions import free_motions, generalised, resisting, unstopped
+from fastcontact.model.rigid_motions import FreeMotions, free_motions, generalised, resisting, unstopped
 
 # Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
 # Types of items that may act in some load steps only.
@@ -67,7 +67,8 @@ class Model(ModelSupports):
         and large rotations. Pressures follow the deformed surface; other loads keep their directions and reference areas.
         Stresses are Cauchy stresses.
     reference_temperature : float
-        Initial temperature of the bodies with heat conduction, at which the thermal strain is zero [temperature].
+        Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` is given another
+        one [temperature].
     units : str or mapping of str to str, optional
         Names of the units of length, force and pressure, either in this order as a text such as ``"mm, N, MPa"``, or by
         the keys ``"length"``, ``"force"`` and ``"pressure"``. Tables, reports, plots and result files show them, and a
@@ -211,17 +212,20 @@ class Model(ModelSupports):
 
         Supports, constraints and springs prevent rigid-body motions, and so does contact against which a load acts.
         """
-        driven = self.force_driven
-        motions = driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
+        motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
-        at_rest, still = Configuration.undeformed(self.mesh.points), np.zeros(self.mesh.dim)
-        fixing = [driven.constraints(pair.name, self.bind(pair).constraints(at_rest), still) for pair in self.contact]
-        rows = [resisting(constraints)[0] @ motions.displacement for constraints in fixing]
         works = [generalised(motions, force.ravel()) for force in forces]
-        k = len(motions)
-        gaps, driven_by = np.vstack([*rows, np.empty((0, k))]), np.vstack([*works, np.empty((0, k))])
-        check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))
+        driven_by = np.vstack([*works, np.empty((0, len(motions)))])
+        check_motions(self.mesh, motions.combined(unstopped(gaps_at_rest(self, motions), driven_by)))
+
+
+def gaps_at_rest(model: Model, motions: FreeMotions) -> Array:
+    """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions."""
+    driven, at_rest, still = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
+    fixing = [driven.constraints(pair.name, model.bind(pair).constraints(at_rest), still) for pair in model.contact]
+    rows = [resisting(constraints)[0] @ motions.displacement for constraints in fixing]
+    return np.vstack([*rows, np.empty((0, len(motions)))])
 
 
 def _in_steps_after(begin: float, error: ModelError) -> ModelError:

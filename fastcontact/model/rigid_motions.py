@@ -7,6 +7,7 @@ loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and S
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -38,18 +39,27 @@ MOST_FRICTION = 100.0
 MANY = 1500
 
 
+class Label(NamedTuple):
+    """Name of an elementary motion; for a rotation of a body also its `centre` (dim,) and largest arm [length]."""
+
+    body: str
+    motion: str
+    centre: Array | None = None
+    arm: float = 1.0
+
+
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
     """Independent rigid-body motions that supports and constraints allow.
 
     The largest entry of each column of the `displacement` (n_dofs, k) of all points is about 1. `parts` (p, k) are the same
-    motions as combinations of elementary ones, and `labels` are the body and the name of each elementary motion. `hinges`
-    (m,) are nodes that connect parts of bodies, single or collinear.
+    motions as combinations of elementary ones, and `labels` are the names of the elementary motions. `hinges` (m,) are nodes
+    that connect parts of bodies, single or collinear.
     """
 
     displacement: Array
     parts: Array
-    labels: list[tuple[str, str]]
+    labels: list[Label]
     hinges: Indices = field(default_factory=lambda: np.empty(0, np.intp))
 
     def __len__(self) -> int:
@@ -66,17 +76,56 @@ class FreeMotions:
     def by_body(self) -> dict[str, list[str]]:
         """Return the names of the motions of each body, each once, even if joint motions contain it repeatedly."""
         by_body: dict[str, list[str]] = {}
-        for column in self.parts.T:
+        for column in _reduced(self.parts).T:
             for body, motion in self._mixed(column):
                 by_body.setdefault(body, []).append(motion)
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
 
     def _mixed(self, column: Array) -> list[tuple[str, str]]:
-        mixed: dict[str, list[str]] = {}
+        mixed: dict[str, list[int]] = {}
         for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()):
-            body, motion = self.labels[i]
-            mixed.setdefault(body, []).append(motion)
-        return [(body, " with ".join(motions)) for body, motions in mixed.items()]
+            mixed.setdefault(self.labels[i].body, []).append(int(i))
+        return [(body, self._described(column, rows)) for body, rows in mixed.items()]
+
+    def _described(self, column: Array, rows: list[int]) -> str:
+        """Return the name of the motion of a body: a rotation about a point or line, if it is one, or all its parts."""
+        labels = [self.labels[i] for i in rows]
+        apart, turn = np.zeros((2, 3))
+        for i, label in zip(rows, labels, strict=True):
+            axis = "xyz".find(label.motion[-1])  # "rotation" in the plane: about z
+            (apart if label.centre is None else turn)[axis] += column[i] / label.arm
+        centre, square = next((label.centre for label in labels if label.centre is not None), None), turn @ turn
+        if centre is None or abs(apart @ turn) > 1e-6 * square * max(label.arm for label in labels):
+            return " with ".join(label.motion for label in labels)
+        if len(centre) == 3 and not apart.any() and len(rows) == 1:
+            return labels[0].motion
+        size = max(label.arm for label in labels)
+        at = centre + (np.cross(turn, apart) / square)[: len(centre)]
+        place = _listed(np.where(np.abs(at) > 1e-5 * size, at, 0.0))
+        along = turn / turn[np.argmax(np.abs(turn))]
+        line = f" along {_listed(np.where(np.abs(along) > 1e-6, along, 0.0))}"
+        return f"rotation about {place}" if len(centre) == 2 else f"rotation about the line through {place}{line}"
+
+
+def _reduced(A: Array) -> Array:
+    """Return the reduced column echelon form (p, k) of a matrix A (p, k) of full column rank."""
+    A, done = A.copy(), 0
+    for row in A:  # a view, which follows the elimination
+        if done == A.shape[1]:
+            break
+        pivot = done + int(np.argmax(np.abs(row[done:])))
+        if abs(row[pivot]) <= ZERO * np.abs(A).max():
+            continue
+        A[:, [done, pivot]] = A[:, [pivot, done]]
+        A[:, done] /= row[done]
+        others = np.arange(A.shape[1]) != done
+        A[:, others] -= A[:, [done]] * row[others]
+        done += 1
+    return A
+
+
+def _listed(values: Array) -> str:
+    return f"({', '.join(f'{value:.4g}' for value in values)})"
 
 
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
@@ -108,7 +157,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
         for dof in np.unique(relations.indices[reference & ~fixed.ravel()[relations.indices]]):
             columns.append(np.eye(dofs, 1, -int(dof)))
             matrices.append(np.ones((1, 1)))
-            labels.append((f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
+            labels.append(Label(f"point {dof // mesh.dim}", f"translation along {'xyz'[dof % mesh.dim]}"))
     motions = FreeMotions(np.hstack(columns), np.asarray(block_diag(*matrices), float), labels, motions.hinges)
     if relations is None or not relations.shape[0] or not len(motions):
         return motions
@@ -123,12 +172,17 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     for number in range(rigid.count):
         members = rigid.nodes_of(number)
         modes = rigid_modes(mesh.points[members], kinematics)
-        modes = modes / np.abs(modes).max(axis=0)
+        arms = np.abs(modes).max(axis=0)
+        modes = modes / arms
         free = _null_space(modes[fixed[members].ravel()])  # combinations of the part's modes without support
         moving.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
         if free.shape[1]:
             matrices.append(free)
-            labels += [(_part_name(mesh, rigid, number), name) for name in MODE_NAMES[kinematics]]
+            name, centre = _part_name(mesh, rigid, number), mesh.points[members].mean(axis=0)
+            labels += [
+                Label(name, motion, centre if motion.startswith("rotation") else None, float(arm))
+                for motion, arm in zip(MODE_NAMES[kinematics], arms, strict=True)
+            ]
     kept = _turning_about(mesh, rigid, moving)
     spans = np.split(kept, np.cumsum([motion.shape[2] for _, motion in moving]))
     displacement = np.zeros((mesh.n_points, mesh.dim, kept.shape[1]))
@@ -251,6 +305,15 @@ def unstopped(gaps: Array, works: Array) -> Array:
             if np.abs(away).max(initial=0.0) > 1e-6:
                 return away[:, None]
     return np.empty((k, 0))
+
+
+def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
+    """Return the name of the motion that changes the gaps least, and by how much relative to the other motions.
+
+    `gaps` (m, k) are the changes of m gaps for each of the k motions.
+    """
+    _, values, right = np.linalg.svd(gaps, full_matrices=False)
+    return motions.combined(right[-1:].T).names(), float(values[-1] / values[0]) if values[0] else 1.0
 
 
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:

@@ -93,7 +93,21 @@ class Sweep(Report):
         """See `Report`."""
         warnings = sorted({text for point in self.points for text in point.warnings})
         choices = [(", ".join(f"{k} = {_shown(v)}" for k, v in choice.items()), text) for choice, text in self.failed]
-        return [*(f"warning: {text}" for text in warnings), *(f"{choice} failed: {text}" for choice, text in choices)]
+        return [
+            *(f"warning: {text}" for text in warnings), *(f"{choice} failed: {text}" for choice, text in choices),
+            *self._same_theory(),
+        ]  # fmt: skip
+
+    def _same_theory(self) -> list[str]:
+        """Return a remark if no parameter changes the theory, although values change."""
+        kept = [
+            name for name in self._main()
+            if len({point.theory.get(name) for point in self.points} - {None}) == 1
+            and len({point.values.get(name) for point in self.points}) > 1
+        ]  # fmt: skip
+        if not kept or len(self.points) < 2:
+            return []
+        return ["the theory is the same for all points: a parameter in [study.parameters] can change its keys, too"]
 
     def figure(self) -> Any:
         """Return a Matplotlib figure with the values over the first parameter and their ratios to theory.

@@ -209,3 +209,28 @@ def test_masks_are_not_lost_without_a_word(what):
 def test_imaginary_parts_are_not_lost_without_a_word(what):
     with pytest.raises(fc.FastcontactError, match=r"must be|must hold"):
         MASKED[what](lambda values: np.asarray(values, float) + 1j)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (
+            lambda model: model.add_contact("pair", "TOP", "BOTTOM"),
+            "Model.add_contact takes name by position and all else by name: write secondary=..., primary=...",
+        ),
+        (
+            lambda model: model.add_pressure("TOP", 1.0, [(0.0, 1.0)]),
+            "Model.add_pressure takes group, value by position and all else by name: write ramp=...",
+        ),
+        (
+            lambda model: model.add_contact("pair", secondary="TOP"),
+            "Model.add_contact() missing 1 required keyword-only argument: 'primary'",
+        ),
+        (lambda model: model.fix("TOP"), "Model.fix() missing 1 required positional argument: 'components'"),
+    ],
+)
+def test_misplaced_and_missing_arguments_are_named(call, message):
+    model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    with pytest.raises(TypeError) as refused:
+        call(model)
+    assert str(refused.value) == message

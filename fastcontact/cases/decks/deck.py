@@ -27,6 +27,7 @@ from fastcontact.errors import ContactError, FileError, MeshError, ModelError, w
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
 from fastcontact.results.step import StepResult
+from fastcontact.results.steps import Steps
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +79,7 @@ class Deck:
         """Return the title, the notes and the model as HTML tables for notebooks."""
         return html_table([("note", text) for text in self.notes], caption=self.title) + self.model._repr_html_()
 
-    def solve(self, **options: Any) -> list[StepResult]:
+    def solve(self, **options: Any) -> Steps:
         """Solve all steps.
 
         Parameters
@@ -88,7 +89,7 @@ class Deck:
 
         Returns
         -------
-        list of StepResult
+        Steps
             Load steps; step k of the deck ends at load factor k. Displacements are along the global axes. Reactions are the
             forces of supports, without those of equations and couplings. Forces of plane models are for the whole thickness.
 
@@ -98,7 +99,7 @@ class Deck:
             If the deck requests NLGEOM but small strains are used. The warning states the largest strain and rotation, whose
             squares linear kinematics neglect. Other warnings and errors are those of `fastcontact.solve`.
         """
-        steps: list[StepResult] = []
+        steps = Steps()
         for step in self.solve_steps(**options):
             if steps:
                 steps[-1] = replace(steps[-1], restart=None)

@@ -76,4 +76,4 @@ def _add(model: Model, rises: Array, ramp: Table) -> None:
     for section in model.pretensions:  # their opposite nodes are not in the deck
         rises[section.opposite] = rises[section.nodes]
     if rises.any() and any(factor for _, factor in ramp):
-        model.add_temperature(rises, ramp=ramp)
+        model.add_temperature(rises, reference=0.0, ramp=ramp)

@@ -35,7 +35,7 @@ class ModelInitialStates(ModelLoads):
         value: Value | Array,
         groups: Sequence[str] | str | None = None,
         *,
-        reference: float = 0.0,
+        reference: float | None = None,
         times: Sequence[float] | None = None,
         ramp: History = None,
     ) -> None:
@@ -51,8 +51,8 @@ class ModelInitialStates(ModelLoads):
             values at several instants [temperature].
         groups : str or sequence of str, optional
             Groups of solid cells; by default all solid cells.
-        reference : float
-            Temperature at which the thermal strain is zero [temperature].
+        reference : float, optional
+            Temperature at which the thermal strain is zero [temperature]; by default `reference_temperature` of the model.
         times : sequence of float (n_instants,), optional
             Load factors of the instants, between which temperatures are interpolated linearly [-]; required for values at
             several instants.
@@ -74,6 +74,7 @@ class ModelInitialStates(ModelLoads):
         """
         names = group_names(groups)
         checked = checked_value(value)
+        reference = self.reference_temperature if reference is None else reference
         if times is not None:
             if ramp is not None:
                 raise ModelError("give either times or ramp for a temperature, not both")
@@ -92,7 +93,7 @@ class ModelInitialStates(ModelLoads):
         field: str,
         groups: Sequence[str] | str | None = None,
         *,
-        reference: float = 0.0,
+        reference: float | None = None,
         instant: float | None = None,
         times: Sequence[float] | None = None,
         ramp: History = None,
@@ -111,8 +112,8 @@ class ModelInitialStates(ModelLoads):
             Name of the nodal field.
         groups : str or sequence of str, optional
             Groups of solid cells; by default all solid cells.
-        reference : float
-            Temperature at which the thermal strain is zero [temperature].
+        reference : float, optional
+            Temperature at which the thermal strain is zero [temperature]; by default `reference_temperature` of the model.
         instant : float, optional
             Use only this time of the file.
         times : sequence of float (n_instants,), optional
@@ -135,6 +136,7 @@ class ModelInitialStates(ModelLoads):
         from fastcontact.model.temperature_files import read_temperatures
 
         names = self._solid_groups(groups, ": it has no temperature")
+        reference = self.reference_temperature if reference is None else reference
         values, times_of_file = read_temperatures(self.mesh, file, field, solid_points(self.mesh, names), instant)
         values = np.where(np.isfinite(values), values, reference)
         if len(values) == 1:

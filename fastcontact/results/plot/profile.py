@@ -139,17 +139,21 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
 
 
 def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units) -> None:
-    """Shade the range between the outermost closed node and the first open node."""
+    """Shade the range of the contact radius, in 2D as arc lengths, on both sides of the contact."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
-    centre = 0.0
+    centre, name = 0.0, "edge"
     if position.min(initial=0.0) < 0:
         closed = contact.place[contact.active]
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
-        ax.axvspan(centre - outside, centre - inside, color="tab:blue", alpha=0.15, lw=0)
-    # If constraints lie between nodes, the bounds of the radius are closer to each other than those two nodes.
-    between = not np.allclose(half_width(contact.place, contact.active, contact.across), contact.radius, rtol=0.01)
+    if abs(centre) > 0.01 * outside:
+        name = f"edges, with a half-width about {centre:.4g}"
+    else:  # constraints may lie between nodes, so that the bounds of the radius are closer to each other than nodes are
+        across, order = np.abs(contact.across), np.argsort(np.abs(contact.across))
+        inside, outside = np.interp(contact.radius, across[order], np.abs(contact.place)[order])
     along = "" if contact.tangent is None else " (arc length)"
-    label = f"edge{', between nodes' * between}: {inside:.4g} to {valued(outside, units, 'length')}{along}"
-    ax.axvspan(centre + inside, centre + outside, color="tab:blue", alpha=0.15, lw=0, label=label)
+    label = f"{name}: {inside:.4g} to {valued(outside, units, 'length')}{along}"
+    for side in (-1.0, 1.0) if position.min(initial=0.0) < 0 else (1.0,):
+        ends = centre + side * inside, centre + side * outside
+        ax.axvspan(min(ends), max(ends), color="tab:blue", alpha=0.15, lw=0, label=label if side > 0.0 else None)

@@ -30,6 +30,9 @@ VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0
 # Number of ticks on an axis that is as long as the diagonal of the box in the plot, and distance from the ends of the y axis,
 # relative to its length, within which its tick labels would overlap those of other axes.
 TICKS, NEAR_END = 14, 0.1
+# Distances of numbers and names from the axes in 3D, in the unit of matplotlib for a box of size 1, and the least size for
+# which they are computed.
+NUMBERS, NAMES, SHORTEST = 6.0, 17.0, 0.05
 
 
 def draw_solid(
@@ -92,7 +95,22 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
         ticks = ticks[(ticks >= begin + margin) & (ticks <= end - margin)]
         getattr(ax, f"set_{name}lim")(begin, end)
         getattr(ax, f"set_{name}ticks")(ticks[-1:] if TICKS * along < 1.5 else ticks)
+    _keep_apart(ax, size / diagonal, eye, level)
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
+
+
+def _keep_apart(ax: Any, size: Array, eye: Array, level: Array) -> None:
+    """Place numbers and names of 3D axes at the same distance on the screen for bodies of all proportions.
+
+    Matplotlib moves them away from an axis by distances proportional to the `size` (3,) [-] of the box along the other two.
+    `eye` and `level` (3,) are the unit vectors towards the eye and along the horizontal direction of the screen.
+    """
+    screen = np.array([level, np.cross(eye, level)])
+    near, across = np.sign(eye) * [1.0, 1.0, -1.0] * size, np.sign(level) * size
+    for name, outward in zip("xyz", (near * [0, 1, 1], near * [1, 0, 1], across)):
+        reach = max(float(np.linalg.norm(screen @ outward)), SHORTEST)
+        ax.tick_params(axis=name, pad=NUMBERS / reach - 8.0)  # 8 and 21 are offsets of matplotlib
+        getattr(ax, f"{name}axis").labelpad = NAMES / reach - 21.0
 
 
 def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
