@@ -180,7 +180,7 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
             watch.forget()
         if update == max(plan.limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
             log.info("nodes flip between facets: from now on the edges of facets are rounded")
-            iterate.rounded = True
+            iterate.rounded = mixing.rounded = True
             mixing.restart()
             watch.forget()
     if plan.until_settled:
@@ -278,6 +278,7 @@ class _Mixing:
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
+        self.rounded = False
         self._newton, self._change, self._contraction = newton, np.inf, np.inf
 
     def newton(self, change: float, enough: float) -> bool:
@@ -322,7 +323,7 @@ class _Mixing:
         state = constraints.state(solution.active)
         same = self._known is not None and np.array_equal(self._known, state)
         self._known = state if solution.settled else None
-        if inexact or not same:
+        if inexact or not (same or self.rounded):
             self._accelerated.restart()
         # An inexact solution may hardly change although it is not accurate yet.
         return None if inexact else self._accelerated.mixed(before, displacement)
