@@ -255,5 +255,5 @@ def test_a_slice_and_a_side_that_is_drawn_are_determined():
     model.prescribe("B_ZMAX", x=0.1, z=-0.01)
     model.add_contact("c", secondary="B_ZMIN", primary="A_ZMAX", friction=0.2)
     (step,) = quietly(model)
-    assert abs(step.contact["c"].force[0]) == pytest.approx(0.2 * abs(step.contact["c"].force[2]), rel=1e-6)
+    assert abs(step.contact["c"].force[0]) == pytest.approx(0.2 * abs(step.contact["c"].force[2]), rel=1e-3)
     assert not any("supports hold" in text for text in step.warnings)

@@ -502,8 +502,8 @@ class Formulation(ABC):
     def undetermined(self, at: Configuration) -> Mask:
         """Return which nodes (n_nodes,) belong to facets between which and what they face nothing determines a traction.
 
-        Supports hold all their nodes, and the other side, in one direction. Where they hold the whole side along the contact, as
-        in a slice in plane strain, the traction in this direction vanishes.
+        Supports hold all their nodes, and the other side, in one direction. Where they hold the whole side along the
+        contact, as in a slice in plane strain, the traction in this direction vanishes.
         """
         both = self._both_held(at)
         if not both.any():

@@ -50,7 +50,8 @@ def _project(nodes, f, x, y):
             s = new
             if change < 1e-15:
                 break
-    # At a common node all its facets have exactly the same distance. A point opposite it may lie within one by a rounding error.
+    # At a common node all its facets have exactly the same distance. A point opposite it may lie within one of them by a
+    # rounding error.
     if abs(s) >= 1.0 - ROUND_OFF:
         end = 0 if s < 0.0 else 1
         s = 2.0 * end - 1.0
