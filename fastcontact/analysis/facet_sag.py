@@ -74,7 +74,8 @@ def _sag_at_points(pair: Formulation, at: Configuration, active: Mask) -> Array:
         nodes, pose = points.nodes[rows], at.pose
         at_nodes = pair.primary.facing(deformed[nodes].reshape(-1, deformed.shape[1]), pose)[0].reshape(nodes.shape)
         inside = pair.primary.facing(points.positions(deformed)[rows], pose)[0]
-        return np.einsum("nk,nk->n", points.shape[rows], at_nodes) - inside
+        faced = np.isfinite(at_nodes).all(axis=1) & np.isfinite(inside)  # gaps are infinite beyond the edge of a punch
+        return np.einsum("nk,nk->n", points.shape[rows[faced]], at_nodes[faced]) - inside[faced]
     smoothing, facing = Smoothing.of(pair.secondary, pair.primary, pair.points), pair.facing(points, at)
     rows = np.flatnonzero(facing.paired & closed[points.nodes].any(axis=1))
     if smoothing is None or points.facet is None or points.xi is None:

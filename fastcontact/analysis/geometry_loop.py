@@ -237,7 +237,7 @@ class _Mixing:
         state = settled.constraints.state(solution.active)
         same = self._known is not None and np.array_equal(self._known, state)
         self._known = state if solution.settled else None
-        if tolerances.inexact or not same:
+        if tolerances.inexact or not (same or settled.iterate.rounded):
             self.restart()
         if tolerances.inexact:
             return None

@@ -69,7 +69,8 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         if pair.options.gap_only:
             continue
         lost = [] if name in clearances else _lost(pair, contact, name in state.touched, loaded)
-        warnings += [*_deep(pair, contact, state.u), *lost]
+        at = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
+        warnings += [*_deep(pair, contact, state.u), *lost, *_held(pair, contact, pair.undetermined(at))]
         warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
@@ -83,6 +84,23 @@ def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Ite
         yield (
             f"contact '{contact.name}' penetrates by {depth:.4g}, which is {depth / size:.1%} of the largest displacement: "
             f"raise its penalty from {penalty:.4g} to about {penalty * depth / (NOTABLE * size):.2g}, or omit it"
+        )
+
+
+def _held(pair: Formulation, contact: ContactResult, undetermined: Mask) -> Iterator[str]:
+    """Yield a warning about closed facets between which and the other side nothing determines a traction.
+
+    `undetermined` (n_nodes,) are their nodes.
+    """
+    near = contact.gap <= LENGTH_ROUND_OFF * float(np.ptp(pair.points, axis=0).max())
+    nodes = undetermined & (contact.active | near | pair.options.always_closed)
+    held = sum(int(nodes[block.local].all(axis=1).sum()) for block in pair.secondary.blocks)
+    if held:
+        where = np.array2string(pair.points[pair.secondary.points[nodes]].mean(axis=0), precision=4)
+        yield (
+            f"contact '{contact.name}': supports hold {held} of the {pair.secondary.n_facets} facets of "
+            f"'{pair.secondary.group}' and what they face, about {where}: nothing determines what goes from one to the other "
+            "in the held directions, and 0 is told; the reactions contain it. Free the nodes of one side there"
         )
 
 

@@ -105,10 +105,10 @@ def beyond(triangle, s, t):
 
 @innermost_kernel
 def inside(triangle, s, t):
-    """Return reference coordinates moved into a facet."""
+    """Return reference coordinates moved into a facet, whichever its first corner is."""
     if triangle:
-        a, b = max(s, 0.0), max(t, 0.0)
-        whole = max(a + b, 1.0)
+        a, b, c = max(s, 0.0), max(t, 0.0), max(1.0 - s - t, 0.0)
+        whole = a + b + c if min(s, t, 1.0 - s - t) < 0.0 else 1.0
         return a / whole, b / whole
     return min(max(s, -1.0), 1.0), min(max(t, -1.0), 1.0)
 

@@ -1,5 +1,7 @@
 """Friction at supported nodes: present where sides slide, zero where symmetry excludes slip, however supports are stated."""
 
+import warnings
+
 import numpy as np
 import pytest
 from models import elastic_model
@@ -206,3 +208,52 @@ def test_a_moving_ball_drags_no_node_across_its_plane_of_symmetry(options, motio
         assert np.abs((contact.shear @ Q)[plane, 0]).max() < 1e-10 * contact.pressure.max()
         forces.append(contact.force @ Q)
     np.testing.assert_allclose(forces, np.tile(forces[0], (4, 1)), atol=1e-9 * abs(forces[0][2]))
+
+
+TOLD = "supports hold 2 of the 6 facets of 'CONT_UPPER'"
+
+
+@pytest.mark.parametrize(
+    ("options", "held", "told"),
+    [
+        ({"kind": "tied"}, "x", True),
+        ({"kind": "tied", "formulation": "node_to_segment"}, "xy", True),
+        ({"friction": 0.3}, "x", True),
+        ({"friction": 0.3, "formulation": "continuous"}, "xy", True),
+        ({}, "xy", True),
+        ({}, "x", False),  # without friction nothing goes along the contact
+    ],
+)
+def test_tractions_between_facets_that_supports_hold_are_told_to_be_undetermined(options, held, told):
+    model = elastic_model(fc.generate.block_on_block(divisions_lower=(6, 3), divisions_upper=(6, 3)), "plane_strain")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.prescribe("UPPER_TOP", x=0.01, y=-0.01)
+    points, width = model.mesh.points, np.ptp(model.mesh.points[:, 0])
+    sides = np.concatenate([model.mesh.points_of(group) for group in ("CONT_LOWER", "CONT_UPPER")])
+    for point in sides[points[sides, 0] < points[:, 0].min() + 0.34 * width]:
+        for component in held:
+            model.relate([(int(point), component, 1.0)])
+    model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
+    (step,) = quietly(model)
+    assert any(TOLD in text for text in step.warnings) == told
+
+
+def quietly(model):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        return fc.solve(model, 1)
+
+
+def test_a_slice_and_a_side_that_is_drawn_are_determined():
+    """Where the whole side is held, as in plane strain, there is no traction; where one slides over the other, friction."""
+    model = elastic_model(blocks("hex8", 3), "3d")
+    for side in ("A_YMIN", "A_YMAX", "B_YMIN", "B_YMAX", "A_ZMAX", "B_ZMIN"):
+        model.fix(side, "y")
+    model.fix("A_ZMIN", "xz")
+    model.fix("A_ZMAX", "x")
+    model.prescribe("B_ZMIN", x=0.1)
+    model.prescribe("B_ZMAX", x=0.1, z=-0.01)
+    model.add_contact("c", secondary="B_ZMIN", primary="A_ZMAX", friction=0.2)
+    (step,) = quietly(model)
+    assert abs(step.contact["c"].force[0]) == pytest.approx(0.2 * abs(step.contact["c"].force[2]), rel=1e-3)
+    assert not any("supports hold" in text for text in step.warnings)

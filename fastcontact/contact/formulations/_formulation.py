@@ -490,14 +490,34 @@ class Formulation(ABC):
 
         Directions in which all nodes of a facet are held do not count.
         """
-        nodes = self._held_nodes
-        if not len(nodes) or self.held is None:
-            return None
-        ours, (_, theirs) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
-        held = np.zeros((len(self.secondary.points), *ours.shape[1:]))
-        held[nodes] = spanned(ours @ theirs @ ours, 0.5)
-        held = _without_whole_facets(held, self.secondary)
+        held = _without_whole_facets(self._both_held(at), self.secondary)
         return held if held.any() else None
+
+    def _both_held(self, at: Configuration) -> Array:
+        """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""
+        held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
+        if len(nodes) and self.held is not None:
+            ours, (_, theirs) = self.held.at(self.secondary.points[nodes]), self._opposite_held(nodes, at)
+            held[nodes] = spanned(ours @ theirs @ ours, 0.5)
+        return held
+
+    def undetermined(self, at: Configuration) -> Mask:
+        """Return which nodes (n_nodes,) belong to facets between which and what they face nothing determines a traction.
+
+        Supports hold all their nodes, and the other side, in one direction. Where they hold the whole side along the
+        contact, as in a slice in plane strain, the traction in this direction vanishes.
+        """
+        both = self._both_held(at)
+        if not both.any():
+            return np.zeros(len(both), bool)
+        along = without(both, nodal_normals(self.secondary, self.points + at.displacement), np.sqrt(0.5))
+        across = both - along
+        if not self.options.tied:
+            since_begin = replace(at, start=np.zeros_like(at.displacement))
+            along = self._without_motion(since_begin) if self.friction else np.zeros_like(both)
+        elsewhere = np.eye(both.shape[1]) - spanned(along.mean(axis=0)[None], 1.0 - LENGTH_ROUND_OFF)[0]
+        across, along = (held - _without_whole_facets(held, self.secondary) for held in (across, along))
+        return np.asarray(np.trace(across + elsewhere @ along @ elsewhere, axis1=1, axis2=2) > 0.5)
 
     def without_slip(self, at: Configuration) -> list[tuple[Array, Mask]]:
         """Return directions in which supports hold both sides without relative motion.
@@ -511,9 +531,14 @@ class Formulation(ABC):
         list of (ndarray (n_nodes, dim), ndarray of bool (n_nodes,))
             Unit vectors, each with the secondary nodes that are held in this direction.
         """
-        nodes = self._held_nodes
+        held = _without_whole_facets(self._without_motion(at), self.secondary)
+        return alike(held, self.points[self.secondary.points])
+
+    def _without_motion(self, at: Configuration) -> Array:
+        """Return projectors (n_nodes, dim, dim) onto the directions of `without_slip`, also those of whole facets."""
+        held, nodes = np.zeros((len(self.secondary.points), *2 * self.points.shape[1:])), self._held_nodes
         if not len(nodes) or self.held is None:
-            return []
+            return held
         pairing, held_opposite = self._opposite_held(nodes, at)
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
@@ -524,11 +549,11 @@ class Formulation(ABC):
         else:
             rows = np.flatnonzero(pairing.paired)
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
-            held, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
+            theirs, motion = self.held.at(facing.nodes), (at.displacement - at.start)[facing.nodes]
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
             # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
             # facet is ignored.
-            beside = np.einsum("nk,nkde,nkd->ne", facing.shape, held, motion - mean[:, None])
+            beside = np.einsum("nk,nkde,nkd->ne", facing.shape, theirs, motion - mean[:, None])
             moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), beside)
             both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
@@ -540,9 +565,8 @@ class Formulation(ABC):
         )
         moved -= closing[:, None] * pairing.normal
         both = without(both, moved, LENGTH_ROUND_OFF * max(np.abs(at.displacement).max(), np.abs(at.start).max()))
-        held = np.zeros((len(self.secondary.points), *both.shape[1:]))
         held[nodes] = both
-        return alike(_without_whole_facets(held, self.secondary), self.points[self.secondary.points])
+        return held
 
     def _mirrored(self, side: Surface) -> Surface:
         """Return a side whose averaged normals at planes of symmetry are those of the full model.

@@ -50,9 +50,11 @@ def _project(nodes, f, x, y):
             s = new
             if change < 1e-15:
                 break
-    # At a common node the distances of all its facets must be equal, so that the one with the lowest number is taken.
-    if abs(s) == 1.0:
+    # At a common node the distances of all its facets must be equal, so that the choice between them does not depend on
+    # round-off. A point opposite the node may lie within one of them by a rounding error.
+    if abs(s) >= 1.0 - ROUND_OFF:
         end = 0 if s < 0.0 else 1
+        s = 2.0 * end - 1.0
         px, py = nodes[f, end, 0], nodes[f, end, 1]
     else:
         px, py, _, _, _, _ = _curve(nodes, f, s)
@@ -61,11 +63,12 @@ def _project(nodes, f, x, y):
 
 @interpretable_kernel
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
-    """Project points (n, 2) on their closest facets; of facets at equal distance the one with the lowest number is taken.
+    """Project points (n, 2) on their closest facets; of equally close facets on the one that ends at their common node.
 
-    Points are processed from `begin` to ``end - 1`` of an `order` (n,) in which neighbours in space follow each other. Facets
-    are in the order of the tree; `numbers` (n_facets,) are their numbers before sorting. `result` is filled in place, with
-    facet -1 and distance NaN where a point is not finite.
+    If several end there, it is the one with the lowest number. The choice does not depend on the numbers of facets in a line
+    that have the same direction. Points are processed from `begin` to ``end - 1`` of an `order` (n,) in which neighbours in
+    space follow each other. Facets are in the order of the tree; `numbers` (n_facets,) are their numbers before sorting.
+    `result` is filled in place, with facet -1 and distance NaN where a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     for k in range(begin, end):
@@ -84,7 +87,7 @@ def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
                 continue
             f = box - leaves
             s, d = _project(nodes, f, x, y)
-            if d < best or (d == best and numbers[f] < numbers[closest]):
+            if d < best or (d == best and (s > best_s or (s == best_s and numbers[f] < numbers[closest]))):
                 closest, best, best_s, reach = f, d, s, (1.0 + ROUND_OFF) * d
         result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
