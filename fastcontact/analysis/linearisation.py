@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from dataclasses import replace
 
+import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
@@ -20,11 +21,13 @@ from fastcontact.analysis.terms import Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import sum_of_blocks
+from fastcontact.round_off import SINGLE_PRECISION
 
 
 def linearised(
-    problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool
-) -> Problem:
+    problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool,
+    friction: bool,
+) -> Problem:  # fmt: skip
     """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
 
     Parameters
@@ -37,13 +40,18 @@ def linearised(
     rigid : RigidPosition, optional
         Last position of floating bodies.
     contact : csr_array (n_dofs, n_dofs), optional
-        Stiffness due to contact forces, which is added to K [force / length].
+        Stiffness due to contact, which is added to K [force / length].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
+    friction : bool
+        Whether `contact` includes springs along slips. If it holds the floating bodies, they have no springs of their own:
+        with friction the iteration of their positions may not converge for a tangent that is nearly singular.
     """
     K = problem.force_driven.stiffness(K)
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
     floating = _floating(problem, system, u, rigid, stiff)
+    if friction and floating is not None and contact is not None and _holds(contact, floating):
+        floating = None
     solver = copy.copy(problem.solver)
     involved = system.involved(problem.contact_dofs)
     modes = problem.force_driven.near_nullspace(near_nullspace(problem.model, problem.displacement(u)))
@@ -51,6 +59,13 @@ def linearised(
     dofs = active_dofs(system, problem.contact_dofs, involved, problem.pairs, floating, solver)
     at = u if problem.bodies is not None and problem.bodies.finite else None
     return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+
+
+def _holds(contact: csr_array, floating: FloatingBodies) -> bool:
+    """Return whether a stiffness (n_dofs, n_dofs) resists all motions of floating bodies."""
+    motions = floating.motions.displacement
+    values = np.linalg.eigvalsh(motions.T @ (contact @ motions))
+    return bool(values[0] > SINGLE_PRECISION * values[-1])
 
 
 def load_about(problem: Problem, terms: Terms, u: Array, load: StepLoad, rigid: RigidPosition | None) -> StepLoad:

@@ -12,15 +12,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import bsr_array, csr_array, diags_array
+from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
+from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium, balance, solve_displacements, with_loads
 from fastcontact.analysis.terms import Fluid, Terms
@@ -120,6 +122,11 @@ class Regularisation:
     held: float = 0.0
     stiff: bool = False
 
+    @property
+    def linear(self) -> bool:
+        """Whether iterations with this tangent converge linearly only."""
+        return self.geometric < WHOLE or self.held > 0.0
+
 
 class _Newton:
     """The iterations of a load step; see `newton` for the parameters."""
@@ -133,7 +140,8 @@ class _Newton:
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
-        self._held = False  # whether the last tangent needed springs along closed gaps
+        self._by = Regularisation()  # of the last tangent
+        self._mixing = Anderson(DEPTH, np.arange(len(self._start.u)))
 
     def iterated(self, origin: Array) -> StepEquilibrium:
         """Return the equilibrium by iterations from displacements `origin` (n_dofs,) [length]."""
@@ -157,6 +165,7 @@ class _Newton:
             small = self._stands_still(changes) or moved <= self._start.gap_round_off
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
+            u = self._accelerated(before, u, changes) if fraction == 1.0 else u
             if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
                 break
         raise ConvergenceError(
@@ -193,8 +202,20 @@ class _Newton:
     def _stands_still(self, changes: list[float]) -> bool:
         """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
-        error = last * min(last / before, 1.0) if before else last
-        return error <= self._enough or (last <= SINGLE_PRECISION and last > FALL * before)
+        rate = min(last / before, 1.0) if before else 1.0
+        if self._by.linear:
+            return last * rate <= self._enough * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
+        return last * rate <= self._enough or (last <= SINGLE_PRECISION and rate > FALL)
+
+    def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
+        """Return the displacements (n_dofs,) [length] to continue from; the last iteration led from `before` (n_dofs,) to u.
+
+        Anderson acceleration is used where a regularised tangent makes the iterations converge linearly.
+        """
+        if not self._by.linear or changes[-1] > changes[-2]:
+            self._mixing.restart()
+            return u
+        return self._mixing.mixed(before, u)
 
     def _serves_again(self, changes: list[float]) -> bool:
         """Return whether a second iteration with the last tangent is expected to be the last iteration.
@@ -226,7 +247,7 @@ class _Newton:
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         failed: Exception | None = None
         for by in self._regularisations():
-            if self._held and by.geometric == WHOLE and not by.held:
+            if self._by.held and by.geometric == WHOLE and not by.held:
                 continue  # it failed in the last iteration
             try:
                 solution = self._linearised_contact(u, changes, by)
@@ -234,7 +255,9 @@ class _Newton:
                 log.info("the tangent fails with %s: %s", by, error)
                 failed = error
             else:
-                self._held = by.held > 0.0
+                if by != self._by:
+                    self._mixing.restart()
+                self._by = by
                 return solution
         if isinstance(failed, ConvergenceError):
             raise failed
@@ -261,7 +284,8 @@ class _Newton:
         else:
             K = terms.tangent(u, by.geometric)
             contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
-            problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff)
+            friction = by.held > 0.0 and self._settled is not None and self._settled.constraints.tangents != ()
+            problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, friction)
             if by.geometric == WHOLE:
                 self._kept = problem
         load = load_about(problem, terms, u, self._load, iterate.rigid)
@@ -293,16 +317,20 @@ class _Newton:
     def _stiffness_of_contact(self, K: bsr_array, u: Array, by: Regularisation) -> csr_array | None:
         """Return the stiffness that the last contact adds to a tangent at displacements u (n_dofs,) [force / length].
 
-        It is the symmetric part of the load stiffness of fluid pressure, and that of springs, slack at u, along closed gaps.
-        Displacements along closed gaps hardly change as iterations converge, so that the springs affect iterations only to
-        second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
+        It is the symmetric part of the load stiffness of fluid pressure, and that of springs, slack at u, along closed gaps
+        and along the slips of sticking constraints. These displacements hardly change as iterations converge, so that the
+        springs affect iterations only to second order (as in the augmented Lagrangian method: Alart and Curnier, 1991).
         """
         parts = [fluid.tangent(u) for fluid in self._fluid(u)]
         if by.held and self._settled is not None:
-            constraints = self._settled.constraints
+            constraints, solution = self._settled.constraints, self._settled.solution
             dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
-            rows = csr_array(constraints.B[np.flatnonzero(self._settled.solution.active & (dry > 0.0))])
-            stiffness = by.held * float(K.diagonal().max()) / np.asarray(rows.multiply(rows).sum(axis=1)).ravel()
+            closed = solution.active & (dry > 0.0)
+            sticking = closed & solution.sticking if isinstance(solution, FrictionalEquilibrium) else closed
+            stuck = [tangent[np.flatnonzero(sticking)] for tangent in constraints.tangents]
+            rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *stuck]))
+            sizes = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
+            stiffness = by.held * float(K.diagonal().max()) / np.where(sizes > 0.0, sizes, np.inf)
             parts.append(csr_array(rows.T @ diags_array(stiffness) @ rows))
         for part in parts:
             part.resize((len(u), len(u)))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from pairwise import first_of
 
 import fastcontact as fc
 from tests.verification.test_finite_strain import LAWS
@@ -141,6 +142,48 @@ def test_a_ring_held_by_contact_alone_is_that_of_symmetry() -> None:
     assert force == pytest.approx(6.0 * 5.0 * (1.25 * 0.25**1.5 + 50.0 * 0.25**6), rel=0.1)
     points, moved = (ring(False).mesh.points + part * half[-1].displacement for part in (0.0, 1.0))
     assert volume(ring(False).mesh, moved) == pytest.approx(volume(ring(False).mesh, points), rel=1e-3)
+
+
+def groove(friction: float) -> fc.Model:
+    """Return an O-ring that the four walls of a groove hold: the inner one stretches it, the lid squeezes it by a quarter."""
+    part = fc.generate.quarter_disc("tri6", R=2.5, size=0.7, contact_size=0.7)
+    part = fc.generate.renamed(part, {"CONT1": "UPPER", "D1B1": "UPPER"})
+    part = fc.generate.transformed(part, translate=(0.0, 2.5))
+    upper = fc.generate.union(part, fc.generate.mirrored(part, "x"))
+    lower = fc.generate.renamed(fc.generate.mirrored(upper, "y"), {"UPPER": "LOWER"})
+    mesh = fc.generate.merge_points(fc.generate.union(upper, lower), 1e-6)
+    mesh = fc.generate.transformed(mesh, translate=(25.0, 0.0))
+    mesh = mesh.with_facet_group("CORD", lambda x: np.hypot(x[:, 0] - 25.0, x[:, 1]) > 2.4)
+    model = fc.Model(mesh, "axisymmetric", strain="finite")
+    model.add_material(fc.NeoHookean(E=6.0, nu=0.4995))
+    for name, side, point, normal, motion in (
+        ("floor", "LOWER", (0.0, -2.5), (0.0, 1.0), None),
+        ("lid", "UPPER", (0.0, 2.5), (0.0, -1.0), {"y": -1.25}),
+        ("inner", "CORD", (22.5, 0.0), (1.0, 0.0), {"x": 0.2}),
+        ("outer", "CORD", (28.3, 0.0), (-1.0, 0.0), None),
+    ):
+        wall = fc.obstacles.HalfSpace(point=point, normal=normal)
+        model.add_obstacle(name, secondary=side, obstacle=wall, motion=motion, friction=friction)
+    return model
+
+
+@pytest.mark.filterwarnings("ignore:contact .* elements across its radius")
+@pytest.mark.parametrize("steps", first_of(1, [5, 3]))
+def test_a_ring_in_a_groove_rubs_on_four_walls(steps: int) -> None:
+    """Nothing but the walls hold it; the force on the lid is that on the floor and what it rubs on both sides, sliding."""
+    model = groove(0.1)
+    last = fc.solve(model, steps)[-1]
+    contact = last.contact
+    assert sum(c.force[1] for c in contact.values()) == pytest.approx(0.0, abs=1e-6 * contact["lid"].normal_force)
+    for name in ("inner", "outer"):
+        assert contact[name].force[1] == pytest.approx(0.1 * contact[name].normal_force, rel=1e-6)
+    for name in ("lid", "inner", "outer"):
+        wall = contact[name]
+        assert wall.active.any()
+        assert not wall.sticking.any()
+        assert np.linalg.norm(wall.shear, axis=1) == pytest.approx(0.1 * wall.pressure, rel=1e-6, abs=1e-9)
+    moved = model.mesh.points + last.displacement
+    assert volume(model.mesh, moved) == pytest.approx(volume(model.mesh, model.mesh.points), rel=1e-3)
 
 
 def volume(mesh: fc.Mesh, points: np.ndarray) -> float:

@@ -64,6 +64,17 @@ def slope(energy, stretch: np.ndarray, axis: int) -> float:
     return float(np.imag(energy(moved)) / 1e-30)
 
 
+def principal_stress(energy, stretch: np.ndarray) -> np.ndarray:
+    """Return Cauchy stresses (3,) of principal stretches (3,)."""
+    return np.array([stretch[axis] * slope(energy, stretch, axis) for axis in range(3)]) / stretch.prod()
+
+
+def cauchy(energy, F: np.ndarray) -> np.ndarray:
+    """Return the Cauchy stress (3, 3) of an isotropic law, by principal axes of F F^T."""
+    squared, axes = np.linalg.eigh(F @ F.T)
+    return axes @ np.diag(principal_stress(energy, np.sqrt(squared))) @ axes.T
+
+
 def uniaxial(energy, stretch: float) -> float:
     """Return the nominal stress of a bar."""
     across = brentq(lambda s: slope(energy, np.array([stretch, s, s]), 1), 0.5, 1.6, xtol=1e-15)
@@ -144,7 +155,7 @@ def test_plastic_history_turns_with_the_body() -> None:
     ("kinematics", "element"), [("plane_strain", "quad4"), ("plane_strain", "tri6"), ("3d", "hex8")]
 )
 def test_simple_shear(kinematics: str, element: str, law: str) -> None:
-    """Every node moves along x by its height; the shear force is the derivative of the energy by the shear."""
+    """Every node moves along x by its height."""
     material, energy = LAWS[law]
     solid = kinematics == "3d"
     mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), element=element) if solid else fc.generate.block(element=element)
@@ -160,17 +171,10 @@ def test_simple_shear(kinematics: str, element: str, law: str) -> None:
     if solid:
         model.fix("BOX", "z")
     step = fc.solve(model, 2)[-1]
-
-    def sheared(amount: float) -> float:
-        F = np.eye(3)
-        F[0, 1] = amount
-        return energy(np.sqrt(np.linalg.eigvalsh(F.T @ F)))
-
-    exact = (sheared(0.4 + 1e-5) - sheared(0.4 - 1e-5)) / 2e-5
+    exact = cauchy(energy, np.array([[1.0, 0.4, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]))[0, 1]
     inside = np.setdiff1d(np.arange(mesh.n_points), np.concatenate([mesh.points_of(side) for side in sides]))
     assert step.displacement[inside, 0] == pytest.approx(0.4 * mesh.points[inside, 1], abs=1e-9)
-    P = step.stress[:, 3]  # of a shear along x, J = 1 and sigma_xy = P_xy
-    assert pytest.approx(exact, rel=1e-7) == P
+    assert step.stress[:, 3] == pytest.approx(exact, rel=1e-9)
 
 
 def tube(element: str, count: int) -> fc.Model:
@@ -244,20 +248,34 @@ def changes_of(step) -> list[float]:
     return [entry["displacement_change"] for entry in step.iterations["history"]]
 
 
+@pytest.mark.filterwarnings("ignore:(tri3|tet4) cells lock:fastcontact.FastcontactWarning")
 @pytest.mark.parametrize("law", [*LAWS, *YIELDING])
-def test_iterations_converge_quadratically(law: str) -> None:
-    finite = law in LAWS or "finite" in law
-    model = fc.Model(
-        fc.generate.block((1.0, 1.0), (4, 4), element="quad8"), "plane_strain", strain="finite" if finite else "small"
-    )
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [
+        *((kinematics, element) for kinematics in ("plane_strain", "plane_stress", "axisymmetric")
+          for element in ("tri3", "tri6", "quad4", "quad8", "quad9")),
+        *(("3d", element) for element in ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "wedge18",
+                                          "pyramid5", "pyramid13")),
+    ],
+)  # fmt: skip
+def test_iterations_converge_quadratically(kinematics: str, element: str, law: str) -> None:
+    finite, solid = law in LAWS or "finite" in law, kinematics == "3d"
+    if solid:
+        mesh = fc.generate.box(divisions=(2, 2, 2), element=element)
+    else:
+        mesh = fc.generate.block((1.0, 1.0), (4, 4), element, origin=(float(kinematics == "axisymmetric"), 0.0))
+    model = fc.Model(mesh, kinematics, strain="finite" if finite else "small")
     model.add_material(LAWS[law][0] if law in LAWS else YIELDING[law])
-    model.fix("BOTTOM", "xy")
+    model.fix("ZMIN" if solid else "BOTTOM", "xyz"[: mesh.dim])
     scale = 1.0 if law in LAWS else 0.1
     scale *= 0.3 if law == "Saint Venant-Kirchhoff" else 1.0
-    model.prescribe("TOP", x=0.3 * scale, y=-0.2 * scale)
+    model.prescribe("ZMAX" if solid else "TOP", **{"x": 0.3 * scale, "yz"[solid]: -0.2 * scale})
     changes = changes_of(fc.solve(model, 1)[-1])
-    for before, after in zip(changes[-3:-1], changes[-2:], strict=True):
-        assert after <= 10.0 * before**2 + 1e-13
+    assert len(changes) >= 4
+    # In one of them the set of yielding points may change; in the last one the tangent of the one before may serve again.
+    assert min(changes[k] / changes[k - 1] ** 2 for k in (-3, -2)) <= 20.0
+    assert changes[-1] <= 20.0 * changes[-2] * changes[-3] + 1e-13
 
 
 @pytest.mark.filterwarnings("ignore:contact 'ball'")

@@ -79,7 +79,9 @@ def test_plastic_work_is_the_area_under_the_curve() -> None:
     assert work["strain_energy"] == pytest.approx(0.5 * stress[0] ** 2 / E, rel=1e-9)
 
 
-@pytest.mark.parametrize(("element", "count", "bound"), [("quad8", 20, 2e-3), ("tri6", 20, 4e-3), ("quad4", 60, 0.012)])
+@pytest.mark.parametrize(
+    ("element", "count", "bound"), [("quad8", 100, 1e-4), ("tri6", 100, 1e-3), ("quad4", 200, 5e-3)]
+)
 def test_a_tube_yields_from_inside(element: str, count: int, bound: float) -> None:
     """Hill (1950, chapter 5): the plastic radius and the stresses of a tube in plane strain, without hardening."""
     inner, outer, radius, k = 1.0, 2.0, 1.5, Y / np.sqrt(3.0)
@@ -96,13 +98,13 @@ def test_a_tube_yields_from_inside(element: str, count: int, bound: float) -> No
     plastic = 2.0 * k * np.log(np.minimum(r, radius) / radius) - at_front
     exact = np.where(r < radius, plastic, k * radius**2 / outer**2 - k * radius**2 / r**2)
     assert np.abs(stress[:, 0] - exact).max() <= bound * Y
-    away = np.abs(r - radius) > 0.06
     hoop = np.where(r < radius, plastic + 2.0 * k, k * radius**2 / outer**2 + k * radius**2 / r**2)
-    assert np.abs(stress[:, 2] - hoop)[away].max() <= 3.0 * bound * Y
+    assert np.abs(stress[:, 2] - hoop).max() <= bound * Y
+    assert np.abs(stress[:, 1] - 0.5 * (exact + hoop)).max() <= max(bound, 2e-3) * Y
     middle = np.concatenate([mesh.points[block].mean(axis=1)[:, 0] for block in mesh.solids.values()])
     yielded = steps[-1].cell_fields["plastic_strain"] > 1e-6
-    assert middle[yielded].max() == pytest.approx(radius, abs=1.5 / count)
-    assert middle[~yielded].min() == pytest.approx(radius, abs=1.5 / count)
+    assert middle[yielded].max() == pytest.approx(radius, rel=0.01)
+    assert middle[~yielded].min() == pytest.approx(radius, rel=0.01)
 
 
 def indented(element: str, formulation: str, **options):
