@@ -26,8 +26,8 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Largest number of iterations for one change of the displacements.
-MOST = 20
+# Largest number of iterations for one change of the displacements, and ratio of their tolerance to the requested accuracy.
+MOST, AT_END = 20, 0.01
 
 
 def newton_step(
@@ -80,7 +80,7 @@ def newton_step(
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, accuracy), atol=0.0, restart=MOST, maxiter=1)
+    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
     responding = largest_difference(size * v, changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not responding <= size:
