@@ -61,12 +61,26 @@ def _project(nodes, f, x, y):
     return s, (x - px) * (x - px) + (y - py) * (y - py)
 
 
+@inlined_kernel
+def _precedes(nodes, f, s, other, other_s, numbers):
+    """Return whether facet `f`, at s, is taken instead of the equally close facet `other`, at `other_s`.
+
+    On a smooth line it is the facet that ends at their common node, which does not depend on numbers. At corners of more than
+    45 degrees it is the one with the lowest number.
+    """
+    fx, fy = nodes[f, 1, 0] - nodes[f, 0, 0], nodes[f, 1, 1] - nodes[f, 0, 1]
+    ox, oy = nodes[other, 1, 0] - nodes[other, 0, 0], nodes[other, 1, 1] - nodes[other, 0, 1]
+    along = fx * ox + fy * oy
+    if s == other_s or along < 0.0 or along * along < 0.5 * (fx * fx + fy * fy) * (ox * ox + oy * oy):
+        return numbers[f] < numbers[other]
+    return s > other_s
+
+
 @interpretable_kernel
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
-    """Project points (n, 2) on their closest facets; of equally close facets on the one that ends at their common node.
+    """Project points (n, 2) on their closest facets; of two equally close facets see `_precedes`.
 
-    If several end there, it is the one with the lowest number. The choice does not depend on the numbers of facets in a line
-    that have the same direction. Points are processed from `begin` to ``end - 1`` of an `order` (n,) in which neighbours in
+    Points are processed from `begin` to ``end - 1`` of an `order` (n,) in which neighbours in
     space follow each other. Facets are in the order of the tree; `numbers` (n_facets,) are their numbers before sorting.
     `result` is filled in place, with facet -1 and distance NaN where a point is not finite.
     """
@@ -87,7 +101,7 @@ def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
                 continue
             f = box - leaves
             s, d = _project(nodes, f, x, y)
-            if d < best or (d == best and (s > best_s or (s == best_s and numbers[f] < numbers[closest]))):
+            if d < best or (d == best and _precedes(nodes, f, s, closest, best_s, numbers)):
                 closest, best, best_s, reach = f, d, s, (1.0 + ROUND_OFF) * d
         result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
