@@ -61,12 +61,26 @@ def _project(nodes, f, x, y):
     return s, (x - px) * (x - px) + (y - py) * (y - py)
 
 
+@inlined_kernel
+def _precedes(nodes, f, s, g, r, numbers):
+    """Return whether of two equally close facets, `f` at s and `g` at r, `f` is taken.
+
+    Where a line continues smoothly beyond a common node, it is the one that ends there, whatever the numbers of facets are.
+    At corners of more than 45 degrees, and otherwise, it is the one with the lowest number.
+    """
+    _, _, px, py, _, _ = _curve(nodes, f, s)
+    _, _, qx, qy, _, _ = _curve(nodes, g, r)
+    both = px * qx + py * qy
+    if s != r and both > 0.0 and 2.0 * both * both > (px * px + py * py) * (qx * qx + qy * qy):
+        return s > r
+    return numbers[f] < numbers[g]
+
+
 @interpretable_kernel
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
-    """Project points (n, 2) on their closest facets; of equally close facets on the one that ends at their common node.
+    """Project points (n, 2) on their closest facets; see `_precedes` for equally close ones.
 
-    If several end there, it is the one with the lowest number. The choice does not depend on the numbers of a line of facets
-    that have the same direction. Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space
+    Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space
     follow each other. Facets are in the order of the tree; `numbers` (n_facets,) are those before they were sorted. `result`
     is filled in place, with facet -1 and distance NaN where a point is not finite.
     """
@@ -87,7 +101,7 @@ def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
                 continue
             f = box - leaves
             s, d = _project(nodes, f, x, y)
-            if d < best or (d == best and (s > best_s or (s == best_s and numbers[f] < numbers[closest]))):
+            if d < best or (d == best and _precedes(nodes, f, s, closest, best_s, numbers)):
                 closest, best, best_s, reach = f, d, s, (1.0 + ROUND_OFF) * d
         result.facet[i], result.distance[i] = -1, np.nan
         if closest >= 0:
