@@ -257,3 +257,22 @@ def test_a_slice_and_a_side_that_is_drawn_are_determined():
     (step,) = quietly(model)
     assert abs(step.contact["c"].force[0]) == pytest.approx(0.2 * abs(step.contact["c"].force[2]), rel=1e-3)
     assert not any("supports hold" in text for text in step.warnings)
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.6])
+def test_facets_that_meet_a_plane_of_symmetry_at_an_angle_do_not_penetrate(friction):
+    """The support carries what goes along an inclined normal: friction changes hardly anything where nothing slides."""
+    mesh = fc.generate.rings("quad4", divisions_inner=(1, 2), divisions_outer=(1, 2))
+    forces = []
+    for mu in (None, friction):
+        model = elastic_model(mesh, "plane_strain")
+        model.fix("SYMMETRY_X", "x")
+        model.fix("SYMMETRY_Y", "y")
+        model.add_pressure("BORE", 1.0)
+        options = {"formulation": "continuous", "integration": "node", "surface_smoothing": False}
+        model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", friction=mu, **options)
+        (step,) = quietly(model)
+        contact = step.contact["fit"]
+        assert np.abs(contact.gap).max() < 1e-7 * np.abs(step.displacement).max()
+        forces.append(np.linalg.norm(contact.force))
+    assert forces[1] == pytest.approx(forces[0], rel=0.02)

@@ -62,27 +62,27 @@ def _project(nodes, f, x, y):
 
 
 @inlined_kernel
-def _precedes(nodes, f, s, other, other_s, numbers):
-    """Return whether facet `f`, at s, is taken instead of the equally close facet `other`, at `other_s`.
+def _precedes(nodes, f, s, g, r, numbers):
+    """Return whether of two equally close facets, `f` at s and `g` at r, `f` is taken.
 
-    On a smooth line it is the facet that ends at their common node, which does not depend on numbers. At corners of more than
-    45 degrees it is the one with the lowest number.
+    Where a line continues smoothly beyond a common node, it is the one that ends there, whatever the numbers of facets are.
+    At corners of more than 45 degrees, and otherwise, it is the one with the lowest number.
     """
-    fx, fy = nodes[f, 1, 0] - nodes[f, 0, 0], nodes[f, 1, 1] - nodes[f, 0, 1]
-    ox, oy = nodes[other, 1, 0] - nodes[other, 0, 0], nodes[other, 1, 1] - nodes[other, 0, 1]
-    along = fx * ox + fy * oy
-    if s == other_s or along < 0.0 or along * along < 0.5 * (fx * fx + fy * fy) * (ox * ox + oy * oy):
-        return numbers[f] < numbers[other]
-    return s > other_s
+    _, _, px, py, _, _ = _curve(nodes, f, s)
+    _, _, qx, qy, _, _ = _curve(nodes, g, r)
+    both = px * qx + py * qy
+    if s != r and both > 0.0 and 2.0 * both * both > (px * px + py * py) * (qx * qx + qy * qy):
+        return s > r
+    return numbers[f] < numbers[g]
 
 
 @interpretable_kernel
 def closest_facets(points, order, begin, end, nodes, numbers, tree, result):
-    """Project points (n, 2) on their closest facets; of two equally close facets see `_precedes`.
+    """Project points (n, 2) on their closest facets; see `_precedes` for equally close ones.
 
-    Points are processed from `begin` to ``end - 1`` of an `order` (n,) in which neighbours in
-    space follow each other. Facets are in the order of the tree; `numbers` (n_facets,) are their numbers before sorting.
-    `result` is filled in place, with facet -1 and distance NaN where a point is not finite.
+    Points are taken from `begin` to `end` of an `order` (n,) in which neighbours in space
+    follow each other. Facets are in the order of the tree; `numbers` (n_facets,) are those before they were sorted. `result`
+    is filled in place, with facet -1 and distance NaN where a point is not finite.
     """
     stack, squares, leaves = np.empty(DEPTH, np.int64), np.empty(DEPTH), len(tree.low) // 2
     for k in range(begin, end):
