@@ -197,6 +197,8 @@ class Heat:
             return f
         dim = self.model.mesh.dim
         solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(f), tolerance=self.linear_tolerance)
+        # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only. Factors need both.
+        A = csr_array(0.5 * (A + A.T))
         A.sort_indices()
         solver.prepare(bsr_array((A.data[:, None, None], A.indices, A.indptr), shape=A.shape), np.ones((len(f), 1)))
         return solver.load(f).full_solution(np.zeros(len(f)))

@@ -136,6 +136,8 @@ class Drawing:
     def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
         labels = parameter_label(self.first, self.units), y_label
         frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
+        if self.others:  # curves may be everywhere
+            ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
     def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
         """Return, for each choice of the other parameters, the label, the values of the first parameter and the points."""

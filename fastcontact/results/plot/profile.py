@@ -143,17 +143,17 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units)
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
-    centre, name = 0.0, "edge"
+    centre = 0.0
     if position.min(initial=0.0) < 0:
         closed = contact.place[contact.active]
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
-    if abs(centre) > 0.01 * outside:
-        name = f"edges, with a half-width about {centre:.4g}"
-    else:  # constraints may lie between nodes, so that the bounds of the radius are closer to each other than nodes are
+    label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
+    if abs(centre) <= 0.01 * outside:
+        # Constraints may lie between nodes, so that the bounds of the radius are closer to each other than nodes are.
         across, order = np.abs(contact.across), np.argsort(np.abs(contact.across))
         inside, outside = np.interp(contact.radius, across[order], np.abs(contact.place)[order])
-    along = "" if contact.tangent is None else " (arc length)"
-    label = f"{name}: {inside:.4g} to {valued(outside, units, 'length')}{along}"
+        label = f"edge: {inside:.4g} to {valued(outside, units, 'length')}"
+    label += "" if contact.tangent is None else " (arc length)"
     for side in (-1.0, 1.0) if position.min(initial=0.0) < 0 else (1.0,):
         ends = centre + side * inside, centre + side * outside
         ax.axvspan(min(ends), max(ends), color="tab:blue", alpha=0.15, lw=0, label=label if side > 0.0 else None)
