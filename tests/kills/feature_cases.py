@@ -72,6 +72,13 @@ CONDUCTS = LINEAR + "\nconductivity = 50.0\nexpansion = 12e-6"
 CASES = {
     "plastic": _blocks(LINEAR + "\nyield_stress = 3.0\nhardening = [[0.0, 3.0], [0.1, 9.0]]\nkinematic = 20.0"),
     "plastic with friction": _blocks(LINEAR + "\nyield_stress = 3.0", "friction = 0.3", along=0.05),
+    "plastic, finite": _blocks(
+        LINEAR + "\nyield_stress = 3.0\nhardening = [[0.0, 3.0], [0.1, 9.0]]",
+        "friction = 0.3",
+        top='strain = "finite"',
+        down=-0.1,
+        along=0.05,
+    ),
     "rubber": _blocks(
         'law = "neo_hookean"\nE = 10.0\nnu = 0.45', "friction = 0.2", top='strain = "finite"', down=-0.3, along=0.2
     ),

@@ -51,6 +51,7 @@ CASES = {
     "node_to_segment, friction": lambda: spheres(formulation="node_to_segment", friction=0.2),
     "continuous": lambda: spheres(formulation="continuous"),
     "plastic, friction": lambda: spheres(PLASTIC, friction=0.1),
+    "plastic, finite strain, friction": lambda: spheres(PLASTIC, "finite", friction=0.1),
     "finite strain": lambda: spheres(fc.NeoHookean(E=20_000.0, nu=0.3), "finite"),
     "held by contact": lying_block,
     "held by contact, friction": lambda: lying_block(friction=0.3),

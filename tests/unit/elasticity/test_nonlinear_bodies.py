@@ -95,20 +95,22 @@ def test_forces_turn_with_the_body(element: str, law: str) -> None:
     assert max(np.abs(values).max() for values in rigid.stress.values()) <= 1e-10 * 100.0
 
 
-def test_threads_do_not_change_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("law", ["Mooney-Rivlin", "plastic, finite", "plastic"])
+def test_threads_do_not_change_bits(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from fastcontact._jit import parallel
 
     mesh = fc.generate.box((1.0, 1.0, 1.0), (5, 4, 3))
-    model = fc.Model(mesh, "3d", strain="finite")
-    model.add_material(fc.MooneyRivlin(20.0, 10.0, bulk=1000.0))
+    material, strain = LAWS[law]
+    model = fc.Model(mesh, "3d", strain=strain)
+    model.add_material(material)
     u = 0.02 * np.random.default_rng(0).normal(size=mesh.points.shape)
     found = []
     for count in (1, 2, 3):
         monkeypatch.setattr(parallel, "WORTHWHILE", 1)
         monkeypatch.setattr(parallel.decorators, "threads", lambda count=count: count)
-        bodies = NonlinearBodies(mesh, "3d", "finite", model.material_field())
+        bodies = NonlinearBodies(mesh, "3d", strain, model.material_field())
         here = bodies.at(u, bodies.beginning)
-        found.append((here.K.data, here.force, here.stress["hex8"], here.energy))
+        found.append((here.K.data, here.force, here.stress["hex8"], here.history["hex8"], here.energy))
     for other in found[1:]:
         assert all(np.array_equal(one, two) for one, two in zip(found[0], other, strict=True))
 
