@@ -81,7 +81,9 @@ def newton_step(
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=along, dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1)
+    v, _ = gmres(
+        system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1
+    )
     responding = largest_difference(size * v, changed)
     # Far from the solution a step in which the response adds more than the change itself leads anywhere.
     if not responding <= size:
