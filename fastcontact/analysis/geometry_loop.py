@@ -109,7 +109,7 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
         once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
         solution, displacement = solve_inequalities(step, once, iterate, closed & once.usable, accuracy)
         moved = _move(step, iterate, constraints, solution, displacement)
-        if not (solution.settled or tolerances.inexact):
+        if not (solution.settled or accuracy.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
         if not problem.until_settled:
             continue

@@ -76,13 +76,17 @@ class Tolerances:
         self._residual = max(self._solver.tolerance, worth)
 
     def accuracy(self, scale: float) -> Accuracy:
-        """Return the tolerances and limits of the next contact solution; `scale` is that of the displacements [length]."""
+        """Return the tolerances and limits of the next contact solution; `scale` is that of the displacements [length].
+
+        While linear solutions are inexact, surfaces are paired again after one iteration of the active set or one Newton step
+        of friction.
+        """
         noise = max(10 * self._solver.tolerance, self._residual if self._solver.iterative else 0.0)
         return Accuracy(
             gap=max(noise * (scale or self._expected), self._round_off),
             multiplier=noise,
             residual=max(self._residual, self._solver.tolerance),
-            max_iterations=self._criteria.max_active_set_iterations,
+            max_iterations=1 if self.inexact else self._criteria.max_active_set_iterations,
             inexact=self.inexact,
         )
 
