@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 
 from scipy.sparse import bsr_array, csr_array
@@ -44,7 +43,7 @@ def linearised(
     K = problem.force_driven.stiffness(K)
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
     floating = _floating(problem, system, u, rigid, stiff)
-    solver = copy.copy(problem.solver)
+    solver = problem.solver.near()
     involved = system.involved(problem.contact_dofs)
     modes = problem.force_driven.near_nullspace(near_nullspace(problem.model, problem.displacement(u)))
     involved = prepare_solver(solver, system, floating, modes, involved)
