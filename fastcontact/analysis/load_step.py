@@ -101,7 +101,7 @@ def _ended(
         end, contact = keep_path(problem, start, load, settled, end, contact, balanced.energy)
         end = end.after_touching(name for name, pair in contact.items() if pair.active.any())
     else:
-        end = replace(end, extrapolation=start.extrapolation.converged(u, {}))
+        end = replace(end, extrapolation=start.extrapolation.converged(u, {}, problem.bodies is not None))
     if settled is None and start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if end.work is not None:
@@ -134,11 +134,15 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
     if problem.floating_bodies is not None:
         forces = generalised(problem.floating_bodies.motions, pushing.force)
         rigid_force = max(rigid_force, float(np.abs(forces).max()))
-    # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads.
-    motions = [] if problem.bodies is None else load.obstacles.values()
+    # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads, from
+    # the state at rest on.
+    parts = [load.lift, pushing.force, *(() if problem.bodies is None else load.obstacles.values())]
+    extrapolation = state.extrapolation
+    if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
+        extrapolation = extrapolation.to(*map(np.zeros_like, parts)).converged(state.u, {})
     start = replace(
         state, gap_round_off=round_off, largest_rigid_force=rigid_force, rigid=None, last_change=None,
         largest_force=max(state.largest_force, largest(pushing.force)),
-        extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions),
+        extrapolation=extrapolation.to(*parts),
     )  # fmt: skip
     return Beginning(start, index, load, loaded, expected)

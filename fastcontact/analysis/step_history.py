@@ -38,7 +38,9 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
     return replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
         last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
-        extrapolation=start.extrapolation.converged(end.u, {name: (gap[at], force[at]) for name, at in rows.items()}),
+        extrapolation=start.extrapolation.converged(
+            end.u, {name: (gap[at], force[at]) for name, at in rows.items()}, problem.bodies is not None
+        ),
         never_opening=never_opening(problem, start, settled), elastic_slip=elastic_slips(settled),
         bonds=bonds(settled, end.u),
     )  # fmt: skip

@@ -187,18 +187,19 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 
 
 @kernel
-def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, old, new, P, A, G):
+def _respond(
+    constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, J, G, old, new, P, A
+):
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
-    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder; see `linearise`, `_through` and,
-    for `everywhere`, `respond`.
+    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder, J and G (3, 3) are the dilatation
+    and its derivative; see `linearise`, `_through` and, for `everywhere`, `respond`.
     """
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
         if finite and geometric == 0:
             _leave_out_initial_stress(G, determinant(F), P, 0.0, A)
         return energy, settled
-    J = _dilatation(F, finite, G)
     energy = respond(constants, D, F, J, G, everywhere, old, new, P, A) + 0.5 * bulk * (J - 1.0) ** 2
     pressure += bulk * (J - 1.0)
     turning = pressure if finite and geometric == 2 and everywhere else 0.0
@@ -213,7 +214,9 @@ def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geomet
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
     """Subtract the elastic tangent at small strains, without the projected dilatation, from A (9, 9)."""
     none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
-    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, np.eye(3), none, new, P, of_elasticity, G)
+    F = np.eye(3)
+    J = _dilatation(F, False, G)
+    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, F, J, G, none, new, P, of_elasticity)
     A -= of_elasticity
 
 
@@ -232,23 +235,22 @@ def _add_forces(gradient, q, weight, P, dim, factors, out, row):
 
 
 @kernel
-def _project(polynomials, volume, gradient, dim, finite, F, G, factors, mass, projected, slopes):
+def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected, slopes):
     """Fill the Cholesky factor `mass` (m, m) of the polynomials' mass matrix, and the dilatation in orthonormal ones.
 
-    `projected` (m, 1) is the dilatation, and `slopes` (4 m, width) are its derivatives by displacements, four rows for each
-    polynomial; they are computed if `slopes` is not empty.
+    J (n_q,) are one plus the dilatation, and G (n_q, 3, 3) its derivatives. `projected` (m, 1) is the dilatation, `slopes`
+    (4 m, width) are its derivatives by displacements, four rows for each polynomial, computed if `slopes` is not empty.
     """
     m = len(mass)
     mass[:], projected[:], slopes[:] = 0.0, 0.0, 0.0
     for q in range(len(volume)):
-        J = _dilatation(F[q], finite, G)
         for k in range(m):
             share = volume[q] * polynomials[q, k]
             for n in range(k + 1):
                 mass[k, n] += share * polynomials[q, n]
-            projected[k, 0] += share * (J - 1.0)
+            projected[k, 0] += share * (J[q] - 1.0)
             if len(slopes):
-                _add_forces(gradient, q, share, G, dim, factors, slopes, 4 * k)
+                _add_forces(gradient, q, share, G[q], dim, factors, slopes, 4 * k)
     reduce(mass, projected)
     for k in range(m if len(slopes) else 0):
         for n in range(k):
@@ -386,7 +388,8 @@ def linearise(
     _tables(dN, lines, of_reference)
     x, u, J, inverse = np.zeros((n_nodes, 4)), np.zeros((n_nodes, 4)), np.empty((4, 4)), np.zeros((3, 4))
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
-    F, G, thicker, pressure = np.empty((n_q, 3, 3)), np.empty((3, 3)), np.ones(n_q), np.empty(n_q)
+    F, G, ratio, thicker = np.empty((n_q, 3, 3)), np.empty((n_q, 3, 3)), np.empty(n_q), np.ones(n_q)
+    pressure = np.empty(n_q)
     P, A, history, inside = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(n_nodes, np.bool_)
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     factors, factors_of_pairs, local = np.zeros((3, 4)), np.zeros((3, 4 * n_pairs)), np.empty((n_pairs * width, width))
@@ -402,20 +405,21 @@ def linearise(
                 volume[q] *= _about_axis(x, u, N, q, gradient, F[q])
             if len(rise):
                 strain, rows = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
-                ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[rows])
-                volume[q] *= ratio
-            if finite and not determinant(F[q]) > 0.0:
+                expansion_ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[rows])
+                volume[q] *= expansion_ratio
+            ratio[q] = _dilatation(F[q], finite, G[q])
+            if finite and not ratio[q] > 0.0:
                 return INVERTED, c
         forces[:], pressure[:] = 0.0, 0.0
         stored, dissipated, mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
         if mean > 0.0:
-            _project(polynomials, volume, gradient, dim, finite, F, G, factors, mass, projected, slopes)
+            _project(polynomials, volume, gradient, dim, ratio, G, factors, mass, projected, slopes)
             stored += _pressures(mean, polynomials, mass, projected, pressure)
         for q in range(n_q):
             row = material[c, q]
             density, settled = _respond(
                 constants[row], moduli[row], bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric,
-                stiff, F[q], old[c, q], history, P, A, G,
+                stiff, F[q], ratio[q], G[q], old[c, q], history, P, A,
             )  # fmt: skip
             if not settled:
                 return NO_PLANE_STRESS, c

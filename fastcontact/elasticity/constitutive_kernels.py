@@ -299,13 +299,13 @@ def _saint_venant(D, F, everywhere, P, A):
 
 
 @kernel
-def _add_isochoric(value, first, power, F, J, G, slope, bend, everywhere, P, A):
-    """Add to P and A the terms of an energy of the invariant ``J**-power`` times `value`, except for the value's curvature.
+def _add_isochoric(value, first, power, scale, F, J, G, slope, bend, everywhere, P, A):
+    """Add to P and A the terms of an energy of the invariant `scale` times `value`, except for the value's curvature.
 
-    `first` (3, 3) is the derivative of the value; `slope` and `bend` are derivatives of the energy with respect to the
-    invariant. Return `slope` times ``J**-power``, the factor of the second derivative of the value.
+    `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
+    with respect to the invariant. Return `slope` times `scale`, the factor of the second derivative of the value.
     """
-    scale, along, across = J**-power, first.reshape(9), G.reshape(9)
+    along, across = first.reshape(9), G.reshape(9)
     ratio, factor = power * value / J, slope * scale
     for row in range(9):
         change = along[row] - ratio * across[row]
@@ -335,17 +335,19 @@ def _invariants(constants, F, J, G, everywhere, P, A):
         A[:] = 0.0
     for row in range(9):
         I1 += F[row // 3, row % 3] ** 2
-    x = J ** (-2.0 / 3.0) * I1 - 3.0
+    root = np.cbrt(J)
+    scale = 1.0 / (root * root)
+    x = scale * I1 - 3.0
     slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    factor = _add_isochoric(0.5 * I1, F, 2.0 / 3.0, F, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
+    factor = _add_isochoric(0.5 * I1, F, 2.0 / 3.0, scale, F, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
     for row in range(9 if everywhere else 0):
         A[row, row] += factor
     energy = C10 * x + C20 * x**2 + C30 * x**3
-    return energy if C01 == 0.0 else energy + _second_invariant(C01, I1, F, J, G, everywhere, P, A)
+    return energy if C01 == 0.0 else energy + _second_invariant(C01, I1, scale * scale, F, J, G, everywhere, P, A)
 
 
 @kernel
-def _second_invariant(C01, I1, F, J, G, everywhere, P, A):
+def _second_invariant(C01, I1, scale, F, J, G, everywhere, P, A):
     """Add C01 (I2 - 3) to P and A, see `_invariants`; return its energy density."""
     C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
     right_cauchy_green(F, C)
@@ -354,7 +356,7 @@ def _second_invariant(C01, I1, F, J, G, everywhere, P, A):
             first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
-    factor = _add_isochoric(0.5 * I2, first, 4.0 / 3.0, F, J, G, 2.0 * C01, 0.0, everywhere, P, A)
+    factor = _add_isochoric(0.5 * I2, first, 4.0 / 3.0, scale, F, J, G, 2.0 * C01, 0.0, everywhere, P, A)
     for i in range(3 if everywhere else 0):
         for j in range(3):
             A[3 * i + j, 3 * i + j] += factor * I1
@@ -363,7 +365,7 @@ def _second_invariant(C01, I1, F, J, G, everywhere, P, A):
                 A[3 * i + j, 3 * k + j] -= factor * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
                 for m in range(3):
                     A[3 * i + j, 3 * k + m] += factor * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
-    return C01 * (J ** (-4.0 / 3.0) * I2 - 3.0)
+    return C01 * (scale * I2 - 3.0)
 
 
 @kernel
