@@ -59,24 +59,28 @@ def _at_point(x, u, q, dim, lines, rows, J, inverse, gradient, F):
     n_nodes = len(x)
     first = q * n_nodes
     tile(lines, first, 0, x, 0, 0, n_nodes, J, 0, True)
-    if dim == 2:
-        J[2, 2] = 1.0
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        for m in range(3):
-            n, r = (m + 1) % 3, (m + 2) % 3
-            inverse[m, i] = J[n, j] * J[r, k] - J[n, k] * J[r, j]
-    det = J[0, 0] * inverse[0, 0] + J[0, 1] * inverse[0, 1] + J[0, 2] * inverse[0, 2]
+    j00, j01, j02, j10, j11, j12 = J[0, 0], J[0, 1], J[0, 2], J[1, 0], J[1, 1], J[1, 2]
+    j20, j21, j22 = J[2, 0], J[2, 1], 1.0 if dim == 2 else J[2, 2]
+    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
+    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
+    c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+    det = j00 * c00 + j01 * c01 + j02 * c02
     factor = 1.0 / det
-    for m in range(3):
-        for i in range(3):
-            inverse[m, i] *= factor
+    i00, i01, i02, i10, i11, i12 = factor * c00, factor * c01, factor * c02, factor * c10, factor * c11, factor * c12
+    i20, i21, i22 = factor * c20, factor * c21, factor * c22
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = i00, i01, i02
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = i10, i11, i12
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = i20, i21, i22
     for a in range(0, gradient.shape[1], 4):
         tile(inverse, 0, 0, rows, 3 * q, a, 3, gradient, 3 * q, True)
     tile(lines, first, 0, u, 0, 0, n_nodes, J, 0, True)
     for i in range(3):
-        for j in range(3):
-            F[i, j] = J[0, i] * inverse[0, j] + J[1, i] * inverse[1, j] + J[2, i] * inverse[2, j]
+        r, s, t = J[0, i], J[1, i], J[2, i]
+        F[i, 0], F[i, 1], F[i, 2] = (
+            r * i00 + s * i10 + t * i20,
+            r * i01 + s * i11 + t * i21,
+            r * i02 + s * i12 + t * i22,
+        )
         F[i, i] += 1.0
     return det
 
@@ -433,7 +437,8 @@ def linearise(
                 _keep_tangent(gradient, q, volume[q], A, dim, n_factors, factors_of_pairs, left, right)
                 n_factors += 3
             if inside[0]:
-                new[c, q] = history
+                for e in range(9):
+                    new[c, q, e] = history[e]
                 _cauchy(F[q], P, finite, stress[c, q])
         if inside[0]:
             energy[c, 0], energy[c, 1] = stored, dissipated

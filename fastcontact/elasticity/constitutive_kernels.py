@@ -431,7 +431,8 @@ def respond(constants, D, F, J, G, everywhere, old, new, P, A):
     plastic flow occurs at small strains.
     """
     law = int(constants[0])
-    new[:] = old
+    for e in range(9):
+        new[e] = old[e]
     if law == LINEAR:
         return _linear(D, F, everywhere, P, A)
     if law == PLASTIC:

@@ -100,6 +100,11 @@ class NonlinearBodies:
         return np.ascontiguousarray(rows[self._owner])
 
     @property
+    def yields(self) -> bool:
+        """Whether there is an elastic-plastic law."""
+        return any(isinstance(law, ElasticPlastic) for law in self._materials)
+
+    @property
     def beginning(self) -> History:
         """The history before the first load step."""
         return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
@@ -221,7 +226,7 @@ class NonlinearBodies:
         J, fields = np.ones(self._cells[name].shape), []
         if self.finite:
             J, *fields = self._strains(name, bodies, displacement)
-        if any(isinstance(law, ElasticPlastic) for law in self._materials):
+        if self.yields:
             fields += self._yielding(name, bodies, J)
         return fields
 
