@@ -139,11 +139,13 @@ def _dilatation(F, finite, G):
 @kernel
 def _add_volumetric(F, G, pressure, turning, bulk, tangent, P, A):
     """Add the volumetric part: `pressure` dJ/dF to P; if `tangent`, `bulk` dJ/dF dJ/dF plus `turning` d2J/dF2 to A."""
-    along = G.reshape(9)
-    for row in range(9):
-        P[row // 3, row % 3] += pressure * along[row]
-        for column in range(9 if tangent else 0):
-            A[row, column] += bulk * along[row] * along[column]
+    for i in range(3):
+        for j in range(3):
+            P[i, j] += pressure * G[i, j]
+    for row in range(9 if tangent else 0):  # reshaping G would take longer than the loops
+        factor = bulk * G[row // 3, row % 3]
+        for column in range(9):
+            A[row, column] += factor * G[column // 3, column % 3]
     if turning != 0.0:
         add_second_derivative(F, turning, A)
 

@@ -22,6 +22,8 @@ EQUAL = 1e-7
 CLOSE = 1e-3
 # Sweeps of Jacobi's method, and squared off-diagonal entries over those of the diagonal below which it ends.
 SWEEPS, NEGLIGIBLE = 20, 1e-34
+# Cosine up to which eigenvalues are distinct: its arc then loses at most one digit.
+DISTINCT = 0.99
 
 
 @kernel
@@ -69,8 +71,16 @@ def right_cauchy_green(F, C):
 def extreme_eigenvalues(C):
     """Return the smallest and largest eigenvalue of a symmetric C (3, 3), which is overwritten.
 
-    Jacobi's method (Golub and Van Loan, 2013, section 8.5); three or four sweeps.
+    By a cosine (Smith, 1961) or, where two eigenvalues are so close that its angle has few digits, by Jacobi's method (Golub
+    and Van Loan, 2013, section 8.5), which takes three or four sweeps.
     """
+    mean = (C[0, 0] + C[1, 1] + C[2, 2]) / 3.0
+    x, y, z, a, b, c = C[0, 0] - mean, C[1, 1] - mean, C[2, 2] - mean, C[0, 1], C[1, 2], C[0, 2]
+    size = np.sqrt((x * x + y * y + z * z + 2.0 * (a * a + b * b + c * c)) / 6.0)
+    cubed = 0.5 * (x * (y * z - b * b) - a * (a * z - b * c) + c * (a * b - y * c))
+    if abs(cubed) < DISTINCT * size**3:
+        angle = np.arccos(cubed / size**3) / 3.0
+        return mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * size * np.cos(angle)
     for _ in range(SWEEPS):
         off = C[0, 1] * C[0, 1] + C[0, 2] * C[0, 2] + C[1, 2] * C[1, 2]
         if off <= NEGLIGIBLE * (C[0, 0] * C[0, 0] + C[1, 1] * C[1, 1] + C[2, 2] * C[2, 2]):
@@ -305,18 +315,20 @@ def _add_isochoric(value, first, power, scale, F, J, G, slope, bend, everywhere,
     `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
     with respect to the invariant. Return `slope` times `scale`, the factor of the second derivative of the value.
     """
-    along, across = first.reshape(9), G.reshape(9)
-    ratio, factor = power * value / J, slope * scale
-    for row in range(9):
-        change = along[row] - ratio * across[row]
-        P[row // 3, row % 3] += factor * change
-        if not everywhere:
-            continue
-        by_first = bend * scale * scale * change - factor * power / J * across[row]
-        by_volume = factor * power / J * ((power + 1.0) * value / J * across[row] - along[row])
-        by_volume -= bend * scale * scale * ratio * change
-        for column in range(9):
-            A[row, column] += by_first * along[column] + by_volume * across[column]
+    inverse, factor = power / J, slope * scale
+    ratio, by_volume = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
+    curvature, shrinks = bend * scale * scale, factor * inverse
+    for i in range(3):
+        for j in range(3):
+            change = first[i, j] - ratio * G[i, j]
+            P[i, j] += factor * change
+            if not everywhere:
+                continue
+            along = curvature * change - shrinks * G[i, j]
+            across = by_volume * G[i, j] - shrinks * first[i, j] - curvature * ratio * change
+            for k in range(3):
+                for m in range(3):
+                    A[3 * i + j, 3 * k + m] += along * first[k, m] + across * G[k, m]
     if everywhere:
         add_second_derivative(F, -factor * ratio, A)
     return factor
