@@ -72,10 +72,11 @@ def test_a_parabola_is_continued_once_it_was_closer_than_a_line(loads):
 
     early = on_a_curve(loads[:3], path).to(np.full(2, loads[3]))
     assert np.array_equal(early.predicted(path(3.0)), early.displacement(path(3.0)))  # not known to be closer yet
-    found = on_a_curve(loads, path).to(np.full(2, 4.5))
-    assert found.predicted(path(4.0)) == pytest.approx(path(4.5), rel=1e-13)
-    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[3])).to(np.full(2, 4.5))
-    assert np.array_equal(again.predicted(path(4.0)), found.predicted(path(4.0)))
+    end = loads[3] + 0.5
+    found = on_a_curve(loads, path).to(np.full(2, end))
+    assert found.predicted(path(loads[3])) == pytest.approx(path(end), rel=1e-13)
+    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[3])).to(np.full(2, end))
+    assert np.array_equal(again.predicted(path(loads[3])), found.predicted(path(loads[3])))
 
 
 def test_a_kinked_path_is_continued_along_a_line():
