@@ -223,9 +223,10 @@ class NonlinearBodies:
 
     def _fields(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
         """Return the values (n_cells,) of `field_names` for the cells of an element."""
-        J, fields = np.ones(self._cells[name].shape), []
+        J, fields = np.ones(self._cells[name].shape), list[Array]()
         if self.finite:
-            J, *fields = self._strains(name, bodies, displacement)
+            J, ratio, logarithm = self._strains(name, bodies, displacement)
+            fields = [ratio, logarithm]
         if self.yields:
             fields += self._yielding(name, bodies, J)
         return fields
@@ -246,7 +247,7 @@ class NonlinearBodies:
                 logarithm[rows],
             )  # fmt: skip
 
-        parallel.shared(part, parallel.portions(len(cells), across.shape[1]))
+        parallel.shared(part, parallel.portions(len(cells), len(N)))
         return J, ratio, logarithm
 
     def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:

@@ -91,6 +91,8 @@ class Multigrid:
         If the precision is neither "single" nor "double".
     """
 
+    K: ScaledMatrix
+
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         if precision not in ("single", "double"):
             raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
