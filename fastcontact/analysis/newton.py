@@ -135,7 +135,6 @@ class _Newton:
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
-        self._fresh = False  # whether the last iteration computed its tangent
         self._held = False  # whether the last tangent needed springs along closed gaps
 
     def iterated(self, origin: Array) -> StepEquilibrium:
@@ -194,17 +193,9 @@ class _Newton:
         return max(self._problem.criteria.geometry, UNCHANGED)
 
     def _stands_still(self, changes: list[float]) -> bool:
-        """Return whether relative `changes` leave an error below the criterion, or are round-off.
-
-        The error is the last change times the rate of convergence. With smooth laws, without contact and with its own
-        tangent, Newton's method converges quadratically: then it is C last^2, C = last / before^2.
-        """
+        """Return whether relative `changes` leave an error below the criterion, or are round-off."""
         before, last = changes[-2:]
-        rate = min(last / before, 1.0) if before else 1.0
-        bodies = self._problem.bodies
-        smooth = bodies is not None and not bodies.yields and not self._problem.pairs
-        quadratic = smooth and self._fresh and len(changes) > 2  # the first change is compared with 1
-        error = last * rate * (rate if quadratic else 1.0)
+        error = last * min(last / before, 1.0) if before else last
         return error <= self._enough or (last <= SINGLE_PRECISION and last > STAYS * before)
 
     def _serves_again(self, changes: list[float]) -> bool:
@@ -269,7 +260,6 @@ class _Newton:
         """Return the result of `_solve` for a tangent."""
         terms, iterate = self._terms, self._iterate
         problem, self._kept = (self._kept, None) if self._serves_again(changes) else (None, None)
-        self._fresh = problem is None
         if problem is not None:
             problem = replace(problem, linearised_at=None if problem.linearised_at is None else u)
         else:
