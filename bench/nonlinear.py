@@ -2,7 +2,7 @@
 
 ``python bench/nonlinear.py block PYTHON_WITH_FELUPE [N] [STEPS]``: a neo-Hookean block of N^3 hex8, stretched by a tenth of
 its height and sheared by as much. FElupe uses conjugate gradients with a Jacobi preconditioner, which are faster than its
-default, SuperLU.
+default, SuperLU. Both run in one thread; threads of BLAS would spin and add to FElupe's CPU time.
 
 ``python bench/nonlinear.py indentation [SIZE] [STEPS] [RADIUS]``: a rigid ball of quad8 pressed into an elastic-plastic block
 of quad8, axisymmetric; SIZE is the length of the facets in contact, 0.02 by default, up to RADIUS, 0.6 by default. CalculiX
@@ -12,6 +12,7 @@ uses mortar. The ball has at most 20 cells along the arc: CalculiX 2.20 refuses 
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
 import sys
@@ -134,9 +135,11 @@ def indentation(size: str = "0.02", steps: str = "40", radius: str = "0.6") -> N
 
 
 def timed(command: list[str], folder: Path | None = None) -> tuple[float, float, str]:
-    """Return user CPU and wall time [s] of a process in a folder, and the last line that it prints."""
+    """Return user CPU and wall time [s] of a process in a folder, in one thread, and the last line that it prints."""
     before, begin = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime, time.perf_counter()
-    told = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder).stdout.strip().splitlines()
+    threads = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+    done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder, env=os.environ | threads)
+    told = done.stdout.strip().splitlines()
     after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     return after - before, time.perf_counter() - begin, told[-1] if told else ""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 
 import numpy as np
@@ -52,7 +51,7 @@ def linearised(
     floating = _floating(problem, system, u, rigid, stiff)
     if friction and floating is not None and contact is not None and _holds(contact, floating):
         floating = None
-    solver = copy.copy(problem.solver)
+    solver = problem.solver.near()
     involved = system.involved(problem.contact_dofs)
     modes = problem.force_driven.near_nullspace(near_nullspace(problem.model, problem.displacement(u)))
     involved = prepare_solver(solver, system, floating, modes, involved)

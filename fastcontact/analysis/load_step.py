@@ -111,9 +111,9 @@ def _ended(
     elif start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if problem.extrapolates:
-        end = replace(
-            end, extrapolation=start.extrapolation.converged(u, {} if settled is None else settled.gaps_and_forces)
-        )
+        contact_data = {} if settled is None else settled.gaps_and_forces
+        extrapolation = start.extrapolation.converged(u, contact_data, problem.bodies is not None)
+        end = replace(end, extrapolation=extrapolation)
     if end.work is not None:
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
@@ -149,9 +149,13 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         largest_force=max(state.largest_force, largest(pushing.force)),
     )  # fmt: skip
     if problem.extrapolates:
-        # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads.
-        motions = [] if problem.bodies is None else load.obstacles.values()
-        start = replace(start, extrapolation=state.extrapolation.to(load.lift, pushing.force, *motions))
+        # Displacements of nonlinear bodies are extrapolated along the motions of rigid obstacles as well as along the loads,
+        # from the state at rest on.
+        parts = [load.lift, pushing.force, *(() if problem.bodies is None else load.obstacles.values())]
+        extrapolation = state.extrapolation
+        if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
+            extrapolation = extrapolation.to(*map(np.zeros_like, parts)).converged(state.u, {})
+        start = replace(start, extrapolation=extrapolation.to(*parts))
     return Beginning(start, index, load, loaded, expected)
 
 

@@ -95,7 +95,7 @@ def newton(
     """
     start = begin.state
     if problem.bodies is not None and (before is not None or start.extrapolation.ratio):
-        origin = start.extrapolation.displacement(start.u) if before is None else before.u
+        origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
             return _Newton(problem, begin, load).iterated(origin)
         except ConvergenceError as error:

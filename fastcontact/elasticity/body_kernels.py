@@ -10,10 +10,19 @@ stress-free intermediate configuration (Lu and Pister, 1975).
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
-from fastcontact.elasticity.constitutive_kernels import add_second_derivative, cofactor, determinant, respond, voigt
+from fastcontact.elasticity.constitutive_kernels import (
+    add_second_derivative,
+    cofactor,
+    determinant,
+    extreme_eigenvalues,
+    respond,
+    right_cauchy_green,
+    voigt,
+)
 from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
 from fastcontact.elasticity.element_2d_kernels import TWO_PI, owned
-from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacobian
+from fastcontact.elasticity.element_3d_kernels import add_block
+from fastcontact.elasticity.tile_product import tile
 
 # Largest number of Newton iterations for the out-of-plane strain in plane stress, and tolerance relative to the modulus.
 THROUGH, ENOUGH = 50, 1e-13
@@ -22,38 +31,76 @@ INVERTED, NO_PLANE_STRESS = 1, 2
 
 
 @kernel
-def _gradients(x, N, dN, weights, axisymmetric, J, inverse, at_point, gradient, hoop, volume):
-    """Fill shape derivatives `gradient` (n_q, dim, n_nodes), N / r in `hoop` (n_q, n_nodes), weights `volume` (n_q,)."""
-    for q in range(N.shape[0]):
-        volume[q] = weights[q] * inverse_jacobian(x, dN, q, J, inverse)
-        gradients(dN, q, inverse, at_point)
-        for i in range(x.shape[1]):
-            for a in range(x.shape[0]):
-                gradient[q, i, a] = at_point[a, i]
-        if axisymmetric:
-            radius = 0.0
-            for a in range(x.shape[0]):
-                radius += N[q, a] * x[a, 0]
-            volume[q] *= TWO_PI * radius
-            for a in range(x.shape[0]):
-                hoop[q, a] = N[q, a] / radius
+def _tables(dN, lines, rows):
+    """Fill derivatives (n_q, n_nodes, dim) into `lines` (n_q * n_nodes, 4) and, by components, `rows` (n_q * 3, width)."""
+    n_q, n_nodes, dim = dN.shape
+    lines[:], rows[:] = 0.0, 0.0
+    for q in range(n_q):
+        for a in range(n_nodes):
+            for i in range(dim):
+                lines[q * n_nodes + a, i] = rows[3 * q + i, a] = dN[q, a, i]
 
 
 @kernel
-def _deformation(u, gradient, hoop, F):
-    """Fill F (3, 3) from displacements u (n_nodes, dim) and shape derivatives (dim, n_nodes)."""
-    F[:] = 0.0
-    F[0, 0] = F[1, 1] = F[2, 2] = 1.0
-    for a in range(u.shape[0]):
-        for i in range(u.shape[1]):
-            for j in range(u.shape[1]):
-                F[i, j] += u[a, i] * gradient[j, a]
-        F[2, 2] += u[a, 0] * hoop[a]
+def _gather(values, cells, c, x):
+    """Fill `x` (n_nodes, 4) with the vectors of `values` (n_points, dim) at the nodes of cell `c`."""
+    for a in range(cells.shape[1]):
+        p = cells[c, a]
+        for i in range(values.shape[1]):
+            x[a, i] = values[p, i]
 
 
 @kernel
-def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
-    """Remove the thermal expansion from F, the shape derivatives `gradient` (dim, n_nodes) and `hoop` (n_nodes,), in place.
+def _at_point(x, u, q, dim, lines, rows, J, inverse, gradient, F):
+    """Fill the rows from 3 q on of `gradient` (n_q * 3 + 1, width) and F (3, 3); return det J.
+
+    `x` and `u` (n_nodes, 4) are positions and displacements of the nodes. J (4, 4) and `inverse` (3, 4) are overwritten.
+    """
+    n_nodes = len(x)
+    first = q * n_nodes
+    tile(lines, first, 0, x, 0, 0, n_nodes, J, 0, True)
+    j00, j01, j02, j10, j11, j12 = J[0, 0], J[0, 1], J[0, 2], J[1, 0], J[1, 1], J[1, 2]
+    j20, j21, j22 = J[2, 0], J[2, 1], 1.0 if dim == 2 else J[2, 2]
+    c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
+    c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
+    c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
+    det = j00 * c00 + j01 * c01 + j02 * c02
+    factor = 1.0 / det
+    i00, i01, i02, i10, i11, i12 = factor * c00, factor * c01, factor * c02, factor * c10, factor * c11, factor * c12
+    i20, i21, i22 = factor * c20, factor * c21, factor * c22
+    inverse[0, 0], inverse[0, 1], inverse[0, 2] = i00, i01, i02
+    inverse[1, 0], inverse[1, 1], inverse[1, 2] = i10, i11, i12
+    inverse[2, 0], inverse[2, 1], inverse[2, 2] = i20, i21, i22
+    for a in range(0, gradient.shape[1], 4):
+        tile(inverse, 0, 0, rows, 3 * q, a, 3, gradient, 3 * q, True)
+    tile(lines, first, 0, u, 0, 0, n_nodes, J, 0, True)
+    for i in range(3):
+        r, s, t = J[0, i], J[1, i], J[2, i]
+        F[i, 0], F[i, 1], F[i, 2] = (
+            r * i00 + s * i10 + t * i20,
+            r * i01 + s * i11 + t * i21,
+            r * i02 + s * i12 + t * i22,
+        )
+        F[i, i] += 1.0
+    return det
+
+
+@kernel
+def _about_axis(x, u, N, q, gradient, F):
+    """Fill the third row of `gradient` of point q with N / r, add the hoop strain to F, and return 2 pi r."""
+    radius = hoop = 0.0
+    for a in range(len(x)):
+        radius += N[q, a] * x[a, 0]
+        hoop += N[q, a] * u[a, 0]
+    for a in range(len(x)):
+        gradient[3 * q + 2, a] = N[q, a] / radius
+    F[2, 2] += hoop / radius
+    return TWO_PI * radius
+
+
+@kernel
+def _expanded(strain, N, cell, rise, finite, F, gradient):
+    """Remove the expansion by a `rise` (n_points,) from F and shape derivatives (3, width), in place.
 
     `rise` (n_points,) is the temperature rise, and `strain` (6,) the thermal strain per degree, with engineering shears.
     Returns the thermal volume ratio and the thermal stretch along z.
@@ -74,9 +121,7 @@ def _expanded(strain, N, cell, rise, finite, F, gradient, hoop):
     ratio = determinant(U)
     inverse /= ratio
     F[:] = F @ inverse
-    dim = gradient.shape[0]
-    gradient[:] = np.ascontiguousarray(inverse[:dim, :dim].T) @ gradient
-    hoop *= inverse[2, 2]
+    gradient[:] = np.ascontiguousarray(inverse.T) @ gradient
     return ratio, U[2, 2]
 
 
@@ -94,11 +139,13 @@ def _dilatation(F, finite, G):
 @kernel
 def _add_volumetric(F, G, pressure, turning, bulk, tangent, P, A):
     """Add the volumetric parts `pressure` dJ/dF to P and, if `tangent`, `bulk` dJ/dF dJ/dF + `turning` d2J/dF2 to A."""
-    along = G.reshape(9)
-    for row in range(9):
-        P[row // 3, row % 3] += pressure * along[row]
-        for column in range(9 if tangent else 0):
-            A[row, column] += bulk * along[row] * along[column]
+    for i in range(3):
+        for j in range(3):
+            P[i, j] += pressure * G[i, j]
+    for row in range(9 if tangent else 0):  # reshaping G would take longer than the loops
+        factor = bulk * G[row // 3, row % 3]
+        for column in range(9):
+            A[row, column] += factor * G[column // 3, column % 3]
     if turning != 0.0:
         add_second_derivative(F, turning, A)
 
@@ -147,22 +194,23 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
 
 
 @kernel
-def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, old, new, P, A, G):
+def _respond(
+    constants, D, bulk, pressure, thicker, plane_stress, finite, geometric, everywhere, F, J, G, old, new, P, A
+):
     """Fill the history `new` (9,), P and A of a point; return its energy density, and whether plane stress converged.
 
-    `pressure` is the pressure of the projected dilatation and `bulk` the bulk modulus of its remainder. The other arguments
-    are those of `linearise`, `_through` and `respond`.
+    `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder, J and G (3, 3) are the dilatation
+    and its derivative; see `linearise`, `_through` and, for `everywhere`, `respond`.
     """
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
         if finite and geometric == 0:
             _leave_out_initial_stress(G, determinant(F), P, 0.0, A)
         return energy, settled
-    J = _dilatation(F, finite, G)
     energy = respond(constants, D, F, J, G, everywhere, old, new, P, A) + 0.5 * bulk * (J - 1.0) ** 2
     pressure += bulk * (J - 1.0)
-    turning = pressure if finite and geometric == 2 else 0.0
-    if finite and geometric == 0:
+    turning = pressure if finite and geometric == 2 and everywhere else 0.0
+    if finite and geometric == 0 and everywhere:
         turning = min(pressure, 0.0)
         _leave_out_initial_stress(G, J, P, turning, A)
     _add_volumetric(F, G, pressure, turning, bulk, everywhere or new[6] > old[6], P, A)
@@ -173,47 +221,61 @@ def _respond(constants, D, bulk, pressure, thicker, plane_stress, finite, geomet
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
     """Subtract the elastic tangent at small strains from A (9, 9), without the part of the projected dilatation."""
     none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
-    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, np.eye(3), none, new, P, of_elasticity, G)
+    F = np.eye(3)
+    J = _dilatation(F, False, G)
+    _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, F, J, G, none, new, P, of_elasticity)
     A -= of_elasticity
 
 
 @kernel
-def _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected):
+def _add_forces(gradient, q, weight, P, dim, factors, out, row):
+    """Add the nodal forces of point q to the rows from `row` on of `out` (n_rows, width); `factors` (3, 4) is work space.
+
+    The third row of shape derivatives is that along z or, about an axis, N / r, which belongs to the radial displacement.
+    """
+    for i in range(3):
+        factors[0, i], factors[1, i], factors[2, i] = weight * P[i, 0], weight * P[i, 1], weight * P[i, 2]
+    if dim == 2:
+        factors[2, 0], factors[0, 2], factors[1, 2], factors[2, 2] = weight * P[2, 2], 0.0, 0.0, 0.0
+    for a in range(0, gradient.shape[1], 4):
+        tile(factors, 0, 0, gradient, 3 * q, a, 3, out, row, False)
+
+
+@kernel
+def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected, slopes):
     """Project the dilatation of a cell on polynomials.
 
-    Fills the Cholesky factor `mass` (m, m) of the mass matrix of the polynomials, and `projected` with the coefficients of
-    the dilatation in the orthonormalised polynomials. The columns of `projected` (m, n_nodes * dim + 1) are the derivatives
-    by the displacements of all nodes along x, then along y and z, and the coefficients. With a single column, it contains
-    the coefficients only.
+    J (n_q,) are one plus the dilatation, and G (n_q, 3, 3) its derivatives. `projected` (m, 1) is the dilatation, `slopes`
+    (4 m, width) are its derivatives by displacements, four rows for each polynomial, computed if `slopes` is not empty.
     """
-    n_q, dim, n_nodes = gradient.shape
-    last = projected.shape[1] - 1
-    mass[:], projected[:] = 0.0, 0.0
-    for q in range(n_q):
-        J = _dilatation(F[q], finite, G)
-        for k in range(polynomials.shape[1]):
+    m = len(mass)
+    mass[:], projected[:], slopes[:] = 0.0, 0.0, 0.0
+    for q in range(len(volume)):
+        for k in range(m):
             share = volume[q] * polynomials[q, k]
             for n in range(k + 1):
                 mass[k, n] += share * polynomials[q, n]
-            projected[k, last] += share * (J - 1.0)
-            if last == 0:
-                continue
-            for i in range(dim):
-                for j in range(dim):
-                    for a in range(n_nodes):
-                        projected[k, i * n_nodes + a] += share * G[i, j] * gradient[q, j, a]
-            for a in range(n_nodes):
-                projected[k, a] += share * G[2, 2] * hoop[q, a]
+            projected[k, 0] += share * (J[q] - 1.0)
+            if len(slopes):
+                _add_forces(gradient, q, share, G[q], dim, factors, slopes, 4 * k)
     reduce(mass, projected)
+    for k in range(m if len(slopes) else 0):
+        for n in range(k):
+            for i in range(4):
+                for a in range(slopes.shape[1]):
+                    slopes[4 * k + i, a] -= mass[k, n] * slopes[4 * n + i, a]
+        for i in range(4):
+            for a in range(slopes.shape[1]):
+                slopes[4 * k + i, a] /= mass[k, k]
 
 
 @kernel
 def _pressures(bulk, polynomials, mass, projected, pressure):
     """Fill the `pressure` (n_q,) of the projected dilatation and return the energy of the projected dilatation."""
-    m, last = projected.shape
+    m = len(projected)
     coefficients, energy = np.empty(m), 0.0
     for k in range(m):
-        coefficients[k] = projected[k, last - 1]
+        coefficients[k] = projected[k, 0]
         energy += 0.5 * bulk * coefficients[k] ** 2
     back_substitute(mass, coefficients)
     for q in range(polynomials.shape[0]):
@@ -224,49 +286,50 @@ def _pressures(bulk, polynomials, mass, projected, pressure):
 
 
 @kernel
-def _add_projected_tangent(bulk, projected, local):
-    """Add the stiffness of the projected dilatation to `local`, whose layout is that of `_add_tangent`."""
-    n_nodes, dim = local.shape[0], local.shape[1]
-    for b in range(n_nodes):
-        for k in range(dim):
-            for n in range(projected.shape[0]):
-                factor = bulk * projected[n, k * n_nodes + b]
-                for i in range(dim):
-                    for a in range(b + 1):
-                        local[b, k, i, a] += factor * projected[n, i * n_nodes + a]
+def _keep_tangent(gradient, q, weight, A, dim, n, factors, left, right):
+    """Fill the rows from n on of the factors of the stiffness, for `_stiffness`, with those of point q.
 
-
-@kernel
-def _add_tangent(gradient, hoop, weight, A, product, local):
-    """Add the tangent of a quadrature point to `local` (n_nodes b, dim k, dim i, n_nodes a) for a <= b.
-
-    The change of P due to component k of node b is the product of columns of A with the shape derivatives of the node, of
-    which the third one is along z or, in 2D, the hoop direction. `product` (9,) is work space.
+    `left` (3 n_q, width) are weighted shape derivatives. The stress change due to component k of a node is a column of A
+    times its shape derivatives; its product with component i of the others is in `right` (n_pairs * (3 n_q + 1), width), for
+    the pairs i <= k. `factors` (3, 4 n_pairs) is work space.
     """
-    dim, n_nodes = gradient.shape
-    in_space, third = dim == 3, gradient[2] if dim == 3 else hoop
-    for b in range(n_nodes):
-        x, y, z = weight * gradient[0, b], weight * gradient[1, b], weight * third[b]
-        for k in range(dim):
-            column, last = (3 * k + 2, z) if in_space else (8, z if k == 0 else 0.0)
-            for row in range(9):
-                product[row] = A[row, 3 * k] * x + A[row, 3 * k + 1] * y + A[row, column] * last
-            for i in range(dim):
-                first, second = product[3 * i], product[3 * i + 1]
-                rest = product[3 * i + 2] if in_space else (product[8] if i == 0 else 0.0)
-                for a in range(b + 1):
-                    local[b, k, i, a] += first * gradient[0, a] + second * gradient[1, a] + rest * third[a]
+    step, pair = len(left) + 1, 0
+    for row in range(3):
+        for a in range(left.shape[1]):
+            left[n + row, a] = weight * gradient[3 * q + row, a]
+    for k in range(dim):
+        for i in range(k + 1):
+            last, scale = (3 * i + 2, 1.0) if dim == 3 else (8, 1.0 if i == 0 else 0.0)
+            for row in range(3):
+                column, by = 3 * k + row, 1.0
+                if dim == 2 and row == 2:
+                    column, by = 8, 1.0 if k == 0 else 0.0
+                factors[0, 4 * pair + row] = by * A[3 * i, column]
+                factors[1, 4 * pair + row] = by * A[3 * i + 1, column]
+                factors[2, 4 * pair + row] = by * scale * A[last, column]
+            for a in range(0, left.shape[1], 4):
+                tile(factors, 0, 4 * pair, gradient, 3 * q, a, 3, right, pair * step + n, True)
+            pair += 1
 
 
 @kernel
-def _forces(gradient, hoop, weight, P, forces):
-    """Add the nodal forces of a quadrature point to `forces` (dim, n_nodes)."""
-    for i in range(gradient.shape[0]):
-        for j in range(gradient.shape[0]):
-            for a in range(gradient.shape[1]):
-                forces[i, a] += weight * P[i, j] * gradient[j, a]
-    for a in range(gradient.shape[1]):
-        forces[0, a] += weight * P[2, 2] * hoop[a]
+def _stiffness(left, right, n, dim, bulk, slopes, local):
+    """Fill the stiffness `local` (n_pairs * width, width) from n rows of factors and the projected dilatation.
+
+    A pair i <= k has the rows of nodes b, component k, and the columns of nodes a, component i; if i = k only tiles up to
+    the diagonal are filled.
+    """
+    step, width, pair = len(left) + 1, left.shape[1], 0
+    weighted = bulk * slopes
+    for k in range(dim):
+        for i in range(k + 1):
+            for b in range(0, width, 4):
+                for a in range(0, b + 4 if i == k else width, 4):
+                    at = pair * width + b
+                    tile(left, 0, b, right, pair * step, a, n, local, at, True)
+                    for m in range(0, len(weighted), 4):
+                        tile(weighted, m + k, b, slopes, m + i, a, 1, local, at, False)
+            pair += 1
 
 
 @kernel
@@ -286,21 +349,26 @@ def _cauchy(F, P, finite, out):
 
 @kernel
 def _assemble(local, slots, inside, data):
-    """Add the stiffness of a cell to `data` (n_blocks, dim, dim), in the rows of nodes that are `inside`.
+    """Add the stiffness of a cell, see `_stiffness`, to `data` (n_blocks, dim, dim), in the rows of nodes that are `inside`.
 
-    Up to round-off, the block of a node pair is the transpose of the opposite block, and diagonal blocks are symmetric.
+    The block of a node pair is the transpose of the opposite one, and a diagonal block is symmetric.
     """
-    n_nodes, dim = local.shape[0], local.shape[1]
+    n_nodes, dim, width, flat = len(slots), data.shape[1], local.shape[1], data.reshape(-1)
     for b in range(n_nodes):
         for a in range(b + 1):
-            upper, lower = slots[a, b], slots[b, a]
-            for i in range(dim):
-                for k in range(dim):
-                    value = local[b, k, i, a] if a != b or i <= k else local[b, i, k, a]
-                    if inside[a]:
-                        data[upper, i, k] += value
-                    if a != b and inside[b]:
-                        data[lower, k, i] += value
+            upper, lower, at_upper, at_lower = slots[a, b], slots[b, a], inside[a], inside[b]
+            xx, xy, yx, yy = local[b, a], local[width + b, a], local[width + a, b], local[2 * width + b, a]
+            if dim == 3:
+                xz, zx = local[3 * width + b, a], local[3 * width + a, b]
+                yz, zy, zz = local[4 * width + b, a], local[4 * width + a, b], local[5 * width + b, a]
+                add_block(flat, at_upper, at_lower, upper, lower, (xx, xy, xz, yx, yy, yz, zx, zy, zz))
+                continue
+            if at_upper:
+                for e, value in enumerate((xx, xy, yx, yy)):
+                    flat[4 * upper + e] += value
+            if a != b and at_lower:
+                for e, value in enumerate((xx, yx, xy, yy)):
+                    flat[4 * lower + e] += value
 
 
 @kernel
@@ -323,57 +391,58 @@ def linearise(
     """
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
-    gradient, hoop, volume = np.empty((n_q, dim, n_nodes)), np.zeros((n_q, n_nodes)), np.empty(n_q)
-    x, u, at_point = np.empty((n_nodes, dim)), np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
-    jacobian, inverse = np.empty((dim, dim)), np.empty((dim, dim))
-    F, G, thicker, pressure = np.empty((n_q, 3, 3)), np.empty((3, 3)), np.ones(n_q), np.empty(n_q)
-    P, A, product, history = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(9)
-    local, forces = np.empty((n_nodes, dim, dim, n_nodes)), np.empty((dim, n_nodes))
-    mass, projected, inside = (
-        np.empty((m, m)),
-        np.empty((m, 1 if elastic else n_nodes * dim + 1)),
-        np.empty(n_nodes, np.bool_),
-    )
+    stiff, width, n_pairs = tangent and not elastic, -(-n_nodes // 4) * 4, dim * (dim + 1) // 2
+    lines, of_reference = np.empty((n_q * n_nodes, 4)), np.empty((3 * n_q, width))
+    _tables(dN, lines, of_reference)
+    x, u, J, inverse = np.zeros((n_nodes, 4)), np.zeros((n_nodes, 4)), np.empty((4, 4)), np.zeros((3, 4))
+    gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
+    F, G, ratio, thicker = np.empty((n_q, 3, 3)), np.empty((n_q, 3, 3)), np.empty(n_q), np.ones(n_q)
+    pressure = np.empty(n_q)
+    P, A, history, inside = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(n_nodes, np.bool_)
+    left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
+    factors, factors_of_pairs, local = np.zeros((3, 4)), np.zeros((3, 4 * n_pairs)), np.empty((n_pairs * width, width))
+    mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):
             continue
-        at_nodes(points, cells, c, x)
-        at_nodes(displacement, cells, c, u)
-        _gradients(x, N, dN, weights, axisymmetric, jacobian, inverse, at_point, gradient, hoop, volume)
+        _gather(points, cells, c, x)
+        _gather(displacement, cells, c, u)
         for q in range(n_q):
-            _deformation(u, gradient[q], hoop[q], F[q])
+            volume[q] = weights[q] * _at_point(x, u, q, dim, lines, of_reference, J, inverse, gradient, F[q])
+            if axisymmetric:
+                volume[q] *= _about_axis(x, u, N, q, gradient, F[q])
             if len(rise):
-                strain = expansion[material[c, q]]
-                ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[q], hoop[q])
-                volume[q] *= ratio
-            if finite and not determinant(F[q]) > 0.0:
+                strain, rows = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
+                expansion_ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[rows])
+                volume[q] *= expansion_ratio
+            ratio[q] = _dilatation(F[q], finite, G[q])
+            if finite and not ratio[q] > 0.0:
                 return INVERTED, c
-        local[:], forces[:], pressure[:] = 0.0, 0.0, 0.0
-        stored, dissipated, mean, stiffens = 0.0, 0.0, bulk[material[c, 0], 0], tangent and not elastic
+        forces[:], pressure[:] = 0.0, 0.0
+        stored, dissipated, mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
         if mean > 0.0:
-            _project(polynomials, volume, gradient, hoop, finite, F, G, mass, projected)
+            _project(polynomials, volume, gradient, dim, ratio, G, factors, mass, projected, slopes)
             stored += _pressures(mean, polynomials, mass, projected, pressure)
-            if tangent and not elastic:
-                _add_projected_tangent(mean, projected, local)
         for q in range(n_q):
             row = material[c, q]
             density, settled = _respond(
                 constants[row], moduli[row], bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric,
-                not elastic, F[q], old[c, q], history, P, A, G,
+                stiff, F[q], ratio[q], G[q], old[c, q], history, P, A,
             )  # fmt: skip
             if not settled:
                 return NO_PLANE_STRESS, c
             stored += volume[q] * density
             dissipated += volume[q] * history[7]
-            _forces(gradient[q], hoop[q], volume[q], P, forces)
+            _add_forces(gradient, q, volume[q], P, dim, factors, forces, 0)
             flows = history[6] > old[c, q, 6]
             if tangent and elastic and flows:
                 _subtract_elastic(constants[row], moduli[row], bulk[row, 1], plane_stress, A)
             if tangent and (flows or not elastic):
-                _add_tangent(gradient[q], hoop[q], volume[q], A, product, local)
-                stiffens = True
+                _keep_tangent(gradient, q, volume[q], A, dim, n_factors, factors_of_pairs, left, right)
+                n_factors += 3
             if inside[0]:
-                new[c, q] = history
+                for e in range(9):
+                    new[c, q, e] = history[e]
                 _cauchy(F[q], P, finite, stress[c, q])
         if inside[0]:
             energy[c, 0], energy[c, 1] = stored, dissipated
@@ -381,6 +450,39 @@ def linearise(
             if inside[b]:
                 for i in range(dim):
                     force[cells[c, b], i] += forces[i, b]
-        if stiffens:
+        if n_factors:
+            _stiffness(left, right, n_factors, dim, mean, slopes if mean > 0.0 else slopes[:0], local)
             _assemble(local, slots[c], inside, data)
     return 0, -1
+
+
+@kernel
+def strains(points, cells, N, dN, weights, axisymmetric, across, displacement, J, ratio, logarithm):
+    """Fill J (n_cells, n_q), the volume `ratio` (n_cells,), and the principal logarithmic strain of largest magnitude.
+
+    `across` (n_cells, n_q) are the strains of F along z in plane stress, zero otherwise; `logarithm` (n_cells,) are
+    extremes over the points of a cell.
+    """
+    n_nodes, dim, n_q, F = cells.shape[1], points.shape[1], len(N), np.empty((3, 3))
+    lines, of_reference = np.empty((n_q * n_nodes, 4)), np.empty((3 * n_q, -(-n_nodes // 4) * 4))
+    _tables(dN, lines, of_reference)
+    x, u, jacobian, inverse = np.zeros((n_nodes, 4)), np.zeros((n_nodes, 4)), np.empty((4, 4)), np.zeros((3, 4))
+    gradient, C = np.empty((3 * n_q + 1, of_reference.shape[1])), np.empty((3, 3))
+    for c in range(len(cells)):
+        _gather(points, cells, c, x)
+        _gather(displacement, cells, c, u)
+        least, most, before, after = np.inf, 0.0, 0.0, 0.0
+        for q in range(n_q):
+            volume = weights[q] * _at_point(x, u, q, dim, lines, of_reference, jacobian, inverse, gradient, F)
+            if axisymmetric:
+                volume *= _about_axis(x, u, N, q, gradient, F)
+            F[2, 2] += across[c, q]
+            J[c, q] = determinant(F)
+            before += volume
+            after += volume * J[c, q]
+            right_cauchy_green(F, C)
+            low, high = extreme_eigenvalues(C)
+            least, most = min(least, low), max(most, high)
+        ratio[c] = after / before
+        least, most = 0.5 * np.log(least), 0.5 * np.log(most)
+        logarithm[c] = most if most >= -least else least

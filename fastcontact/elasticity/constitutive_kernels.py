@@ -20,6 +20,10 @@ YIELDING = 1e-12
 EQUAL = 1e-7
 # The same for second divided differences, for which a series is used below it.
 CLOSE = 1e-3
+# Sweeps of Jacobi's method, and squared off-diagonal entries over those of the diagonal below which it ends.
+SWEEPS, NEGLIGIBLE = 20, 1e-34
+# Cosine up to which eigenvalues are distinct: its arc then loses at most one digit.
+DISTINCT = 0.99
 
 
 @kernel
@@ -56,11 +60,47 @@ def add_second_derivative(F, factor, A):
 
 
 @kernel
-def _right_cauchy_green(F, C):
+def right_cauchy_green(F, C):
     """Fill C (3, 3) with F^T F."""
     for i in range(3):
         for j in range(3):
             C[i, j] = F[0, i] * F[0, j] + F[1, i] * F[1, j] + F[2, i] * F[2, j]
+
+
+@kernel
+def extreme_eigenvalues(C):
+    """Return the smallest and largest eigenvalue of a symmetric C (3, 3), which is overwritten.
+
+    By a cosine (Smith, 1961) or, where two eigenvalues are so close that its angle has few digits, by Jacobi's method (Golub
+    and Van Loan, 2013, section 8.5), which takes three or four sweeps.
+    """
+    mean = (C[0, 0] + C[1, 1] + C[2, 2]) / 3.0
+    x, y, z, a, b, c = C[0, 0] - mean, C[1, 1] - mean, C[2, 2] - mean, C[0, 1], C[1, 2], C[0, 2]
+    size = np.sqrt((x * x + y * y + z * z + 2.0 * (a * a + b * b + c * c)) / 6.0)
+    cubed = 0.5 * (x * (y * z - b * b) - a * (a * z - b * c) + c * (a * b - y * c))
+    if abs(cubed) < DISTINCT * size**3:
+        angle = np.arccos(cubed / size**3) / 3.0
+        return mean + 2.0 * size * np.cos(angle + 2.0 * np.pi / 3.0), mean + 2.0 * size * np.cos(angle)
+    for _ in range(SWEEPS):
+        off = C[0, 1] * C[0, 1] + C[0, 2] * C[0, 2] + C[1, 2] * C[1, 2]
+        if off <= NEGLIGIBLE * (C[0, 0] * C[0, 0] + C[1, 1] * C[1, 1] + C[2, 2] * C[2, 2]):
+            break
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            i, j = min(i, j), max(i, j)
+            if C[i, j] == 0.0:
+                continue
+            tau = (C[j, j] - C[i, i]) / (2.0 * C[i, j])
+            t = (1.0 if tau >= 0.0 else -1.0) / (abs(tau) + np.sqrt(1.0 + tau * tau))
+            cosine = 1.0 / np.sqrt(1.0 + t * t)
+            sine = t * cosine
+            C[i, i] -= t * C[i, j]
+            C[j, j] += t * C[i, j]
+            C[i, j] = 0.0
+            one, two = (min(i, k), max(i, k)), (min(j, k), max(j, k))
+            first, second = C[one], C[two]
+            C[one], C[two] = cosine * first - sine * second, sine * first + cosine * second
+    return min(C[0, 0], C[1, 1], C[2, 2]), max(C[0, 0], C[1, 1], C[2, 2])
 
 
 @kernel
@@ -167,15 +207,19 @@ def _plastic(constants, F, everywhere, old, new, P, A):
 
 
 @kernel
-def _pushed(F, S, C, P, A):
-    """Fill P and A from the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) w.r.t. Green-Lagrange strains."""
+def _rotate(F, S, P):
+    """Fill P with F times the second Piola-Kirchhoff stress S (3, 3)."""
+    for i in range(3):
+        for j in range(3):
+            P[i, j] = F[i, 0] * S[0, j] + F[i, 1] * S[1, j] + F[i, 2] * S[2, j]
+
+
+@kernel
+def _pushed(F, S, C, A):
+    """Fill A from the second Piola-Kirchhoff stress S (3, 3) and its moduli C (9, 9) w.r.t. Green-Lagrange strains."""
     half = np.empty((9, 9))
     for i in range(3):
         for j in range(3):
-            value = 0.0
-            for k in range(3):
-                value += F[i, k] * S[k, j]
-            P[i, j] = value
             for column in range(9):
                 value = 0.0
                 for k in range(3):
@@ -208,14 +252,14 @@ def _bend(x, y, z):
 
 
 @kernel
-def _logarithmic(constants, F, old, new, P, A):
+def _logarithmic(constants, F, everywhere, old, new, P, A):
     """Apply plasticity in the space of logarithmic strains (Miehe, Apel and Lambrecht, 2002); return the elastic energy.
 
     `_plastic` relates the strain ln(F^T F) / 2 and its conjugate stress T. Derivatives of the strain in principal axes are
     divided differences (Daleckii and Krein).
     """
     C, T, D, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9))
-    _right_cauchy_green(F, C)
+    right_cauchy_green(F, C)
     squared, axes = np.linalg.eigh(C)
     energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, old, new, T, D)
     slope = np.empty((3, 3))
@@ -226,6 +270,10 @@ def _logarithmic(constants, F, old, new, P, A):
                 for j in range(3):
                     turn[3 * i + j, 3 * a + b] = axes[i, a] * axes[j, b]
     T, factor = axes.T @ T @ axes, slope.reshape(9)
+    S = axes @ (slope * T) @ axes.T
+    _rotate(F, S, P)
+    if not everywhere:
+        return energy
     moduli = turn.T @ D @ turn * factor
     moduli *= factor.reshape(9, 1)
     for a in range(3):
@@ -237,79 +285,91 @@ def _logarithmic(constants, F, old, new, P, A):
                     for column in (3 * b + c, 3 * c + b):
                         moduli[row, column] += value
                         moduli[column, row] += value
-    _pushed(F, axes @ (slope * T) @ axes.T, turn @ moduli @ turn.T, P, A)
+    _pushed(F, S, turn @ moduli @ turn.T, A)
     return energy
 
 
 @kernel
-def _saint_venant(D, F, P, A):
+def _saint_venant(D, F, everywhere, P, A):
     """Apply Hooke's law to Green-Lagrange strain and second Piola-Kirchhoff stress; return the energy density."""
     strain, S, C = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
-    _right_cauchy_green(F, strain)
+    right_cauchy_green(F, strain)
     strain *= 0.5
     for i in range(3):
         strain[i, i] -= 0.5
     energy = _hooke(D, strain, S)
+    _rotate(F, S, P)
+    if not everywhere:
+        return energy
     for row in range(9):
         for column in range(9):
             C[row, column] = D[voigt(row // 3, row % 3), voigt(column // 3, column % 3)]
-    _pushed(F, S, C, P, A)
+    _pushed(F, S, C, A)
     return energy
 
 
 @kernel
-def _add_isochoric(value, first, power, F, J, G, slope, bend, P, A):
-    """Add to P and A the terms of an energy of the invariant ``J**-power`` times `value`, except for the value's curvature.
+def _add_isochoric(value, first, power, scale, F, J, G, slope, bend, everywhere, P, A):
+    """Add to P and A the terms of an energy of the invariant `scale` times `value`, except for the value's curvature.
 
-    `first` (3, 3) is the derivative of the value; `slope` and `bend` are derivatives of the energy with respect to the
-    invariant. Return `slope` times ``J**-power``, the factor of the second derivative of the value.
+    `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
+    with respect to the invariant. Return `slope` times `scale`, the factor of the second derivative of the value.
     """
-    scale, along, across = J**-power, first.reshape(9), G.reshape(9)
-    ratio, factor = power * value / J, slope * scale
-    for row in range(9):
-        change = along[row] - ratio * across[row]
-        P[row // 3, row % 3] += factor * change
-        by_first = bend * scale * scale * change - factor * power / J * across[row]
-        by_volume = factor * power / J * ((power + 1.0) * value / J * across[row] - along[row])
-        by_volume -= bend * scale * scale * ratio * change
-        for column in range(9):
-            A[row, column] += by_first * along[column] + by_volume * across[column]
-    add_second_derivative(F, -factor * ratio, A)
+    inverse, factor = power / J, slope * scale
+    ratio, by_volume = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
+    curvature, shrinks = bend * scale * scale, factor * inverse
+    for i in range(3):
+        for j in range(3):
+            change = first[i, j] - ratio * G[i, j]
+            P[i, j] += factor * change
+            if not everywhere:
+                continue
+            along = curvature * change - shrinks * G[i, j]
+            across = by_volume * G[i, j] - shrinks * first[i, j] - curvature * ratio * change
+            for k in range(3):
+                for m in range(3):
+                    A[3 * i + j, 3 * k + m] += along * first[k, m] + across * G[k, m]
+    if everywhere:
+        add_second_derivative(F, -factor * ratio, A)
     return factor
 
 
 @kernel
-def _invariants(constants, F, J, G, P, A):
+def _invariants(constants, F, J, G, everywhere, P, A):
     """Apply a polynomial law of the isochoric invariants; return the energy density.
 
     The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3); see Rivlin and Saunders (1951) and Yeoh
     (1993). `_add_isochoric` is called with half of each invariant; the derivative of I1 / 2 is F.
     """
     C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
-    P[:], A[:], I1 = 0.0, 0.0, 0.0
+    P[:], I1 = 0.0, 0.0
+    if everywhere:
+        A[:] = 0.0
     for row in range(9):
         I1 += F[row // 3, row % 3] ** 2
-    x = J ** (-2.0 / 3.0) * I1 - 3.0
+    root = np.cbrt(J)
+    scale = 1.0 / (root * root)
+    x = scale * I1 - 3.0
     slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    factor = _add_isochoric(0.5 * I1, F, 2.0 / 3.0, F, J, G, 2.0 * slope, 4.0 * bend, P, A)
-    for row in range(9):
+    factor = _add_isochoric(0.5 * I1, F, 2.0 / 3.0, scale, F, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
+    for row in range(9 if everywhere else 0):
         A[row, row] += factor
     energy = C10 * x + C20 * x**2 + C30 * x**3
-    return energy if C01 == 0.0 else energy + _second_invariant(C01, I1, F, J, G, P, A)
+    return energy if C01 == 0.0 else energy + _second_invariant(C01, I1, scale * scale, F, J, G, everywhere, P, A)
 
 
 @kernel
-def _second_invariant(C01, I1, F, J, G, P, A):
+def _second_invariant(C01, I1, scale, F, J, G, everywhere, P, A):
     """Add C01 (I2 - 3) to P and A, see `_invariants`; return its energy density."""
     C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
-    _right_cauchy_green(F, C)
+    right_cauchy_green(F, C)
     for i in range(3):
         for j in range(3):
             first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
-    factor = _add_isochoric(0.5 * I2, first, 4.0 / 3.0, F, J, G, 2.0 * C01, 0.0, P, A)
-    for i in range(3):
+    factor = _add_isochoric(0.5 * I2, first, 4.0 / 3.0, scale, F, J, G, 2.0 * C01, 0.0, everywhere, P, A)
+    for i in range(3 if everywhere else 0):
         for j in range(3):
             A[3 * i + j, 3 * i + j] += factor * I1
             for k in range(3):
@@ -317,11 +377,11 @@ def _second_invariant(C01, I1, F, J, G, P, A):
                 A[3 * i + j, 3 * k + j] -= factor * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
                 for m in range(3):
                     A[3 * i + j, 3 * k + m] += factor * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
-    return C01 * (J ** (-4.0 / 3.0) * I2 - 3.0)
+    return C01 * (scale * I2 - 3.0)
 
 
 @kernel
-def _ogden(constants, F, P, A):
+def _ogden(constants, F, everywhere, P, A):
     """Apply Ogden's law of the isochoric stretches; return the energy density.
 
     The energy is the sum of 2 mu / alpha^2 (l1^alpha + l2^alpha + l3^alpha - 3) (Ogden, 1972); the moduli in principal axes
@@ -329,7 +389,7 @@ def _ogden(constants, F, P, A):
     """
     n = int(constants[3])
     C = np.empty((3, 3))
-    _right_cauchy_green(F, C)
+    right_cauchy_green(F, C)
     squared, axes = np.linalg.eigh(C)
     scale = (squared[0] * squared[1] * squared[2]) ** (-1.0 / 6.0)
     beta, gamma, energy = np.zeros(3), np.zeros((3, 3)), 0.0
@@ -346,6 +406,13 @@ def _ogden(constants, F, P, A):
                 gamma[a, b] += 2.0 * mu * (total / 9.0 - (powers[a] + powers[b]) / 3.0)
             gamma[a, a] += 2.0 * mu * powers[a]
     S, moduli = np.zeros((3, 3)), np.zeros((9, 9))
+    for a in range(3):
+        for i in range(3):
+            for j in range(3):
+                S[i, j] += beta[a] / squared[a] * axes[i, a] * axes[j, a]
+    _rotate(F, S, P)
+    if not everywhere:
+        return energy
     for a in range(3):
         for b in range(3):
             normal = (gamma[a, b] - (2.0 * beta[a] if a == b else 0.0)) / (squared[a] * squared[b])
@@ -364,10 +431,7 @@ def _ogden(constants, F, P, A):
                     moduli[row, column] += normal * left * axes[k, b] * axes[m, b]
                     if a != b:
                         moduli[row, column] += shear * mixed * (axes[k, a] * axes[m, b] + axes[k, b] * axes[m, a])
-        for i in range(3):
-            for j in range(3):
-                S[i, j] += beta[a] / squared[a] * axes[i, a] * axes[j, a]
-    _pushed(F, S, moduli, P, A)
+    _pushed(F, S, moduli, A)
     return energy
 
 
@@ -376,19 +440,20 @@ def respond(constants, D, F, J, G, everywhere, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
     The volumetric part of the law, with the bulk modulus ``constants[2]``, is not included. D (6, 6) are the moduli of
-    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is not filled at small
-    strains without plastic flow.
+    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is filled only where
+    plastic flow occurs at small strains.
     """
     law = int(constants[0])
-    new[:] = old
+    for e in range(9):
+        new[e] = old[e]
     if law == LINEAR:
         return _linear(D, F, everywhere, P, A)
     if law == PLASTIC:
         return _plastic(constants, F, everywhere, old, new, P, A)
     if law == LOGARITHMIC:
-        return _logarithmic(constants, F, old, new, P, A)
+        return _logarithmic(constants, F, everywhere, old, new, P, A)
     if law == SAINT_VENANT:
-        return _saint_venant(D, F, P, A)
+        return _saint_venant(D, F, everywhere, P, A)
     if law == INVARIANTS:
-        return _invariants(constants, F, J, G, P, A)
-    return _ogden(constants, F, P, A)
+        return _invariants(constants, F, J, G, everywhere, P, A)
+    return _ogden(constants, F, everywhere, P, A)

@@ -75,7 +75,7 @@ def _integrate_products(x, slopes, weights, gradient, g):
 
 
 @kernel
-def _add_block(flat, at_upper, at_lower, upper, lower, block):
+def add_block(flat, at_upper, at_lower, upper, lower, block):
     """Add the `block` (9,) of a node pair if `at_upper`, and its transpose beyond the diagonal if `at_lower`."""
     u, v = 9 * upper, 9 * lower
     if at_upper:
@@ -99,7 +99,7 @@ def _add_isotropic_block(flat, pair, at_upper, at_lower, upper, lower, coupling,
     if not pair:  # equal up to round-off; keeps K bitwise symmetric
         k10, k20, k21 = k01, k02, k12
     block = both * xx + trace, k01, k02, k10, both * yy + trace, k12, k20, k21, both * zz + trace
-    _add_block(flat, at_upper, at_lower, upper, lower, block)
+    add_block(flat, at_upper, at_lower, upper, lower, block)
 
 
 @kernel
@@ -130,7 +130,7 @@ def _add_general(g, tensor, products, block, slots, c, inside, flat):
                 block[row] = total
             if a == b:  # equal up to round-off; keeps K bitwise symmetric
                 block[3], block[6], block[7] = block[1], block[2], block[5]
-            _add_block(flat, inside[a], inside[b], slots[c, a, b], slots[c, b, a], block)
+            add_block(flat, inside[a], inside[b], slots[c, a, b], slots[c, b, a], block)
 
 
 @kernel

@@ -100,6 +100,11 @@ class NonlinearBodies:
         return np.ascontiguousarray(rows[self._owner])
 
     @property
+    def yields(self) -> bool:
+        """Whether there is an elastic-plastic law."""
+        return any(isinstance(law, ElasticPlastic) for law in self._materials)
+
+    @property
     def beginning(self) -> History:
         """The history before the first load step."""
         return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
@@ -194,11 +199,21 @@ class NonlinearBodies:
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
-        measure = np.linalg.det(self._deformation(name, displacement, slice(cell, cell + 1))[0]).min()
+        measure = self._measures(name, cell, displacement).min()
         failure = f"turns inside out (J = {measure:.3g})"
         if status != body_kernels.INVERTED:
             failure = "has no out-of-plane strain of zero stress"
         return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"
+
+    def _measures(self, name: str, cell: int, displacement: Array) -> Array:
+        """Return J (n_q,) of a cell."""
+        N, dN, _ = elements.get(name).tables
+        nodes, dim, F = self.mesh.cells[name][cell], self.mesh.dim, np.tile(np.eye(3), (len(N), 1, 1))
+        points, u = self.mesh.points[nodes], displacement[nodes]
+        F[:, :dim, :dim] += np.einsum("ai,qaj->qij", u, gradients_at(points[None], dN)[0][0])
+        if self.kinematics == "axisymmetric":
+            F[:, 2, 2] += (N @ u[:, 0]) / (N @ points[:, 0])
+        return np.linalg.det(F)
 
     def cell_fields(self, bodies: DeformedBodies, displacement: Array) -> dict[str, Array]:
         """Return the fields of `field_names` (n_solids,): extremes over the points of each cell, except for the volume."""
@@ -208,14 +223,32 @@ class NonlinearBodies:
 
     def _fields(self, name: str, bodies: DeformedBodies, displacement: Array) -> list[Array]:
         """Return the values (n_cells,) of `field_names` for the cells of an element."""
-        J, fields = np.ones(self._cells[name].shape), []
+        J, fields = np.ones(self._cells[name].shape), list[Array]()
         if self.finite:
-            logarithms, volume = self._logarithms(name, bodies, displacement)
-            J = np.exp(logarithms.sum(axis=2))
-            fields = [(volume * J).sum(axis=1) / volume.sum(axis=1), _farthest(logarithms.reshape(len(J), -1))]
-        if any(isinstance(law, ElasticPlastic) for law in self._materials):
+            J, ratio, logarithm = self._strains(name, bodies, displacement)
+            fields = [ratio, logarithm]
+        if self.yields:
             fields += self._yielding(name, bodies, J)
         return fields
+
+    def _strains(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array, Array]:
+        """Return J (n_cells, n_q), and the volume ratios and largest logarithmic strains (n_cells,) of cells."""
+        N, dN, weights = elements.get(name).tables
+        cells, across = self.mesh.cells[name], np.zeros(self._cells[name].shape)
+        if self.kinematics == "plane_stress":
+            across = np.ascontiguousarray(bodies.history[name][..., ACROSS])
+        J, ratio, logarithm = np.empty_like(across), np.empty(len(cells)), np.empty(len(cells))
+        axisymmetric = self.kinematics == "axisymmetric"
+
+        def part(cut: tuple[int, int]) -> None:
+            rows = slice(*cut)
+            body_kernels.strains(
+                self.mesh.points, cells[rows], N, dN, weights, axisymmetric, across[rows], displacement, J[rows], ratio[rows],
+                logarithm[rows],
+            )  # fmt: skip
+
+        parallel.shared(part, parallel.portions(len(cells), len(N)))
+        return J, ratio, logarithm
 
     def _yielding(self, name: str, bodies: DeformedBodies, J: Array) -> list[Array]:
         """Return the largest equivalent plastic strain and yield ratio (n_cells,) of cells.
@@ -232,34 +265,6 @@ class NonlinearBodies:
                 relative = stress - 2.0 / 3.0 * law.kinematic * history[at][:, : stress.shape[1]]
                 ratio[at] = von_mises(relative) / law.yield_at(strain[at])
         return [strain.max(axis=1), ratio.max(axis=1)]
-
-    def _logarithms(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array]:
-        """Return the principal logarithmic strains (n_cells, n_q, 3) of cells, and volumes (n_cells, n_q)."""
-        F, volume = self._deformation(name, displacement, slice(None))
-        if self.kinematics == "plane_stress":
-            F[..., 2, 2] += bodies.history[name][..., ACROSS]
-        stretches = np.linalg.eigvalsh(np.swapaxes(F, -1, -2) @ F)  # squared; a third of the time of singular values
-        return 0.5 * np.log(stretches), volume
-
-    def _deformation(self, name: str, displacement: Array, cells: slice) -> tuple[Array, Array]:
-        """Return F (n_cells, n_q, 3, 3) at quadrature points, without out-of-plane strain in plane stress, and volumes."""
-        N, dN, weights = elements.get(name).tables
-        nodes, dim = self.mesh.cells[name][cells], self.mesh.dim
-        points, u = self.mesh.points[nodes], displacement[nodes]
-        gradient, determinant = gradients_at(points, dN)
-        volume, F = weights * determinant, np.zeros((*determinant.shape, 3, 3))
-        F[..., range(3), range(3)] = 1.0
-        F[..., :dim, :dim] += np.einsum("cai,cqaj->cqij", u, gradient)
-        if self.kinematics == "axisymmetric":
-            radius = points[:, :, 0] @ N.T
-            F[..., 2, 2] += (u[:, :, 0] @ N.T) / radius
-            volume *= radius
-        return F, volume
-
-
-def _farthest(values: Array) -> Array:
-    """Return the value of largest magnitude in each row of `values` (n, k), as (n,)."""
-    return np.take_along_axis(values, np.abs(values).argmax(axis=1)[:, None], axis=1)[:, 0]
 
 
 def field_names(materials: Sequence[Material], strain: str) -> tuple[str, ...]:

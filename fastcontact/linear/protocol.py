@@ -8,9 +8,10 @@ force]. C is a matrix (m, m), or the diagonal (m,) of a diagonal matrix.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, Self, runtime_checkable
 
 from scipy.sparse import bsr_array, csr_array
 
@@ -246,6 +247,10 @@ class LinearSolver(Protocol):
             K, or the object that replaces it in products.
         """
         ...
+
+    def near(self) -> Self:
+        """Return a copy to be prepared for a matrix of the same pattern that differs little, such as a tangent."""
+        return copy.copy(self)
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with the right-hand side f (n,) [force]."""

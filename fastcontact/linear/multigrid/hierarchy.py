@@ -11,6 +11,7 @@ comparison.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -67,6 +68,22 @@ class Hierarchy:
         self.coarse = Coarse(A.to_scipy().tocsc())
         self._free_bounds = [level.bound for level in self.levels]
         self.set_bounds()
+
+    def renewed(self, A: BlockMatrix) -> Hierarchy | None:
+        """Return a hierarchy whose finest level is that of a matrix A of the same pattern, with the coarser levels kept.
+
+        It is a symmetric preconditioner of A, which costs a fifth of a new hierarchy. None is returned if there are no
+        coarser levels, or for another precision.
+        """
+        if len(self.levels) == 1 or A.data.dtype != self.dtype:
+            return None
+        new, finest = copy.copy(self), self._level(A)
+        finest.P, finest.R = self.levels[0].P, self.levels[0].R
+        new.levels = [finest, *(level.without_equations() for level in self.levels[1:])]
+        new.coarse = Coarse(self.coarse.matrix)
+        new._free_bounds = [finest.bound, *self._free_bounds[1:]]
+        new.set_bounds()
+        return new
 
     def _level(self, A: BlockMatrix) -> Level:
         """Return the level of a matrix, without transfer operators."""

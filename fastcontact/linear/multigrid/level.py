@@ -73,6 +73,12 @@ class Level:
         """Number of unknowns."""
         return len(self.b)
 
+    def without_equations(self) -> Level:
+        """Return a copy without the changes by equations and springs, which shares the matrix and the transfer."""
+        inverse = np.empty_like(self.inverse)
+        cycle_kernels.invert_blocks(self.diagonal, len(self.A.rows), inverse)
+        return Level(self.A, self.diagonal, inverse, self.bound, self.P, self.R)
+
     def relax(self, r: AnyArray, first: float, second: float, begin: bool = False) -> None:
         """Make one Chebyshev step for the residual r (n,), see `cycle_kernels.relax`; equations stay satisfied."""
         kind = r.dtype.type

@@ -169,6 +169,8 @@ class ScaledMatrix:
     release : bool
         Whether the low parts may overwrite K's numbers, so that K and its parts are never in memory at the same time,
         which saves a tenth of the peak with a million unknowns. K is empty afterwards.
+    unit : float, optional
+        Scaling factor; by default that for which the largest stiffness is about one.
 
     Attributes
     ----------
@@ -179,18 +181,20 @@ class ScaledMatrix:
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, release: bool = False) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False, unit: float | None = None) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._store(K, precision, release)
+        self._store(K, precision, release, unit)
 
-    def _store(self, K: bsr_array, precision: str, release: bool) -> None:
+    def _store(self, K: bsr_array, precision: str, release: bool, unit: float | None = None) -> None:
         self.unit = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        size = range(K.blocksize[0])
-        largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
-        self.unit = float(0.5 ** np.round(np.log2(largest)))
+        if unit is None:
+            size = range(K.blocksize[0])
+            largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
+            unit = float(0.5 ** np.round(np.log2(largest)))
+        self.unit = unit
         self.scaled = _split(K, self.unit, release)
 
     def change(self, precision: str) -> None:

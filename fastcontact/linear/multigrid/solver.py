@@ -7,7 +7,9 @@ and the multigrid hierarchy is changed near the pivots.
 
 from __future__ import annotations
 
+import copy
 import logging
+from typing import Self
 
 import numpy as np
 from scipy.sparse import bsr_array
@@ -43,7 +45,8 @@ WATCH_EVERY = 2
 WATCH_CONTRAST_FROM = 6
 # The hierarchy is not changed for new equations with the same pivots if all weights differ by at most this much.
 ALIKE = 0.02
-# Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations.
+# Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations; about that of a
+# new hierarchy, too.
 CHANGE = 15
 # A nonsymmetric solution whose initial guess is accurate already is iterated further: until the residual has fallen by the
 # factor WARM, or to WARM_LEAST times its tolerance, with at most MOST_WARM iterations after the tolerance is reached. If
@@ -88,6 +91,8 @@ class Multigrid:
         If the precision is neither "single" nor "double".
     """
 
+    K: ScaledMatrix
+
     def __init__(self, tolerance: float = TOLERANCE, precision: str = "single") -> None:
         if precision not in ("single", "double"):
             raise ModelError(f"the precision of the multigrid cycle is 'single' or 'double', not '{precision}'")
@@ -96,6 +101,11 @@ class Multigrid:
         self.contrast = 1.0
         self.work = 0
         self.allowed: int | None = None
+        # Hierarchy of an earlier matrix to build that of the next one from, and whether the current one is such.
+        self._near: Hierarchy | None = None
+        self._renewed = False
+        # Whether coarser levels of an earlier matrix serve for later ones, shared by all copies.
+        self._lasting = [True]
         self.begin()
 
     def begin(self) -> None:
@@ -109,24 +119,42 @@ class Multigrid:
 
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
-        n = K.shape[0]
-        self.K = ScaledMatrix(K, self.precision, release)
+        n, near = K.shape[0], self._near
+        self.K = ScaledMatrix(K, self.precision, release, None if near is None else self.K.unit)
         self._modes = rigid_modes.astype(np.float32)  # for `build_in`; single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
-        self._build(rigid_modes)
+        self._build(rigid_modes, near)
         self.columns = InverseColumns(n, self._solve_many, MOST_COLUMNS)
 
-    def _build(self, rigid_modes: Array) -> None:
-        """Build the hierarchy of the stored matrix."""
-        self.hierarchy = Hierarchy(self.K.scaled, rigid_modes)
+    def near(self) -> Self:
+        """Return a copy to be prepared for a matrix that differs little: its coarser levels are kept.
+
+        If they do not suffice in one solution, from then on all hierarchies are built anew.
+        """
+        new = copy.copy(self)
+        new._near = self.hierarchy if self._lasting[0] else None
+        return new
+
+    def _build(self, rigid_modes: Array, near: Hierarchy | None = None) -> None:
+        """Build the hierarchy of the stored matrix, with the coarser levels of one that is `near`."""
+        renewed, self._near = None if near is None else near.renewed(self.K.scaled), None
+        self._renewed = renewed is not None
+        self.hierarchy = Hierarchy(self.K.scaled, rigid_modes) if renewed is None else renewed
         self._constrained = ConstrainedHierarchy(self.hierarchy, self.K.scaled)
         # Current equations and springs of the iteration; then the equations and springs for which the hierarchy was changed.
         self._reduced = Reduced(self.K, None)
         self._hierarchy_equations: Elimination | None = None
         self._hierarchy_springs: Springs | None = None
         self.counters.setups += 1
+
+    def _build_anew(self) -> None:
+        """Build the complete hierarchy of the matrix, and from now on those of all tangents."""
+        self._lasting[0], reduced = False, self._reduced
+        self._build(self._modes.astype(float))
+        self._worked(CHANGE)
+        self.constrain(reduced.elimination, reduced.springs)
 
     def build_in(self, precision: str) -> None:
         """Rebuild the hierarchy in a different precision."""
@@ -196,6 +224,9 @@ class Multigrid:
         made, raised = 0, 0
         watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
         while cg.norm > enough:
+            if self._renewed and made >= CHANGE:
+                self._build_anew()
+                self._begin(cg, f)
             if made >= MAX_ITERATIONS or raised > RAISES:
                 raise StallError(
                     f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
@@ -241,6 +272,8 @@ class Multigrid:
         StallError
             If the residual does not fall below the tolerance.
         """
+        if self._renewed:
+            self._build_anew()
         if self._residuals is None:
             self._residuals = ConjugateResiduals(len(f))
         iteration = self._residuals
@@ -282,6 +315,8 @@ class Multigrid:
         StallError
             If the residual does not fall below the tolerance.
         """
+        if self._renewed:
+            self._build_anew()
         n = len(f)
         iteration = ConjugateResiduals(n + len(border))
         scale = self._scale(f, elimination)
@@ -350,6 +385,9 @@ class Multigrid:
 
     def _strengthen(self, times: int) -> None:
         """Make the preconditioner positive definite again: by larger bounds, and at the last attempt by double precision."""
+        if self._renewed:
+            self._build_anew()
+            return
         if times < RAISES or self.precision == "double":
             self.hierarchy.raise_bounds(RAISE)
             return

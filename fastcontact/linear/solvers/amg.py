@@ -116,7 +116,7 @@ class Amg(Multigrid, LinearSolver):
         instead = None if self.instead is None else {"why": self.gave_up, **self.instead.snapshot()}
         return {
             "precision": self.precision, "tolerance": self.tolerance, "bounds": self.hierarchy.bounds,
-            "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead,
+            "asked": list(self.columns.asked), **self._constrained_by(), "instead": instead, "lasting": self._lasting[0],
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
@@ -134,6 +134,7 @@ class Amg(Multigrid, LinearSolver):
             return
         if self.instead is not None:  # The factorisation replaced multigrid after the time of the snapshot.
             self._factored, self.instead, self.gave_up = self.instead, None, ""
+        self._lasting[0] = snapshot.get("lasting", True)
         put_back_tolerance(self, snapshot)
         if snapshot["precision"] != self.precision:
             self.build_in(snapshot["precision"])

@@ -1,4 +1,4 @@
-"""Initial guess of load steps: linear extrapolation, none where the load turns or jumps."""
+"""Initial guess of load steps: extrapolation, none where the load turns or jumps."""
 
 import numpy as np
 import pytest
@@ -56,3 +56,29 @@ def test_what_a_file_keeps_is_what_was_there_and_earlier_files_tell_less():
     kept = found.to_dict()
     kept["loads"] = [parts[1] for parts in kept["loads"]]
     assert Extrapolation.from_dict(kept, u).to(*loads).ratio == 0.0
+
+
+def on_a_curve(loads, path):
+    found = Extrapolation()
+    for factor in loads:
+        found = found.to(np.full(2, factor)).converged(path(factor), {}, curve=True)
+    return found
+
+
+@pytest.mark.parametrize("loads", [(1.0, 2.0, 3.0, 4.0), (1.0, 1.5, 2.5, 3.0)])
+def test_a_parabola_is_continued_once_it_was_closer_than_a_line(loads):
+    def path(factor):
+        return np.array([1.0 + factor + 0.5 * factor**2, -(factor**2)])
+
+    early = on_a_curve(loads[:3], path).to(np.full(2, loads[3]))
+    assert np.array_equal(early.predicted(path(3.0)), early.displacement(path(3.0)))  # not known to be closer yet
+    end = loads[3] + 0.5
+    found = on_a_curve(loads, path).to(np.full(2, end))
+    assert found.predicted(path(loads[3])) == pytest.approx(path(end), rel=1e-13)
+    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[3])).to(np.full(2, end))
+    assert np.array_equal(again.predicted(path(loads[3])), found.predicted(path(loads[3])))
+
+
+def test_a_kinked_path_is_continued_along_a_line():
+    found = on_a_curve((1.0, 2.0, 3.0, 4.0), lambda factor: np.full(2, factor - (factor > 2.0))).to(np.full(2, 5.0))
+    assert found.predicted(np.full(2, 3.0)) == pytest.approx(np.full(2, 4.0))

@@ -381,6 +381,38 @@ def prepared(precision="single", scale=1.0, divisions=(12, 11, 10)):
     return solver, scale * f, fixed
 
 
+def test_coarser_levels_serve_for_a_matrix_that_differs_little():
+    solver, f, fixed = prepared()
+    before, (K, modes, _, _) = solver.load(f).solve(contact_rows(fixed), np.full(6, 1e-3))[0], problem((12, 11, 10))
+    hierarchy, near = solver.hierarchy, solver.near()
+    near.prepare(K * 1.3, modes)
+    assert all(one.A is other.A for one, other in zip(near.hierarchy.levels[1:], hierarchy.levels[1:], strict=True))
+    u = near.load(f).solve(contact_rows(fixed)[:0], np.empty(0))[0]
+    assert np.abs(1.3 * (K @ u) - f).max() < 1e-8 * np.abs(f).max()
+    again = solver.load(f).solve(contact_rows(fixed), np.full(6, 1e-3))[0]
+    assert np.abs(again - before).max() < 1e-8 * np.abs(before).max()  # the solver itself has not changed
+
+
+def test_a_matrix_that_differs_much_gets_its_own_hierarchy_and_so_do_all_later_ones():
+    solver, f, fixed = prepared()
+    K, modes, _, _ = problem((12, 11, 10))
+    stiff = np.where(np.arange(len(f) // 3) % 7 < 3, 100.0, 1.0).repeat(3)
+    other = bsr_array((diags_array(stiff) @ csr_array(K) @ diags_array(stiff)).tobsr((3, 3)))
+    other.sort_indices()
+    snapshot, near = solver.snapshot(), solver.near()
+    near.prepare(other.copy(), modes)
+    u = near.load(f).solve(contact_rows(fixed)[:0], np.empty(0))[0]
+    assert np.abs(other @ u - f).max() < 1e-8 * np.abs(f).max()
+    later = solver.near()
+    later.prepare(K.copy(), modes)
+    assert near.hierarchy.levels[1].A is not solver.hierarchy.levels[1].A
+    assert later.hierarchy.levels[1].A is not solver.hierarchy.levels[1].A
+    solver.put_back(snapshot)
+    later = solver.near()
+    later.prepare(K.copy(), modes)
+    assert later.hierarchy.levels[1].A is solver.hierarchy.levels[1].A
+
+
 @pytest.mark.parametrize("equations", first_of(1, [0, 6]))
 def test_pyamg_finds_the_same_and_takes_as_many_iterations(equations):
     solver, f, fixed = prepared()

@@ -1,0 +1,40 @@
+"""Parts of the element loop of nonlinear bodies, compared with NumPy."""
+
+import numpy as np
+import pytest
+
+from fastcontact._jit.decorators import kernel
+from fastcontact.elasticity.constitutive_kernels import extreme_eigenvalues
+from fastcontact.elasticity.tile_product import tile, tile_plain
+
+
+@kernel
+def of_tile(left, first, b, right, second, a, n, out, row, fresh):
+    tile(left, first, b, right, second, a, n, out, row, fresh)
+
+
+@pytest.mark.parametrize("fresh", [False, True])
+@pytest.mark.parametrize("n", [0, 1, 3, 24])
+def test_a_tile_is_changed_and_nothing_around_it(n, fresh):
+    rng = np.random.default_rng(n)
+    left, right, out = rng.normal(size=(n + 3, 12)), rng.normal(size=(n + 2, 8)), rng.normal(size=(9, 12))
+    right[:2], left[:1] = np.nan, np.nan  # not read
+    expected = out.copy()
+    tile_plain(left, 1, 8, right[:, :], 2, 4, n, expected, 3, fresh)
+    of_tile(left, 1, 8, right, 2, 4, n, out, 3, fresh)
+    assert np.abs(out - expected).max() < 1e-13
+    inside = np.zeros(out.shape, bool)
+    inside[3:7, 4:8] = True
+    assert np.array_equal(out[~inside], expected[~inside])
+
+
+@pytest.mark.parametrize("spread", [0.0, 1e-12, 1e-6, 1.0])
+def test_extreme_eigenvalues_are_those_of_lapack(spread):
+    """Also where two or three of them coincide, or nearly so."""
+    rng = np.random.default_rng(1)
+    for values in ([1.0, 1.0, 1.0], [1.0, 1.0, 2.0], [0.5, 2.0, 2.0], [1e-3, 1.0, 1e3]):
+        axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        C = (axes * (values + spread * rng.random(3))) @ axes.T
+        C = 0.5 * (C + C.T)
+        expected = np.linalg.eigvalsh(C)[[0, 2]]
+        assert np.abs(np.array(extreme_eigenvalues(C.copy())) - expected).max() < 4e-15 * expected[1]
