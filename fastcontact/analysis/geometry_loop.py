@@ -17,8 +17,9 @@ from fastcontact.analysis.inequalities import StepContext, solve_inequalities
 from fastcontact.analysis.iterate import Iterate, initially_active, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Accuracy, Solution
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
+from fastcontact.analysis.touching import Touching
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -125,8 +126,17 @@ def settle_geometry(
         If the active set or the geometry does not converge.
     """
     iterate = begun or Iterate.of(step.state)
+    touching = Touching(step, Plan.of(step.problem).newton)
     try:
-        settled = _settle(step, iterate, extrapolation, expected)
+        try:
+            settled = _settle(step, iterate, extrapolation, expected, touching)
+        except ConvergenceError as error:
+            if not touching.done:
+                raise
+            log.info("friction in increments of the step does not converge: %s", error)
+            touching.give_up()
+            iterate.begin_again(step.state)
+            settled = _settle(step, iterate, extrapolation, expected, touching)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -136,7 +146,9 @@ def settle_geometry(
     return replace(settled, solution=nodes.shared(settled.solution, settled.constraints, settled.iterate.u))
 
 
-def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float) -> SettledContact:
+def _settle(
+    step: StepContext, iterate: Iterate, extrapolation: Extrapolation, expected: float, touching: Touching
+) -> SettledContact:  # fmt: skip
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, plan = step.problem, Plan.of(step.problem)
     if iterate.history:  # The iterate is converged already, so that extrapolation would move it away.
@@ -151,16 +163,25 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
         active = initially_active(constraints, iterate, extrapolation if plan.extrapolate and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
         nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces)
-        solution, displacement = _solve_once(step, constraints, nodes, iterate, active, accuracy)
+        solving = touching.step(step, constraints, iterate, nodes)
+        solution, displacement = _solve_once(solving, constraints, nodes, iterate, active, accuracy)
+        if touching.unfinished:
+            assert isinstance(solution, FrictionalEquilibrium)
+            if not solution.settled:
+                raise ConvergenceError("an increment does not converge", iterate.history)
+            step, mixing = replace(step, path=solution.slid), mixing.anew()
+            watch.forget()
         moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or single or tolerances.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
         if not plan.until_settled:
             continue
+        if not tolerances.inexact:
+            touching.check(step, constraints, solution, moved.change - tolerances.enough(moved.size), moved.size)
         settled = SettledContact(constraints, solution, iterate)
         if not solution.settled or tolerances.inexact:
             watch.forget()
-        elif moved.change <= tolerances.enough(moved.size):
+        elif moved.change <= tolerances.enough(moved.size) and not (touching.due or touching.unfinished):
             return settled
         elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size):
             _log_scatter(scatter, problem.criteria.geometry)
@@ -186,6 +207,10 @@ def _settle(step: StepContext, iterate: Iterate, extrapolation: Extrapolation, e
     if plan.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, plan.limit), iterate.history)
+    touching.check(step, constraints, solution, 0.0, 0.0)
+    if touching.due or touching.unfinished:
+        del iterate.history[-plan.limit - 1 :]
+        return _settle(step, iterate, extrapolation, expected, touching)
     fixed = plan.limit and not problem.criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (plan.limit, moved.relative) if fixed else None)
 
@@ -278,6 +303,7 @@ class _Mixing:
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
+        self._may_use_newton = newton
         self._newton, self._change, self._contraction = newton, np.inf, np.inf
 
     def newton(self, change: float, enough: float) -> bool:
@@ -294,6 +320,11 @@ class _Mixing:
         """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
         self._contraction = contraction
         return next_pairing
+
+    def anew(self) -> _Mixing:
+        """Return the choice for a problem that differs from now on."""
+        self._accelerated.restart()
+        return _Mixing(self._accelerated, self._may_use_newton)
 
     def restart(self) -> None:
         """Discard the earlier iterates."""

@@ -283,11 +283,6 @@ class _Newton:
             dofs = problem.dofs.for_step(self._iterate.u, load.lift)
             step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs)
             settled = settle_geometry(step, extrapolation, self._begin.expected, self._iterate)
-            if problem.criteria.friction_while_touching is not None and self._terms.prepared:
-                from fastcontact.analysis.touching import along_path
-
-                settled = along_path(step, settled, self._begin.expected)
-                self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled
         return solution

@@ -121,15 +121,15 @@ class Path:
         Vectors of the tangential forces [force].
     closing : ndarray (m, dim)
         Tangential relative displacement while the whole gap closes, which is no slip [length].
-    parts : int
-        Number of increments of the load step.
+    waiting : ndarray of bool (m,)
+        Constraints that are open at the beginning of the step, and close at some instant if at all.
     """
 
     gap: Array
     normal: Array
     traction: Array
     closing: Array
-    parts: int
+    waiting: Mask
 
     @property
     def loaded(self) -> Mask:
