@@ -154,7 +154,8 @@ def _settle(
     if iterate.history:  # The iterate is converged already, so that extrapolation would move it away.
         plan = replace(plan, extrapolate=False)
     tolerances = Tolerances(problem.solver, problem.criteria, plan.extrapolate, step.state.gap_round_off, expected)
-    mixing, watch = _Mixing(Anderson(DEPTH, step.dofs.compared, problem.solver.iterative), plan.newton), Watch()
+    accelerated, watch = Anderson(DEPTH, step.dofs.compared, problem.solver.iterative), Watch()
+    mixing = _Mixing(accelerated, plan.newton)
     if plan.extrapolate:
         iterate.u = extrapolation.displacement(iterate.u)
     for update in range(plan.limit + 1):
@@ -164,12 +165,15 @@ def _settle(
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift), single)
         nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces)
         solving = touching.step(step, constraints, iterate, nodes)
+        if touching.unfinished:
+            accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
         solution, displacement = _solve_once(solving, constraints, nodes, iterate, active, accuracy)
         if touching.unfinished:
             assert isinstance(solution, FrictionalEquilibrium)
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
-            step, mixing = replace(step, path=solution.slid), mixing.anew()
+            step, mixing = replace(step, path=solution.slid), _Mixing(accelerated, plan.newton)
+            mixing.restart()
             watch.forget()
         moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or single or tolerances.inexact):
@@ -303,7 +307,6 @@ class _Mixing:
     def __init__(self, accelerated: Anderson, newton: bool) -> None:
         self._accelerated = accelerated
         self._known: AnyArray | None = None
-        self._may_use_newton = newton
         self._newton, self._change, self._contraction = newton, np.inf, np.inf
 
     def newton(self, change: float, enough: float) -> bool:
@@ -320,11 +323,6 @@ class _Mixing:
         """Store the factor by which a solution contracts changes of the geometry, and return `next_pairing` (k,)."""
         self._contraction = contraction
         return next_pairing
-
-    def anew(self) -> _Mixing:
-        """Return the choice for a problem that differs from now on."""
-        self._accelerated.restart()
-        return _Mixing(self._accelerated, self._may_use_newton)
 
     def restart(self) -> None:
         """Discard the earlier iterates."""

@@ -131,11 +131,6 @@ class Path:
     closing: Array
     waiting: Mask
 
-    @property
-    def loaded(self) -> Mask:
-        """Constraints (m,) with normal forces at the beginning of the step."""
-        return self.normal != 0.0
-
     def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
         """Return the normal forces of the constraints `rows` (q,), and their components along each of k tangents (m, dim).
 
@@ -174,9 +169,8 @@ class Slid:
     ----------
     slip : ndarray (m, dim)
         Slip vectors since the beginning of the step [length].
-    work : ndarray (2, m)
-        Frictional work since the beginning of the step, and the part of it in the increment in which a constraint closed
-        [energy].
+    work : ndarray (m,)
+        Frictional work since the beginning of the step [energy].
     normal : ndarray (m,)
         Normal forces [force].
     """
@@ -212,9 +206,8 @@ class FrictionalEquilibrium:
         Number of Newton iterations.
     directions : tuple of k ndarray (m, dim)
         Unit tangents.
-    work : ndarray (2, m), optional
-        Frictional work in the step, and the part of it in the increment in which a constraint closes [energy]; only if the
-        step is solved in increments.
+    work : ndarray (m,), optional
+        Frictional work in the step [energy]; only if the step is solved in increments.
     slid : Slid, optional
         Data at the beginning of the last increment; only if the step is solved in increments.
     response : callable, optional

@@ -60,11 +60,11 @@ def along(
         Forces at the end of the step, with the slips of the last increment.
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
-    before : (ndarray (k, m), ndarray (2, m), ndarray (m,))
+    before : (ndarray (k, m), ndarray (m,), ndarray (m,))
         Slips along the tangents [length], frictional work [energy] and normal forces [force] at the beginning of the last
         increment; see `Slid`.
     """
-    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
+    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
     gap = now = closing[0]
     added = np.where(gap > 0.0, closing[1:], 0.0)
     lag = lag + np.vstack([np.zeros_like(gap), added])
@@ -113,7 +113,7 @@ def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[float,
 
 
 def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
-    """Return the frictional work in an increment.
+    """Return the frictional work (m,) in an increment [energy].
 
     The tangential force is integrated over the slip by the trapezoidal rule. Since sliding friction is at its limit, the
     tangential force at the beginning is that at the end, scaled by the ratio of the normal forces.
@@ -126,15 +126,9 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
         Tangential forces at the end of the increment [force].
     slip : ndarray (k, m)
         Slips in the increment [length].
-
-    Returns
-    -------
-    ndarray (2, m)
-        Frictional work of each constraint, and the same if the constraint closes in the increment, otherwise zero [energy].
     """
-    once = -0.5 * (tangential * slip).sum(axis=0)
     ratio = np.divide(before, normal, out=np.zeros_like(normal), where=normal > 0.0)
-    return np.stack([(1.0 + ratio) * once, np.where(before == 0.0, once, 0.0)])
+    return np.asarray(-0.5 * (1.0 + ratio) * (tangential * slip).sum(axis=0))
 
 
 def shifted(constraints: Constraints, slid: Slid) -> Constraints:

@@ -70,7 +70,7 @@ def solve(
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
-    begun = begun if path is None else begun | path.loaded
+    begun = begun if path is None else begun | ~path.waiting
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
@@ -238,7 +238,7 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
 
     Parameters
     ----------
-    before : (ndarray (k, q), ndarray (2, q), ndarray (q,))
+    before : (ndarray (k, q), ndarray (q,), ndarray (q,))
         Slips [length], frictional work [energy] and normal forces [force] that `path.along` returns.
     Q : csr_array, optional
         Rotation of the tangents, which is undone.
@@ -251,11 +251,11 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
     if Q is not None:
         slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
     m, dim = constraints.positions.shape
-    slid = Slid(np.zeros((m, dim)), np.zeros((2, m)), np.zeros(m))
+    slid = Slid(np.zeros((m, dim)), np.zeros(m), np.zeros(m))
     slid.slip[rows] = sum(
         along[:, None] * tangent[rows] for along, tangent in zip(slip, constraints.directions, strict=True)
     )
-    slid.work[:, rows], slid.normal[rows] = work, normal
+    slid.work[rows], slid.normal[rows] = work, normal
     return slid
 
 
