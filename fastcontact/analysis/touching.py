@@ -1,4 +1,8 @@
-"""Load steps in which nodes slide while they close: friction is solved again, along the path of the step."""
+"""Load steps in which constraints close and slide: friction is solved in increments, see `friction.path`.
+
+Once the geometry has nearly converged, one pairing is solved in increments. In later pairings only the last increment is
+solved again, with the slips of the earlier ones.
+"""
 
 from __future__ import annotations
 
@@ -77,10 +81,7 @@ class Touching:
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
     """Return whether nodes that close in the step carry more shear than the fraction `allowed` of the friction capacity."""
-    forces = (
-        _forces(step, constraints) if isinstance(solution, FrictionalEquilibrium) and constraints.tangents else None
-    )
-    if forces is None:
+    if not isinstance(solution, FrictionalEquilibrium) or (forces := _forces(step, constraints)) is None:
         return False
     shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.coefficients * solution.multiplier
     rubs = solution.active & (constraints.coefficients > 0.0)
