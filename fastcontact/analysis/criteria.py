@@ -48,13 +48,14 @@ class Criteria:
         iterations. Substeps are complete load steps, so that friction follows their path, but only the instants of the ramp
         have results; ``iterations["substeps"]`` lists the ends of the substeps.
     friction_while_touching : float, optional
-        By default, slip is counted from the beginning of each load step. If this fraction is given, load steps in which
-        nodes close and slide are solved in increments, with one Delassus operator and with the geometry at the end of the
-        step, so that these nodes slide only after they have closed. The increments are so small that in each one the shear
-        of these nodes is at most this fraction of the coefficient of friction times the pressure. A value of 0.01 leaves
-        errors of a few percent in shear and frictional work; a step takes up to twice the time with the direct solver, and
-        up to six times the iterations with multigrid. With nonlinear bodies, steps are halved instead, at most
-        `max_halvings` times, as long as such nodes do more than this fraction of the frictional work so far [-].
+        Load steps in which nodes close and carry more shear than this fraction of the coefficient of friction times the
+        normal forces are solved in increments that end where nodes close, with one Delassus operator and with the geometry
+        at the end of the step. Slip is then counted from the instant at which a node closes, otherwise from the beginning of
+        the step. By default 0.001 in plane and axisymmetric models of linear bodies, at obstacles and between bodies with
+        dual mortar multipliers, unless `geometry_updates` is given or only contact restrains a body; elsewhere 1, which
+        means that no step is divided. A step takes up to twice the time with the direct solver, and many times the
+        iterations with multigrid. With nonlinear bodies, steps are halved instead, at most `max_halvings` times, as long as
+        such nodes do more than this fraction of the frictional work so far [-].
 
     Examples
     --------

@@ -15,8 +15,9 @@ from fastcontact.analysis.geometry_newton import newton_step
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Solution
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
+from fastcontact.analysis.touching import Touching
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
@@ -80,8 +81,17 @@ def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
     ConvergenceError
         If the active set or the geometry does not converge.
     """
+    touching = Touching(step, _linearises(step.problem))
     try:
-        settled = _settle(step, iterate)
+        try:
+            settled = _settle(step, iterate, touching)
+        except ConvergenceError as error:
+            if not touching.done:
+                raise
+            log.info("friction in increments of the step does not converge: %s", error)
+            touching.give_up()
+            iterate = replace(Iterate.of(step.state), history=iterate.history)
+            settled = _settle(step, iterate, touching)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -90,7 +100,13 @@ def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
     return replace(settled, solution=settled.nodes.shared(settled.solution, settled.constraints, iterate.u))
 
 
-def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
+def _linearises(problem: Problem) -> bool:
+    """Return whether Newton's method applies to the contact geometry: with factors, and without fluid pressure."""
+    fluid = any(pair.options.source is not None for pair in problem.pairs.values())
+    return not (fluid or problem.solver.iterative)
+
+
+def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledContact:
     """Return the result of `settle_geometry` before nodes in several pairs share their forces; `iterate` is modified."""
     problem, criteria = step.problem, step.problem.criteria
     limit = 0 if criteria.keep_pairing else criteria.geometry_updates
@@ -107,16 +123,28 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift))
         nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces) if problem.shares_nodes else None
         once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
-        solution, displacement = solve_inequalities(step, once, iterate, closed & once.usable, accuracy)
+        along = touching.step(step, constraints, iterate, nodes)
+        if touching.unfinished:
+            accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
+        solution, displacement = solve_inequalities(along, once, iterate, closed & once.usable, accuracy)
+        if touching.unfinished:
+            assert isinstance(solution, FrictionalEquilibrium)
+            if not solution.settled:
+                raise ConvergenceError("an increment does not converge", iterate.history)
+            step = replace(step, path=solution.slid)
+            mixing = _Mixing(step)
+            watch.forget()
         moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or accuracy.inexact):
             _raise_cycling(problem, constraints, solution, iterate)
         if not problem.until_settled:
             continue
+        if not tolerances.inexact:
+            touching.check(step, constraints, solution, moved.change - tolerances.enough(moved.size), moved.size)
         settled = SettledContact(constraints, solution, iterate, nodes=nodes)
         if not solution.settled or tolerances.inexact:
             watch.forget()
-        elif moved.change <= tolerances.enough(moved.size):
+        elif moved.change <= tolerances.enough(moved.size) and not (touching.due or touching.unfinished):
             return settled
         elif scatter := watch.seen(displacement, settled.force, moved.change, moved.size, mixing.contraction):
             log.info(
@@ -135,6 +163,10 @@ def _settle(step: StepContext, iterate: Iterate) -> SettledContact:
     if problem.until_settled:
         changed = step.dofs.put(np.zeros_like(iterate.u), displacement - moved.before)
         raise ConvergenceError(geometry_moves(problem, iterate.history, changed, limit), iterate.history)
+    touching.check(step, constraints, solution, 0.0, 0.0)
+    if touching.due or touching.unfinished:
+        del iterate.history[-limit - 1 :]
+        return _settle(step, iterate, touching)
     fixed = limit and not criteria.keep_pairing
     return SettledContact(constraints, solution, iterate, (limit, moved.relative) if fixed else None, nodes=nodes)
 
@@ -207,11 +239,8 @@ class _Mixing:
 
     def __init__(self, step: StepContext) -> None:
         self._step, self._accelerated = step, None
-        problem = step.problem
-        fluid = any(pair.options.source is not None for pair in problem.pairs.values())
-        newton = not (fluid or problem.solver.iterative)
         self._known: AnyArray | None = None
-        self._newton, self._change, self.contraction = newton, np.inf, np.inf
+        self._newton, self._change, self.contraction = _linearises(step.problem), np.inf, np.inf
 
     _accelerated: Anderson | None
 

@@ -305,11 +305,7 @@ class _Newton:
             dofs = problem.dofs.for_step(u0, lift)
             step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs, extrapolation, expected)
             settled = settle_geometry(step, self._iterate)
-            if problem.criteria.friction_while_touching is not None and self._terms.prepared:
-                from fastcontact.analysis.touching import along_path
-
-                settled = along_path(step, settled)
-                self._iterate = settled.iterate
+            self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
         self._settled = settled
         return solution

@@ -159,7 +159,7 @@ class SharedNodes:
             slip=np.where(self.idle[:, None], turned(solution.slip), solution.slip),
             active=active,
             sticking=solution.sticking[representative],
-            work=None if solution.work is None else self.along * solution.work[:, representative],
+            work=None if solution.work is None else self.along * solution.work[representative],
             tangential=self.along[:, None]
             * np.where(self.idle[:, None], turned(solution.tangential), solution.tangential),
         )

@@ -120,20 +120,15 @@ class Path:
         Vectors of the tangential forces [force].
     closing : ndarray (m, dim)
         Tangential relative displacement while the whole gap closes, which is no slip [length].
-    parts : int
-        Number of increments of the load step.
+    waiting : ndarray of bool (m,)
+        Constraints that are open at the beginning of the step, and close at some instant if at all.
     """
 
     gap: Array
     normal: Array
     traction: Array
     closing: Array
-    parts: int
-
-    @property
-    def loaded(self) -> Mask:
-        """Constraints (m,) with normal forces at the beginning of the step."""
-        return self.normal != 0.0
+    waiting: Mask
 
     def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
         """Return the normal forces of the constraints `rows` (q,), and their components along each of k tangents (m, dim).
@@ -173,9 +168,8 @@ class Slid:
     ----------
     slip : ndarray (m, dim)
         Slip vectors since the beginning of the step [length].
-    work : ndarray (2, m)
-        Frictional work since the beginning of the step, and the part of it in the increment in which a constraint closed
-        [energy].
+    work : ndarray (m,)
+        Frictional work since the beginning of the step [energy].
     normal : ndarray (m,)
         Normal forces [force].
     """
@@ -211,9 +205,8 @@ class FrictionalEquilibrium:
         Number of Newton iterations.
     directions : tuple of k ndarray (m, dim)
         Unit tangents.
-    work : ndarray (2, m), optional
-        Frictional work in the step, and the part of it in the increment in which a constraint closes [energy]; only if the
-        step is solved in increments.
+    work : ndarray (m,), optional
+        Frictional work in the step [energy]; only if the step is solved in increments.
     slid : Slid, optional
         Data at the beginning of the last increment; only if the step is solved in increments.
     response : callable, optional

@@ -1,86 +1,125 @@
-"""Load steps in which nodes slide while they close: friction is solved again in increments along the path of the step."""
+"""Load steps in which constraints close and slide: friction is solved in increments, see `friction.path`.
+
+Once the geometry has nearly converged, one pairing is solved in increments. In later pairings only the last increment is
+solved again, with the slips of the earlier ones.
+"""
 
 from __future__ import annotations
 
-import logging
-import math
 from dataclasses import replace
 
 import numpy as np
 
-from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
-from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces, solve_inequalities
+from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
+from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path
+from fastcontact.analysis.solution import FrictionalEquilibrium, Path, Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
+from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.surface import Surface
-from fastcontact.errors import ConvergenceError
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-log = logging.getLogger("fastcontact")
-# Largest number of increments of a step.
-MOST = 128
+# Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
+NEGLIGIBLE = 1e-3
+# Relative change of the displacements at which the next solution of Newton's method for the geometry is accurate.
+NEARLY = 1e-3
 
 
-def along_path(step: StepContext, settled: SettledContact) -> SettledContact:
-    """Return the contact of a step, with friction solved in increments if nodes slide while they close.
+class Touching:
+    """Decides whether, and from which pairing on, friction of a load step is solved in increments; see `geometry_loop`.
 
-    Increments are solved on the converged geometry of the step without increments. If they do not converge, the step is left
-    unchanged.
+    Parameters
+    ----------
+    step : StepContext
+    newton : bool
+        Whether the geometry converges quadratically. The increments are then solved once it has nearly converged, otherwise
+        once it has.
+
+    Attributes
+    ----------
+    due : bool
+        Whether the next pairing is solved in increments.
+    done : bool
+        Whether increments have been solved.
+    unfinished : bool
+        Whether this was the last pairing, so that its last increment is to be solved again.
     """
-    nodes = settled.nodes
-    path = _path(step, settled, nodes)
-    if path is None:
-        return settled
-    old = settled.iterate
-    begun = replace(old, active=dict(old.active), pressure=dict(old.pressure), history=list(old.history))
-    constraints, active = settled.constraints, settled.solution.active
-    once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
-    try:
-        solution, there = solve_inequalities(
-            replace(step, path=path), once, replace(begun), closed & once.usable, Accuracy(0.0)
+
+    def __init__(self, step: StepContext, newton: bool) -> None:
+        self._allowed, self._near = _allowed(step.problem), NEARLY if newton else 0.0
+        self.due = self.done = self.unfinished = False
+
+    def step(
+        self, step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
+    ) -> StepContext:
+        """Return the step in which a pairing is solved: with a `Path` if increments are due, otherwise unchanged."""
+        self.unfinished = False
+        if not self.due:
+            return step
+        path = _path(step, constraints, iterate, nodes)
+        self.due, self.done, self.unfinished = False, True, path is not None
+        return step if path is None else replace(step, path=path)
+
+    def check(
+        self, step: StepContext, constraints: StackedConstraints, solution: Solution, excess: float, size: float
+    ) -> None:
+        """Set `due`, given the solution of a pairing.
+
+        `excess` is the change of the displacements beyond that which suffices, and `size` the largest displacement [length].
+        """
+        near = solution.settled and excess <= self._near * size
+        self.due = (
+            near and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
         )
-        assert isinstance(solution, FrictionalEquilibrium)
-        if not solution.settled:
-            return settled
-        begun.u = step.dofs.put(begun.u, there)
-        along = settle_geometry(replace(step, path=solution.slid, extrapolation=Extrapolation()), begun)
-        if not step.problem.until_settled:  # fixed number of updates
-            del begun.history[: len(old.history)]
-        return along
-    except ConvergenceError as error:
-        log.info("friction in %d increments of the step does not converge: %s", path.parts, error)
-        return settled
+
+    def give_up(self) -> None:
+        """Solve friction in the whole step."""
+        self.due, self.done, self.unfinished = False, True, False
 
 
-def _path(step: StepContext, settled: SettledContact, nodes: SharedNodes | None) -> Path | None:
-    """Return the path of a step; None if it has no effect."""
-    constraints, solution = settled.constraints, settled.solution
-    allowed = step.problem.criteria.friction_while_touching
-    if allowed is None or allowed >= 1.0 or not isinstance(solution, FrictionalEquilibrium) or not constraints.tangents:
-        return None
+def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
+    """Return whether nodes that close in the step carry more shear than the fraction `allowed` of the friction capacity."""
+    if not isinstance(solution, FrictionalEquilibrium) or (forces := _forces(step, constraints)) is None:
+        return False
+    shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.coefficients * solution.multiplier
+    rubs = solution.active & (constraints.coefficients > 0.0)
+    return bool(shear[rubs & (forces[0] == 0.0)].sum() > allowed * capacity[rubs].sum())
+
+
+def _path(
+    step: StepContext, constraints: StackedConstraints, iterate: Iterate, nodes: SharedNodes | None
+) -> Path | None:
+    """Return the path of a step with its data at the beginning; None if no constraint is open there."""
     forces = _forces(step, constraints)
     if forces is None:
         return None
     normal, traction = forces
-    rubs = solution.active & (constraints.coefficients > 0.0)
-    closing = rubs & (normal == 0.0)
-    shear = np.linalg.norm(solution.tangential, axis=1)
-    limit = allowed * float((constraints.coefficients * solution.multiplier)[rubs].sum())
-    if not float(shear[closing].sum()) > limit:
-        return None
-    gap = np.where(normal != 0.0, 0.0, _gaps(step, constraints, settled.iterate))
+    gap = np.where(normal != 0.0, 0.0, _gaps(step, constraints, iterate))
     size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
-    closing &= gap > LENGTH_ROUND_OFF * size
-    if not (slid := float(shear[closing].sum())) > limit:
-        return None
     slips = _closing(step, constraints, gap)
     if nodes is not None:
         gap, normal, traction, slips = nodes.gathered(constraints, gap, normal, traction, slips)
-    parts = math.ceil(slid / limit - LENGTH_ROUND_OFF)  # if all nodes close, the ratio is an integer up to round-off
-    return Path(gap, normal, traction, slips, min(parts, MOST))
+    waiting = gap > LENGTH_ROUND_OFF * size
+    if constraints.equality is not None:
+        waiting &= ~constraints.equality
+    return Path(gap, normal, traction, slips, waiting) if waiting.any() else None
+
+
+def _allowed(problem: Problem) -> float:
+    """Return `Criteria.friction_while_touching`, or its default, which is 1 where friction is solved in whole steps.
+
+    Formulations that reproduce code_aster between bodies do as it does.
+    """
+    criteria = problem.criteria
+    if problem.bodies is not None:
+        return 1.0
+    if criteria.friction_while_touching is not None:
+        return criteria.friction_while_touching
+    plain = problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or problem.floating_bodies is not None
+    pairs = [pair for pair in problem.pairs.values() if pair.friction and isinstance(pair.primary, Surface)]
+    dual = FORMULATIONS["mortar"].variant(2, {"multipliers": "dual"}) if pairs and not plain else Formulation
+    return NEGLIGIBLE if not plain and all(isinstance(pair, dual) for pair in pairs) else 1.0
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:

@@ -199,7 +199,7 @@ def contact_work(
     friction = float(np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0)).sum())
     touching = float(along[pressure == 0.0].sum())
     if isinstance(solution, FrictionalEquilibrium) and solution.work is not None:
-        friction, touching = (float(own) for own in solution.work[:, rows].sum(axis=1))
+        friction, touching = float(solution.work[rows].sum()), 0.0
     sliding = float((along + earlier).sum())
     moved = _relative(pair, at)
     gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)

@@ -408,7 +408,7 @@ class StepResult:
         - ``external_work``: work of loads, supports, obstacles and thermal strains.
         - ``friction_work``: work dissipated by friction.
         - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which they
-          close. It is overestimated in long steps.
+          close. It is overestimated in long steps, and zero in steps that are solved in increments.
         - ``penalty_energy``: energy of penalties and cohesive layers.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``imbalance``: external work minus the sum of all other energies.

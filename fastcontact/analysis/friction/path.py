@@ -1,8 +1,11 @@
 """Coulomb friction along the load path within a step, in increments with one Delassus operator.
 
 If a load step is solved at once, the slip of a constraint is counted from the beginning of the step, although a constraint
-that closes within the step slides only after it has closed. Here the load increment is applied in equal parts, with the
-geometry and the Delassus operator F at the end of the step.
+that closes within the step slides only after it has closed. Here the load increment is divided at the instants at which
+constraints close, and constraints carry no forces before. These instants are found by linear interpolation of gaps: with
+the geometry and the Delassus operator F at the end of the step, gaps vary linearly with the load while no constraint closes
+or opens, and none changes between stick and slip. The result therefore hardly depends on whether a force or a motion grows
+linearly in the step.
 
 Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for forces y. At its beginning there are gaps g0,
 forces y0 and no slips. At a fraction p of the step, gaps and slips for forces y are
@@ -26,11 +29,18 @@ from fastcontact.analysis.solution import FrictionalEquilibrium, Slid
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
 
+# Calculation of an increment from gaps and slips (1 + k, m) [length] to be added, constraints (m,) that may close, those of
+# them that are closed initially, and initial forces (1 + k, m) [force] or None.
+Increment = Callable[[Array, Mask, Mask, Array | None], Forces]
+# Largest number of constraints that begin to carry forces together, relative to the number of closed ones; and relative
+# difference of instants that are equal but for round-off.
+GROWTH, EQUAL = 1 / 32, 1e-6
+
 
 def along(
-    lag: Array, closing: Array, y: Array, parts: int, solve: Callable[[Array, Mask, Array | None], Forces]
-) -> tuple[Forces, tuple[Array, Array, Array]]:
-    """Return the forces at the end of a load step that is solved in increments.
+    lag: Array, closing: Array, y: Array, waiting: Mask, solve: Increment
+) -> tuple[Forces, Array, tuple[Array, Array, Array]]:
+    """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
     Parameters
     ----------
@@ -40,42 +50,70 @@ def along(
         Gaps at the beginning of the step, and the slips that closing them would add, see `Path.closed` [length].
     y : ndarray (1 + k, m)
         Normal and tangential forces at the beginning of the step [force].
-    parts : int
-        Number of increments.
-    solve : callable
-        Function that returns the `Forces` of an increment. Its arguments are gaps and slips (1 + k, m) [length] to be added,
-        initially closed constraints (m,), and initial forces (1 + k, m) [force] or None.
+    waiting : ndarray of bool (m,)
+        Constraints that are open at the beginning of the step.
+    solve : Increment
 
     Returns
     -------
     forces : Forces
-        Forces at the end of the step, with the slips of the whole step.
-    before : (ndarray (k, m), ndarray (2, m), ndarray (m,))
+        Forces at the end of the step, with the slips of the last increment.
+    gaps : ndarray (1 + k, m)
+        Gaps at the end of the step, and the slips of the whole step [length].
+    before : (ndarray (k, m), ndarray (m,), ndarray (m,))
         Slips along the tangents [length], frictional work [energy] and normal forces [force] at the beginning of the last
         increment; see `Slid`.
     """
-    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros((2, lag.shape[1])), 0, True
-    gap = closing[0]
+    closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
+    gap = now = closing[0]
     added = np.where(gap > 0.0, closing[1:], 0.0)
     lag = lag + np.vstack([np.zeros_like(gap), added])
-    for part in range(1, parts + 1):
-        beside = (1.0 - part / parts) * lag
+
+    def increment(end: float) -> Forces:
+        beside = (1.0 - end) * lag
         beside[1:] -= slip
+        return solve(beside, ~waiting, closed, y if y.any() else None)
+
+    begin = 0.0
+    while begin < 1.0:
+        end, forces = 1.0, increment(1.0)
+        iterations += forces.iterations
+        if (waiting & (forces.gaps[0] < 0.0)).any():
+            part, touching = _touching(now, forces.gaps[0], waiting, _together(len(slip), int(closed.sum())))
+            end = begin + part * (1.0 - begin)
+            forces = increment(end)
+            iterations += forces.iterations
+            waiting = waiting & ~touching
         before = slip, work.copy(), y[0]
-        forces = solve(beside, closed, y if y.any() else None)
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
         whole = slip + forces.gaps[1:]
         left = np.divide(np.maximum(forces.gaps[0], 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
         slip = whole - left * added
-        y, closed = forces.y, forces.closed
-        iterations += forces.iterations
+        begin, y, closed, now = end, forces.y, forces.closed, forces.gaps[0]
         settled &= forces.settled
     gaps = np.vstack([forces.gaps[:1], whole])
-    return replace(forces, gaps=gaps, iterations=iterations, settled=settled), before
+    return replace(forces, iterations=iterations, settled=settled), gaps, before
+
+
+def _together(k: int, closed: int) -> int:
+    """Return the number of constraints that close together: in 3D (k = 2) as many as a row at the edge of `closed` ones."""
+    return max(int(closed ** (1.0 - 1.0 / k)), int(GROWTH * closed), 1)
+
+
+def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[float, Mask]:
+    """Return the fraction of the remaining step at which the next `count` constraints close, and which (m,) these are.
+
+    `now` and `end` are the gaps (m,) now and at the end of the step, if the `waiting` constraints (m,) carry no forces
+    [length]. The fraction is the mean of theirs.
+    """
+    closing = waiting & (end < 0.0)
+    fraction = np.divide(np.maximum(now, 0.0), now - end, out=np.full_like(now, np.inf), where=closing & (now > end))
+    first = np.sort(fraction[closing])[:count]
+    return min(float(first.mean()), 1.0), closing & (fraction <= first[-1] * (1.0 + EQUAL))
 
 
 def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
-    """Return the frictional work in an increment.
+    """Return the frictional work (m,) in an increment [energy].
 
     The tangential force is integrated over the slip by the trapezoidal rule. Since sliding friction is at its limit, the
     tangential force at the beginning is that at the end, scaled by the ratio of the normal forces.
@@ -88,15 +126,9 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
         Tangential forces at the end of the increment [force].
     slip : ndarray (k, m)
         Slips in the increment [length].
-
-    Returns
-    -------
-    ndarray (2, m)
-        Frictional work of each constraint, and the same if the constraint closes in the increment, otherwise zero [energy].
     """
-    once = -0.5 * (tangential * slip).sum(axis=0)
     ratio = np.divide(before, normal, out=np.zeros_like(normal), where=normal > 0.0)
-    return np.stack([(1.0 + ratio) * once, np.where(before == 0.0, once, 0.0)])
+    return np.asarray(-0.5 * (1.0 + ratio) * (tangential * slip).sum(axis=0))
 
 
 def shifted(constraints: Constraints, slid: Slid) -> Constraints:

@@ -30,8 +30,6 @@ from fastcontact.linear.delassus import MOST_ROWS_WITH_FRICTION, check_rows
 from fastcontact.linear.protocol import Loaded, LoadedNonsymmetric
 
 log = logging.getLogger("fastcontact")
-# Accuracy of the increments of a step in `eliminated`. The last increment is solved again to the accuracy of the step.
-ROUGH = Accuracy(0.0, residual=1e-4)
 
 
 def solve(
@@ -72,7 +70,7 @@ def solve(
         log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
-    begun = begun if path is None else begun | path.loaded
+    begun = begun if path is None else begun | ~path.waiting
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
@@ -101,9 +99,12 @@ def _eliminated(
         cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
         return cone
 
-    def beside(offset: Array, closed: Mask, forces: Array | None) -> dense.Forces:
+    def beside(offset: Array, among: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
         at = constraints.gaps_at_rest() + offset
-        return solved(replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=None), closed, ROUGH, forces)
+        at[0, ~among] += far
+        cone = solved(replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=None), closed, accuracy, forces)
+        cone.gaps[0, ~among] -= far
+        return cone
 
     try:
         if path is None:
@@ -111,7 +112,10 @@ def _eliminated(
         else:
             y = path.forces(constraints.directions, np.arange(len(constraints)))
             closing = path.closed(constraints.directions, np.arange(len(constraints)))
-            cone, before = along(_lag(loaded, constraints, path, y), closing, y, path.parts, beside)
+            lag = _lag(loaded, constraints, path, y)
+            far = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
+            cone, gaps, before = along(lag, closing, y, path.waiting, beside)
+            cone = replace(cone, gaps=gaps)
     except ConvergenceError:
         return None
     return FrictionalEquilibrium(
@@ -169,16 +173,19 @@ def _among(
         begin[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
     equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
 
-    def solved(beside: Array, closed: Mask, start: Array | None) -> dense.Forces:
-        return _on_delassus_operator(F, free + beside, constraints.coefficients[rows], closed, equations, start)
-
+    mu = constraints.coefficients[rows]
     if path is None:
-        result, before = solved(np.zeros_like(free), closed[rows], start), None
+        result, before = _on_delassus_operator(F, free, mu, closed[rows], equations, start), None
+        relative = result.gaps
     else:
         lag = -free - (F @ begin.ravel()).reshape(free.shape)
         lag[0] += closing[0]
-        result, before = along(lag, closing, begin, path.parts, solved)
-    y, relative = result.y, result.gaps
+
+        def increment(beside: Array, among: Mask, closed: Mask, start: Array | None) -> dense.Forces:
+            return _on_part_of_delassus_operator(F, free + beside, mu, among, closed, equations, start)
+
+        result, relative, before = along(lag, closing, begin, path.waiting[rows], increment)
+    y = result.y
     if Q is not None:
         y, relative = (Q.T @ y.ravel()).reshape(y.shape), (Q.T @ relative.ravel()).reshape(y.shape)
     u = loaded.involved_solution(R.T @ y.ravel(), u)
@@ -191,12 +198,12 @@ def _among(
     active[rows], sticking[rows] = result.closed, result.sticking
 
     # Constraints that are equations have no friction, and slips along idle tangents do not vary.
-    mu = np.where(equations, 0.0, constraints.coefficients[rows])
+    mu = np.where(equations, 0.0, mu)
     at_end = replace(result, sticking=result.sticking & ~equations)
     return FrictionalEquilibrium(
         u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
         constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
-        response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, mu, at_end)) if path is None else None,
+        response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, mu, at_end)),
     )  # fmt: skip
 
 
@@ -231,7 +238,7 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
 
     Parameters
     ----------
-    before : (ndarray (k, q), ndarray (2, q), ndarray (q,))
+    before : (ndarray (k, q), ndarray (q,), ndarray (q,))
         Slips [length], frictional work [energy] and normal forces [force] that `path.along` returns.
     Q : csr_array, optional
         Rotation of the tangents, which is undone.
@@ -244,11 +251,11 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
     if Q is not None:
         slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
     m, dim = constraints.positions.shape
-    slid = Slid(np.zeros((m, dim)), np.zeros((2, m)), np.zeros(m))
+    slid = Slid(np.zeros((m, dim)), np.zeros(m), np.zeros(m))
     slid.slip[rows] = sum(
         along[:, None] * tangent[rows] for along, tangent in zip(slip, constraints.directions, strict=True)
     )
-    slid.work[:, rows], slid.normal[rows] = work, normal
+    slid.work[rows], slid.normal[rows] = work, normal
     return slid
 
 
@@ -286,6 +293,24 @@ def _on_delassus_operator(
     now, sticking = equality.copy(), equality.copy()
     now[~equality], sticking[~equality] = forces.closed, forces.sticking
     return replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
+
+
+def _on_part_of_delassus_operator(
+    F: Array, free: Array, friction: Array, among: Mask, closed: Mask, equality: Mask, start: Array | None
+) -> dense.Forces:
+    """Return the solution of `_on_delassus_operator` if only the constraints `among` (m,) carry forces."""
+    rows = np.flatnonzero(among)
+    unknown = (np.arange(len(free))[:, None] * len(among) + rows).ravel()
+    start = None if start is None else start[:, rows]
+    part = _on_delassus_operator(
+        F[np.ix_(unknown, unknown)], free[:, rows], friction[rows], closed[rows], equality[rows], start
+    )
+    y = np.zeros_like(free)
+    y[:, rows] = part.y
+    now, sticking = np.zeros((2, len(among)), bool)
+    now[rows], sticking[rows] = part.closed, part.sticking
+    gaps = free + (F[:, unknown] @ part.y.ravel()).reshape(free.shape)
+    return replace(part, y=y, gaps=gaps, closed=now, sticking=sticking)
 
 
 def _turned(C: Array, along: Array) -> Array:
