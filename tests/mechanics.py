@@ -112,7 +112,9 @@ def friction(settled, sizes: Sizes) -> tuple[float, float]:
         return 0.0, 0.0
     rubbing = np.linalg.norm(state.tangential, axis=1)
     outside = (rubbing - constraints.coefficients * state.multiplier).max(initial=0.0)
-    driving = np.einsum("mk,mk->m", state.tangential, state.slip).max(initial=0.0)
+    # In steps that are solved in increments, slips may turn round between them.
+    work = -np.einsum("mk,mk->m", state.tangential, state.slip) if state.work is None else state.work
+    driving = -work.min(initial=0.0)
     return float(outside / sizes.force), float(driving / (sizes.force * sizes.length))
 
 
