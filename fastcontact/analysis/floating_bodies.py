@@ -18,6 +18,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -102,14 +103,20 @@ class Freed:
 
         In motions that contact does not restrain, the springs move by their elongation.
         """
-        left = elongation + self.stretched @ elongation
-        return np.asarray(elongation - np.linalg.lstsq(self.stretched, left, rcond=LENGTH_ROUND_OFF)[0])
+        return elongation - self._inverse @ (elongation + self.stretched @ elongation)
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
         u = self.held(force, gaps)
-        position = np.linalg.lstsq(self.stretched, -u[self.springs], rcond=LENGTH_ROUND_OFF)[0]
-        return np.asarray(u + self.moved @ position)
+        return np.asarray(u - self.moved @ (self._inverse @ u[self.springs]))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        """Inverse (k, k) of `stretched`, zero for motions that contact does not restrain; the others have values about 1."""
+        U, values, V = np.linalg.svd(self.stretched)
+        return np.asarray(
+            (V.T * np.divide(1.0, values, out=np.zeros_like(values), where=values > LENGTH_ROUND_OFF)) @ U.T
+        )
 
 
 class FloatingBodies:

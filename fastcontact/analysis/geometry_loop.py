@@ -184,7 +184,7 @@ class _Moved:
     size : float
         Largest displacement, to which the change is compared [length].
     relative : float
-        The ratio of both, zero without displacements [-].
+        The ratio of both, zero without displacements and for changes that are round-off of gaps [-].
     """
 
     before: Array
@@ -202,7 +202,8 @@ def _move(
     # The unknowns of the solution do not include rigid-body motions of floating bodies, which may be much larger.
     size = max(step.dofs.size(solution.u), largest(step.load.lift))
     change = largest_difference(displacement, before)
-    moved = _Moved(before, change, size, change / size if size else 0.0)
+    known = size and change > step.state.gap_round_off
+    moved = _Moved(before, change, size, change / size if known else 0.0)
     iterate.remember(constraints, solution)
     iterate.history.append(
         {
