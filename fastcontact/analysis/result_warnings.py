@@ -100,7 +100,7 @@ def _held(pair: Formulation, contact: ContactResult, undetermined: Mask) -> Iter
         yield (
             f"contact '{contact.name}': supports hold {held} of the {pair.secondary.n_facets} facets of "
             f"'{pair.secondary.group}' and what they face, about {where}: nothing determines what goes from one to the other "
-            "in the held directions, and 0 is told; the reactions contain it. Free the nodes of one side there"
+            "in the held directions, and 0 is reported; the reactions contain it. Free the nodes of one side there"
         )
 
 

@@ -401,14 +401,6 @@ def test_groups_without_points():
             act(model(mesh))
 
 
-def test_the_first_of_several_changes():
-    from fastcontact.analysis.active_set import _first_changed
-
-    active, wanted = np.array([True, False, True, False]), np.array([True, True, False, False])
-    assert _first_changed(active, wanted).tolist() == [True, True, True, False]
-    assert active.tolist() == [True, False, True, False]
-
-
 def test_without_supports_there_is_no_plane_of_symmetry():
     from fastcontact.contact.contact_middle import symmetry_planes
 

@@ -194,7 +194,7 @@ def test_from_case_file_to_result_file(tmp_path):
     assert there.force[1] == pytest.approx(-2.0e5, rel=1e-8)
     summary = json.loads(json.dumps(summarise(case, steps[-1], [of_step(step) for step in steps], {}, [])))
     assert summary["contact"]["plane"]["obstacle_displacement"] == contact.obstacle_displacement.tolist()
-    assert any("obstacle 'plane' stands (0, -" in line for line in lines(summary))
+    assert any("obstacle 'plane' is displaced by (0, -" in line for line in lines(summary))
     with fc.open_results(tmp_path / "r.vtkhdf") as results:
         for step, stored in zip(steps, results, strict=True):
             place = stored.contact["plane"].obstacle_displacement

@@ -150,6 +150,7 @@ def test_hot_bars_press_and_conduct_as_their_stretches_say():
     assert step.heat["exchanges"] > 2
 
 
+@pytest.mark.filterwarnings("ignore:contact .* supports hold .* of the .* facets")
 @pytest.mark.parametrize("formulation", ["mortar", "continuous", "node_to_segment"])
 def test_heat_is_conducted_in_the_deformed_bodies_and_across_the_deformed_contact(formulation):
     mesh = fc.generate.block_on_block("quad4", **{**BARS, "divisions_upper": (3, 8)})

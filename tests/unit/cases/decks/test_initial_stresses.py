@@ -47,6 +47,7 @@ def test_a_stress_in_a_set_and_one_of_an_element(tmp_path):
     assert np.abs(step.stress).max() < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:contact .* supports hold .* of the .* facets")
 def test_the_order_of_the_shears_is_that_of_abaqus(tmp_path):
     """12, 13, 23: held on all sides, the cubes keep their stress."""
     sets = "*Nset, nset=all, generate\n1, 8\n11, 18\n*Elset, elset=both\n1, 2\n"
