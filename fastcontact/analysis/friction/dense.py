@@ -151,7 +151,7 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
     parts, among = np.arange(len(y)), np.arange(len(rows))
     E, D = law.linearised(y, gaps, rows, sticking)
     unknown = (parts[:, None] * y.shape[1] + rows).ravel()
-    A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), -1))
+    A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), len(unknown)))
     for b in parts:
         A[:, among, b * len(rows) + among] += E[:, b]
     return A.reshape(unknown.size, -1), D
