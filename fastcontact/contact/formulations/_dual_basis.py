@@ -40,8 +40,8 @@ COVERED = 0.15
 # percent.
 EQUAL = 0.9
 # Dual functions count as ill conditioned if the root mean square of one of them exceeds MOST, or if the integral of one of
-# them is negative. Dual functions of complete facets have root mean squares up to 2.4 (nine nodes).
-MOST = 20.0
+# them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine nodes).
+MOST, LEAST = 20.0, 0.2
 
 
 @cache
@@ -111,7 +111,7 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
 
 
 def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
-    """Return for which facets (n_facets,) the dual functions are well conditioned, see MOST.
+    """Return for which facets (n_facets,) the dual functions are well conditioned, see MOST and LEAST.
 
     Parameters are those of `biorthogonal`, with its result `dual`.
     """
@@ -121,8 +121,8 @@ def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
         size = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
         # The dual functions sum to one if all coefficients of their sum are one.
         off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)
-        integral = np.where(partial, np.einsum("fab,fb->fa", dual, weight), np.inf).min(axis=1)
-    return ((size <= MOST) & (off <= LENGTH_ROUND_OFF) & (integral > 0.0)) | ~partial.any(axis=1)
+        share = np.where(partial, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
+    return ((size <= MOST) & (off <= LENGTH_ROUND_OFF) & (share >= 0.0)) | ~partial.any(axis=1)
 
 
 def biorthogonal(mass: Array, partial: Mask) -> tuple[Array, Array]:
