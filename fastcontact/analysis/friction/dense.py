@@ -151,10 +151,10 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
     parts, among = np.arange(len(y)), np.arange(len(rows))
     E, D = law.linearised(y, gaps, rows, sticking)
     unknown = (parts[:, None] * y.shape[1] + rows).ravel()
-    A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), len(unknown)))
+    A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), -1))
     for b in parts:
         A[:, among, b * len(rows) + among] += E[:, b]
-    return A.reshape(len(unknown), len(unknown)), D
+    return A.reshape(unknown.size, -1), D
 
 
 def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
@@ -186,7 +186,7 @@ def _units(F: Array, m: int) -> Array:
     The parameter of the complementarity function, which multiplies gaps and slips, can then be one for all constraints.
     """
     compliance = np.diag(F)[:m]
-    return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max(initial=0.0))))
+    return np.asarray(1.0 / np.sqrt(np.maximum(compliance, np.finfo(float).eps * compliance.max())))
 
 
 def _solved(A: Array, right: Array) -> Array:
