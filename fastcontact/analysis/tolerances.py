@@ -22,7 +22,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.arrays import Array
 from fastcontact.linear.protocol import LinearSolver
-from fastcontact.round_off import SINGLE_PRECISION
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Relative residual of the first solution of a step by an iterative solver. The relative residual of later solutions is
 # RESIDUAL times the last relative change of the displacements or the last residual, whichever is smaller: the pairing is no
@@ -139,7 +139,8 @@ class Watch:
         size : float
             Largest displacement [length].
         contraction : float
-            Factor by which updates are known to contract changes. Half the window then suffices if it is below DECLINE [-].
+            Factor by which updates are known to contract changes. Half the window then suffices for small changes if it is
+            below DECLINE [-].
 
         Returns
         -------
@@ -150,7 +151,8 @@ class Watch:
             self.forget()
             return None
         self._window.append((unknowns.copy(), force.copy(), change))
-        window = WINDOW if contraction > DECLINE else WINDOW // 2
+        sooner = contraction <= DECLINE and change <= LENGTH_ROUND_OFF * size
+        window = WINDOW // 2 if sooner else WINDOW
         if len(self._window) < window:
             return None
         (parts, forces, changes), half = zip(*list(self._window)[-window:], strict=True), window // 2

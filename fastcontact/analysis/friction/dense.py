@@ -163,18 +163,19 @@ def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
     The function returns the change (1 + k, m) of the forces due to a change (1 + k, m) of the gaps and slips without forces.
     F and mu are those of `solve`.
     """
-    rows, unit = np.flatnonzero(forces.closed), _units(F, len(mu))
+    rows = np.flatnonzero(forces.closed)
+    if not len(rows):
+        return np.zeros_like
+    unit = _units(F, len(mu))
     everywhere = np.tile(unit, len(forces.y))
     A, D = _equations(
         Law(mu), everywhere[:, None] * F * everywhere, forces.y / unit, forces.gaps * unit, rows, forces.sticking
     )
-    factors = lu_factors(A) if len(rows) else None
+    factors = lu_factors(A)
 
     def varied(gaps: Array) -> Array:
-        change = np.zeros_like(gaps)
-        if factors is not None:
-            right = -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
-            change[:, rows] = lu_solve(factors, right.ravel()).reshape(right.shape)
+        change, right = np.zeros_like(gaps), -np.einsum("abq,bq->aq", D, (gaps * unit)[:, rows])
+        change[:, rows] = lu_solve(factors, right.ravel()).reshape(right.shape)
         return change * unit
 
     return varied

@@ -222,10 +222,7 @@ def _response(
     forces : tuple
         Arguments of `dense.response`.
     """
-    R, rows, Q = among
-    if not len(rows):
-        return response(loaded, R, rows, np.negative)
-    varied = dense.response(*forces)
+    (R, rows, Q), varied = among, dense.response(*forces)
 
     def forces_of(values: Array) -> Array:
         values = (values if Q is None else Q @ values).reshape(-1, len(rows))
