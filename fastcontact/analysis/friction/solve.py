@@ -225,7 +225,7 @@ def _response(
     (R, rows, Q), varied = among, dense.response(*forces)
 
     def forces_of(values: Array) -> Array:
-        values = (values if Q is None else Q @ values).reshape(-1, len(rows))
+        values = (values if Q is None else Q @ values).reshape(1 + len(held), len(rows))
         values[1:][held] = 0.0
         change = varied(values).ravel()
         return change if Q is None else np.asarray(Q.T @ change)
