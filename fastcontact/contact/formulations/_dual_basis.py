@@ -31,11 +31,8 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, TINY
 # are positive.
 SHARE, SHARE_WITHOUT_CENTRE = 0.25, 0.375
 # A node has no gap, and a function no dual function where those of the facet would otherwise be ill conditioned, if a smaller
-# fraction of its weight faces the other side. A weighted gap is that of the covered part, extrapolated to the node. On a line
-# of three nodes of which half is covered, the weight of the far end is 1/8, and the integral of its absolute dual function
-# is 24 times that of the function itself: a gap of facets that are coarse beside their waves (seed 40032 of the random
-# models) is magnified by this factor.
-COVERED = 0.15
+# fraction of its weight faces the other side. A weighted gap is that of the covered part, extrapolated to the node.
+COVERED = 0.02
 # Covered fractions above this multiple of the largest one count as equal to it: on curved facets they differ by a few
 # percent.
 EQUAL = 0.9
