@@ -57,6 +57,16 @@ def test_every_start_ends_in_the_enumerated_solution(seed, soft, start):
     assert np.abs(state.gap * state.multiplier).max() < 1e-9
 
 
+def test_sets_that_recur_are_left_by_the_least_index():
+    """Changing all wrong constraints at once, from an empty set, comes back to a set after six solutions."""
+    B = np.array([[-2.0, -2.0, -2.0, -1.0], [2.0, 0.0, -1.0, 2.0], [-3.0, -2.0, -1.0, -2.0], [1.0, -1.0, 0.0, 3.0]])
+    K, f, gap0 = np.eye(4), np.zeros(4), np.array([-8.0, -8.0, -2.0, -3.0])
+    state = solve(K, f, B, gap0)
+    assert state.settled
+    assert state.iterations > 6
+    assert state.multiplier == pytest.approx(enumerate_solutions(K, f, B, gap0, np.zeros((4, 4))), abs=1e-8)
+
+
 @pytest.mark.parametrize("solver", linear.SOLVERS)
 def test_every_linear_solver_gives_the_same_state(solver):
     K, f, B, gap0, _ = random_problem(3)
