@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array
 
 from fastcontact._jit.parallel import portions, shared
 from fastcontact.arrays import Array, Indices, Mask, Numbers
@@ -21,9 +22,10 @@ from fastcontact.contact.search.facet_tables import tables
 from fastcontact.contact.surface import FacetBlock, Surface, line_neighbours
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Facets whose normals enclose a smaller angle than this approximate a smooth surface; others form a corner [degrees].
-CORNER = 45.0
+CORNER = 48.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +76,46 @@ def _of_block(block: FacetBlock, rows: Indices, xi: Array) -> Places:
     """Return the points at reference coordinates `xi` (n, dim - 1) in the facets `rows` (n,) of a block."""
     element = elements.get(block.element)
     return Places(block.facets[rows], block.local[rows], element.shape(xi), element.gradient(xi))
+
+
+def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, Indices, Array]:
+    """Return all facets on which points of a side lie: those that meet in a point on an edge or at a corner.
+
+    Which of them a projection finds depends on round-off.
+
+    Parameters
+    ----------
+    side : Surface
+    facet : ndarray of int (n,)
+        One facet of each point.
+    xi : ndarray (n, dim - 1)
+        Its reference coordinates there.
+
+    Returns
+    -------
+    point, facet : ndarray of int (p,)
+        Numbers of the points and of the facets; points are in ascending order, and each is there at least once.
+    xi : ndarray (p, dim - 1)
+        Reference coordinates of the point in the facet.
+    """
+    at = places(side, facet, xi)
+    row, k = np.nonzero(np.abs(at.shape) > LENGTH_ROUND_OFF)
+    around = csr_array((np.ones(len(row)), (row, at.local[row, k])), shape=(len(facet), len(side.points)))
+    local = [block.local for block in side.blocks]
+    ends = np.concatenate([[0], np.cumsum(np.concatenate([np.full(len(nodes), nodes.shape[1]) for nodes in local]))])
+    nodes = np.concatenate([nodes.ravel() for nodes in local])
+    common = coo_array(
+        around @ csr_array((np.ones(len(nodes)), nodes, ends), shape=(len(ends) - 1, len(side.points))).T
+    )
+    whole = common.data == np.diff(around.indptr)[common.row]
+    point, other = common.row[whole].astype(np.intp), common.col[whole].astype(np.intp)
+    found, first = np.empty((len(point), xi.shape[1])), 0
+    for block in side.blocks:
+        rows = np.flatnonzero((other >= first) & (other < first + len(block.local)))
+        same = block.local[other[rows] - first][:, :, None] == at.local[point[rows]][:, None]
+        found[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
+        first += len(block.local)
+    return point, other, found
 
 
 def nodal_normals(side: Surface, coordinates: Array) -> Array:

@@ -27,6 +27,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import Pairing, normals
+from fastcontact.contact.projection import at_common_edges, places
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import nodal_rows
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
@@ -172,11 +173,15 @@ def with_arms(constraints: Constraints, pairing: Pairing, primary: Surface, poin
         Reference coordinates [length].
     """
     size = float(np.ptp(constraints.positions, axis=0).max(initial=0.0))
-    normal, facing = normals(constraints.directions), pairing.places(primary, np.arange(len(constraints)))
-    axes = np.einsum("mkj,mkd->mdj", facing.gradient, points[facing.nodes])
-    along = np.einsum("mkj,mjd->mkd", facing.gradient, np.linalg.pinv(axes))
-    slopes = [np.einsum("mkd,md->mk", along, direction) for direction in constraints.directions]
-    levers = [nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
+    # At an edge the derivative is the mean of those on the facets that meet there: round-off decides which one is found.
+    point, facet, xi = at_common_edges(primary, pairing.facet, pairing.xi)
+    normal, facing = normals(constraints.directions)[point], places(primary, facet, xi)
+    axes = np.einsum("pkj,pkd->pdj", facing.gradient, points[facing.nodes])
+    along = np.einsum("pkj,pjd->pkd", facing.gradient, np.linalg.pinv(axes))
+    share = 1.0 / np.bincount(point)
+    mean = csr_array((share[point], (point, np.arange(len(point)))))
+    slopes = [np.einsum("pkd,pd->pk", along, direction[point]) for direction in constraints.directions]
+    levers = [mean @ nodal_rows(facing.nodes, slope[:, :, None] * normal[:, None, :], points.size) for slope in slopes]
     rotations, translations = _rotations(points), np.tile(np.eye(points.shape[1]), (len(points), 1))
     arms = np.stack([lever @ rotations for lever in levers], axis=1)
     left = np.stack([tangent @ rotations for tangent in constraints.tangents], axis=1)

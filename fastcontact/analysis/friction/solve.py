@@ -96,7 +96,7 @@ def _eliminated(
         if solution is None:
             raise ConvergenceError("friction: the iteration on eliminated constraints did not settle")
         u, cone = solution
-        cone.gaps[0, ~usable], cone.gaps[1:, ~usable] = np.inf, 0.0
+        cone.gaps[:, ~usable] = 0.0
         return cone
 
     def beside(offset: Array, among: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
@@ -118,8 +118,9 @@ def _eliminated(
             cone = replace(cone, gaps=gaps)
     except ConvergenceError:
         return None
+    gap = np.where(usable, cone.gaps[0], np.inf)
     return FrictionalEquilibrium(
-        u, cone.y[0], cone.gaps[0], cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
+        u, cone.y[0], gap, cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
         cone.residual, cone.iterations, constraints.directions,
         slid=None if before is None else _slid(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
