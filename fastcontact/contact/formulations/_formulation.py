@@ -253,8 +253,8 @@ class Formulation(ABC):
             return None
         constraints = self.unilateral(Configuration.undeformed(self.points))
         if isinstance(self.primary, Surface) and constraints.tangents:
-            smooth = self.normals if self.normals != "secondary" and self.normals is not None else "facet"
-            pairing = pair(constraints.positions, self.primary, self.points, np.inf, smooth)
+            # Beside a concave edge two facets may be equally close; along averaged normals the projection is unique.
+            pairing = pair(constraints.positions, self.primary, self.points, np.inf, "averaged")
             constraints = with_arms(constraints, pairing, self.primary, self.points)
         moments, areas = moments_of(constraints)
         return tied(constraints, moments, areas, self._tied_at_supports(constraints, moments, areas))
