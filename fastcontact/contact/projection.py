@@ -24,7 +24,8 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
-# Facets whose normals enclose a smaller angle than this approximate a smooth surface; others form a corner [degrees].
+# Facets whose normals enclose a smaller angle than this approximate a smooth surface; others form a corner [degrees]. The
+# value lies between the angles of octagons and of heptagons, so that round-off does not decide about regular polygons.
 CORNER = 48.0
 
 

@@ -175,7 +175,7 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     at = np.repeat(np.arange(side.n_facets), size), nodes
     incidence = csr_array((np.ones(len(nodes)), at), shape=(side.n_facets, len(side.points)))
     i, j = (incidence @ incidence.T).tocoo().coords
-    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER)) - LENGTH_ROUND_OFF
+    smooth = np.einsum("nd,nd->n", normal[i], normal[j]) > np.cos(np.radians(CORNER))
     near = csr_array((np.ones(smooth.sum()), (i[smooth], j[smooth])), shape=(side.n_facets, side.n_facets))
     around = csr_array(near @ incidence)
     valid = np.arange(np.diff(around.indptr).max()) < np.diff(around.indptr)[:, None]

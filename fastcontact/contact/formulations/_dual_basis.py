@@ -38,7 +38,9 @@ COVERED = 0.02
 EQUAL = 0.9
 # Dual functions count as ill conditioned if the root mean square of one of them exceeds MOST, or if the integral of one of
 # them is less than LEAST times its weight. Dual functions of complete facets have root mean squares up to 2.4 (nine nodes).
-MOST, LEAST = 20.0, 0.2
+# If the nodes of an edge are left out, those of the other corners of eight nodes have 0.21 of their weights, and that of the
+# other corner of six nodes has none.
+MOST, LEAST = 20.0, 0.1
 
 
 @cache
@@ -76,7 +78,8 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
     r"""Return the dual functions of facets of which an arbitrary part faces the other side.
 
     If the dual functions of a facet are ill conditioned, functions are left out: first those with a small covered fraction,
-    then all but those with the largest fraction, and finally all but the first of the latter.
+    then all but those with the largest fraction, then those whose dual functions have small integrals, and finally all but
+    the first of those with the largest fraction.
 
     Parameters
     ----------
@@ -98,10 +101,12 @@ def dual_functions(mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Arr
     # Nearly equal fractions are treated as equal, so that the choice does not change as facets deform.
     large = share >= EQUAL * share.max(axis=1, keepdims=True)
     largest = np.argmax(large, axis=1)[:, None] == np.arange(partial.shape[1])
-    for fewer in (partial & (fraction > COVERED), partial & large, partial & largest):
+    for fewer in (partial & (fraction > COVERED), partial & large, None, partial & largest):
         wild = np.flatnonzero(~_tame(dual, mass, partial))
         if not len(wild):
             break
+        if fewer is None:
+            fewer = partial & _sufficient(dual, mass)
         partial[wild] = np.where(np.any(fewer[wild], axis=1, keepdims=True), fewer[wild], partial[wild])
         dual[wild], D[wild] = biorthogonal(mass[wild], partial[wild])
     return dual, D
@@ -113,13 +118,19 @@ def _tame(dual: Array, mass: Array, partial: Mask) -> Mask:
     Parameters are those of `biorthogonal`, with its result `dual`.
     """
     area = np.maximum(mass.sum(axis=(1, 2)), TINY)
-    weight = mass.sum(axis=2)
     with np.errstate(invalid="ignore", over="ignore"):
         size = np.sqrt(np.einsum("fab,fbc,fac->fa", dual, mass, dual) / area[:, None]).max(axis=1)
         # The dual functions sum to one if all coefficients of their sum are one.
         off = np.abs(dual.sum(axis=1) - 1.0).max(axis=1)
-        share = np.where(partial, np.einsum("fab,fb->fa", dual, weight) - LEAST * weight, 0.0).min(axis=1)
-    return ((size <= MOST) & (off <= LENGTH_ROUND_OFF) & (share >= 0.0)) | ~partial.any(axis=1)
+    sufficient = (_sufficient(dual, mass) | ~partial).all(axis=1)
+    return ((size <= MOST) & (off <= LENGTH_ROUND_OFF) & sufficient) | ~partial.any(axis=1)
+
+
+def _sufficient(dual: Array, mass: Array) -> Mask:
+    """Return which dual functions (n_facets, k) have integrals of at least LEAST times their weights."""
+    weight = mass.sum(axis=2)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(np.einsum("fab,fb->fa", dual, weight) >= LEAST * weight)
 
 
 def biorthogonal(mass: Array, partial: Mask) -> tuple[Array, Array]:
