@@ -266,8 +266,9 @@ class Formulation(ABC):
             return None
         nodes = self.nodes_of(constraints, moments)
         frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
-        axes = np.stack(frames, axis=1)
-        axes /= np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), TINY)
+        # The nearest orthonormal axes to the means do not depend on the choice of the tangents.
+        left, lengths, right = np.linalg.svd(np.stack(frames, axis=1))
+        axes = (left * (lengths > 0.0)[:, None]) @ right
         sizes = np.ones(len(nodes)) if areas is None else np.where(np.isfinite(areas), areas, 0.0)
         return reduction(
             axes, np.where(sizes[:, None, None] > 0.0, held[nodes], 0.0), nodes, sizes, self.secondary.beside
