@@ -44,7 +44,7 @@ from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import Entries, rows_of, scaled
 from fastcontact.mesh import elements
-from fastcontact.round_off import SINGLE_PRECISION, TINY
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
 # A tangent of which a smaller fraction, squared, is free counts as held.
@@ -365,7 +365,7 @@ class WeightedMortar(Formulation):
         return (enough | rescued) & (complete > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
-        """Return unit means (m, dim) of the primary normals that the nodes face; the last axis where there are none.
+        """Return unit means (m, dim) of the primary normals that the nodes face; where there are none, that of all nodes.
 
         Against an obstacle these are the normals at the nodes themselves, which lie in planes of symmetry.
         """
@@ -387,8 +387,11 @@ class WeightedMortar(Formulation):
             faced = coupling.integrals @ normals_of[coupling.primary.element][primary_facet]
             np.add.at(mean, coupling.secondary.local[secondary_facet], tests[coupling.secondary.element] @ faced)
         self.secondary.add_across_ends(mean)
-        length = np.linalg.norm(mean, axis=1, keepdims=True)
-        return np.where(length > 0, mean / np.where(length > 0, length, 1.0), np.eye(mean.shape[1])[-1])
+        length, others = np.linalg.norm(mean, axis=1, keepdims=True), mean.sum(axis=0)
+        if np.linalg.norm(others) <= LENGTH_ROUND_OFF * length.sum():
+            others = np.eye(len(others))[-1]
+        mean = np.where(length > 0.0, mean, others)
+        return mean / np.linalg.norm(mean, axis=1, keepdims=True)
 
     def _clearance(self, rows: csr_array, across: csr_array, weight: Array) -> Array:
         """Return the contribution of nodal clearances on both sides to the weighted gaps (m,) [length]."""
