@@ -33,7 +33,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.model.rigid_motions import FreeMotions
-from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 # Stiffness of the springs relative to that of the softest body: STIFF for factors, whose accuracy soft springs reduce (with
 # 1e-6, a wedge has an error of 3e-9; with 1e-3, displacements of plates scatter by 2e-11, and with 1 by 1e-12), and SOFT
@@ -203,6 +203,27 @@ class FloatingBodies:
             "relative_to_load": float(left.max() / load) if load else 0.0,
             "positions": rigid.positions,
         }
+
+    def undetermined(self, constraints: Constraints, multiplier: Array, u: Array) -> dict[str, list[str]]:
+        """Return the motions that no contact force restrains at the end of a step, by body.
+
+        Any position without contact forces is then a solution. Forces that a motion by round-off of the displacements u
+        (n_dofs,) [length] would change as much, such as those of sides that just touch, do not count.
+
+        Parameters
+        ----------
+        constraints : Constraints
+            The m constraints.
+        multiplier : ndarray (m,)
+            Their normal forces [force].
+        u : ndarray (n_dofs,)
+        """
+        carries = np.abs(multiplier) > LENGTH_ROUND_OFF * self.stiffness * float(np.abs(u).max())
+        rubs = carries & (constraints.coefficients > 0.0)
+        along = [constraints.B[carries], *(tangent[rubs] for tangent in constraints.tangents)]
+        _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in along]))
+        free = np.append(values, np.zeros(len(V) - len(values))) <= SINGLE_PRECISION
+        return self.motions.combined(V[free].T).by_body() if free.any() else {}
 
     def _owner(self, motions: FreeMotions, dof: int, weightless: Mask) -> str:
         """Return the name of the point or obstacle to which the spring at component `dof` is attached."""

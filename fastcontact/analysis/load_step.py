@@ -118,6 +118,9 @@ def _ended(
         iterations["work"] = end.work.as_dict()
     if problem.floating_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
+        if settled is not None:
+            free = problem.floating_bodies.undetermined(settled.constraints, settled.solution.multiplier, u)
+            iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balanced.reaction, iterations, instant, solution.bodies)
     return end, result if heated is None else heated.completed(problem, result)

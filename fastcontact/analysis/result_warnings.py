@@ -53,7 +53,7 @@ MANY = 10
 
 def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
     """Return the warnings about an analysis whose `last` step ended in a state."""
-    warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state)]
+    warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state), *_undetermined(last)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     if problem.bodies is None:
@@ -183,6 +183,17 @@ def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
         yield (
             f"the springs that regularise {'; '.join(report['motions'])} still carry {report['relative_to_load']:.1e} of "
             "the load: rigid motions are so much larger than deformations that round-off permits no higher accuracy"
+        )
+
+
+def _undetermined(last: StepResult) -> Iterator[str]:
+    """Yield a warning about bodies whose position nothing determines."""
+    free = last.iterations.get("regularised", {}).get("undetermined")
+    if free:
+        named = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in free.items())
+        yield (
+            f"nothing determines the position of bodies, since no contact force acts against their motion ({named}): any "
+            "position without such a force is a solution; hold them by supports or weak springs, or load them"
         )
 
 
