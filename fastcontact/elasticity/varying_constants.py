@@ -70,7 +70,7 @@ class Tabulated:
         elif AXES.index(self.along) < points.shape[1]:
             at = points[:, AXES.index(self.along)]
         else:
-            raise ModelError("a table is along z, but the mesh is plane: take x, y or radius")
+            raise ModelError("a table is along z, but the mesh is plane: use x, y or radius")
         places, values = np.array(self.table).T
         return np.interp(at, places, values)
 

@@ -59,12 +59,12 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
     except (OverflowError, TypeError, ValueError):
-        raise ModelError(f"the table of {caption} must hold pairs (instant, multiplier of the loads)") from None
+        raise ModelError(f"the table of {caption} must contain pairs (instant, multiplier of the loads)") from None
     times = np.asarray([time for time, _ in table])
     if len(table) < 2 or not (np.diff(times) > 0).all():
         raise ModelError(f"the table of {caption} needs at least two points with ascending instants")
     if not np.isfinite(table).all():
-        raise ModelError(f"the table of {caption} holds a number that is not finite: {table}")
+        raise ModelError(f"the table of {caption} contains a number that is not finite: {table}")
     if np.abs(table).max() > LARGEST:
         raise ModelError(f"the table of {caption} is out of range: the size of its numbers must be at most {LARGEST:g}")
     return table

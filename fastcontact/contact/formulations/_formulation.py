@@ -502,7 +502,7 @@ class Formulation(ABC):
         return held
 
     def undetermined(self, at: Configuration) -> Mask:
-        """Return which nodes (n_nodes,) belong to facets between which and what they face nothing determines a traction.
+        """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
         Supports hold all their nodes, and the other side, in one direction. Where they hold the whole side along the
         contact, as in a slice in plane strain, the traction in this direction vanishes.
