@@ -244,7 +244,7 @@ class TotalForce(Load):
 
 
 def listed(groups: Sequence[str] | None) -> str:
-    """Return a description of groups of solid cells, for messages; None stands for all."""
+    """Return a description of groups of solid cells, for messages; None means all."""
     return EVERYWHERE if groups is None else ", ".join(f"'{group}'" for group in groups)
 
 

@@ -255,9 +255,7 @@ class ResultWriter:
         if step.index <= index:
             raise FileError(f"step {step.index} cannot be written after step {index}: write each step once, in order")
         if None not in (case, _case_of(step)) and case != _case_of(step):
-            raise FileError(
-                f"step {step.index} belongs to another case than step {index}: write it to a file of its own"
-            )
+            raise FileError(f"step {step.index} belongs to another case than step {index}: write it to a separate file")
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
         """Finish the file; further calls have no effect.
