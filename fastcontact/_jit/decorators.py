@@ -20,7 +20,7 @@ from fastcontact._jit import cache, compiling, interpreting
 
 log = logging.getLogger("fastcontact")
 
-# Arithmetic is done as written, without fused multiply-add. A kernel called by others is compiled once by itself and once
+# Arithmetic is done as written, without fused multiply-add. A kernel called by others is compiled once separately and once
 # as a part of each of them, and optimised differently there. Which of the copies runs depends on what was compiled or
 # loaded before. Their results are bitwise identical only if each operation has a unique result.
 AS_WRITTEN: set[str] = set()

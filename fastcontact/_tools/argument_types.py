@@ -2,7 +2,7 @@
 
 The annotation of an argument determines its allowed types. Numbers are real numbers, including those of NumPy but not
 booleans. Sequences include arrays and iterators but not strings. Arrays are all values that NumPy converts to an array. The
-call itself checks the values.
+function that is called checks the values.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ _REAL = {bool: "True or False", int: "a whole number", float: "a number"}
 def typed(error: type[FastcontactError]) -> Callable[[F], F]:
     """Return a decorator that raises `error` for arguments that do not match their annotation.
 
-    It decorates functions, and classes, of which it checks the constructor and the public methods.
+    The decorated object is a function or a class. The constructor and the public methods of a class are checked.
     """
 
     def decorate(call: F) -> F:
@@ -83,7 +83,7 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 def _refusal(
     call: Callable[..., Any], signature: inspect.Signature, called: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> TypeError:
-    """Return the error for missing, unknown and misplaced arguments: Python's, with the name that the user knows."""
+    """Return Python's error for missing, unknown and misplaced arguments, with the public name of the call."""
     parameters = signature.parameters.values()
     by_place = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
     by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
@@ -91,7 +91,7 @@ def _refusal(
         required = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY and p.default is p.empty]
         example = ", ".join(f"{key}=..." for key in (required or by_name)[:3])
         places = ", ".join([p.name for p in by_place if p.name != "self"]) or "nothing"
-        return TypeError(f"{called} takes {places} by position and all else by name: write {example}")
+        return TypeError(f"{called} takes {places} by position and all other arguments by keyword: write {example}")
     try:
         call(*args, **kwargs)
     except TypeError as failure:
@@ -250,7 +250,7 @@ def _union(members: tuple[Any, ...]) -> Kind:
 
 
 def _series(kind: Any, members: tuple[Any, ...]) -> Kind:
-    """Return the test of a sequence; it tests all members, except of iterators (none) and of arrays (the first)."""
+    """Return the test of a sequence. It tests all members, but none of an iterator and only the first of an array."""
     kinds = [kind_of(member) for member in members if member is not ...]
     if kind is tuple and members and members[-1] is not ...:
         count = {2: "two", 3: "three"}.get(len(members), str(len(members)))

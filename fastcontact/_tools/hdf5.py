@@ -133,7 +133,7 @@ def values(group: Any, name: str) -> AnyArray:
         raise FileError(f"{where} is missing: the file is incomplete, write it anew")
     dataset = group[name]
     if not isinstance(dataset, h5py.Dataset) or dataset.dtype.base.kind not in PLAIN_KINDS:
-        raise FileError(f"{where} holds no plain numbers: the file is damaged, write it anew")
+        raise FileError(f"{where} contains no plain numbers: the file is damaged, write it anew")
     return np.asarray(dataset[()])
 
 

@@ -224,7 +224,7 @@ def _closed_nodes(
     assert constraints.nodal is not None
     if pair.options.always_closed:
         covered = constraints.nodal.covered
-        # Nodes beyond the end of the other side face nothing themselves, but parts of their facets may.
+        # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
         return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
     # Nodes of a cohesive layer are closed under tension as well.
     closed = constraints.nodal.closed_nodes(

@@ -54,8 +54,8 @@ class Extrapolation:
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces], curve: bool = False) -> Extrapolation:
         """Return a copy to which the solution of a step is added.
 
-        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. For a `curve` three
-        steps are kept, otherwise two.
+        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. `curve` keeps three
+        steps, for quadratic extrapolation, instead of two.
         """
         curved = self.curved
         if self.earlier:
@@ -70,7 +70,7 @@ class Extrapolation:
         return last + self.ratio * (last - before)
 
     def predicted(self, u: Array) -> Array:
-        """Return the result of `displacement`, by quadratic extrapolation if it was closer in the last step."""
+        """Return initial displacements (n,) [length], extrapolated quadratically if this was closer in the last step."""
         return self._quadratic() if self.earlier and self.curved else self.displacement(u)
 
     def _quadratic(self) -> Array:
@@ -89,7 +89,7 @@ class Extrapolation:
         (gap0, force0), (gap1, force1) = first[name], second[name]
         if not len(gap0) == len(gap1) == len(last_active):
             return last_active
-        with np.errstate(invalid="ignore"):  # gaps of nodes that face nothing are infinite
+        with np.errstate(invalid="ignore"):  # gaps of unpaired nodes are infinite
             gap, force = gap1 + self.ratio * (gap1 - gap0), force1 + self.ratio * (force1 - force0)
         return np.where(last_active, force > 0.0, gap < 0.0)
 

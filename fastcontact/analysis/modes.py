@@ -106,7 +106,7 @@ def modes(
     if step is not None and step.displacement.shape != model.mesh.points.shape:
         raise ModelError(
             f"the step has displacements of shape {step.displacement.shape}, but the mesh points of shape "
-            f"{model.mesh.points.shape}: take a step of this model"
+            f"{model.mesh.points.shape}: use a step of this model"
         )
     model = stage_of(model, step)
     sectors = Sectors.of(model)

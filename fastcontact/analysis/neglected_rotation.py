@@ -1,7 +1,7 @@
 """Strains that linear kinematics neglect in bodies that rotate, compared by the work of the stresses.
 
 In a rotation by a small angle, linear kinematics neglect the strain ``0.5 W.T @ W``, where W is the antisymmetric part of
-the displacement gradient. The work of the stresses on it, relative to that on the linear strain, tells whether it matters:
+the displacement gradient. The work of the stresses on it, relative to that on the linear strain, shows whether it matters:
 it vanishes for a beam in bending, whose stresses cancel over the thickness, but not for a belt in tension.
 """
 

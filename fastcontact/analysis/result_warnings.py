@@ -368,5 +368,5 @@ def wavering(pair: Formulation, contact: ContactResult) -> Iterator[str]:
     cells = f"quadrangles or hexahedra along '{pair.secondary.group}', or triangles or tetrahedra there about as deep as wide"
     yield (
         f"contact '{contact.name}': nodal pressures waver from node to node, by {0.5 * size:.3g} up and down about a mean of "
-        f"{mean:.3g}: trust means over neighbouring nodes, or take {cells if pair.name == 'mortar' else 'formulation mortar'}"
+        f"{mean:.3g}: trust means over neighbouring nodes, or use {cells if pair.name == 'mortar' else 'formulation mortar'}"
     )

@@ -38,7 +38,7 @@ class Sensitivities:
     Attributes
     ----------
     value : float
-        The quantity [its own unit].
+        Value of the quantity [its unit].
     derivatives : dict
         Derivative of the quantity for each parameter, as a tuple [unit of the quantity per unit of the parameter].
     margin : float
@@ -46,7 +46,7 @@ class Sensitivities:
         largest one of its pair, or the smallest open gap relative to the largest displacement, whichever is smaller;
         at most 1 [-].
     solutions : int
-        Linear solutions of the adjoint problem: one, and those for the variation of the contact geometry.
+        Number of linear solutions: one for the adjoint problem, and those for the variation of the contact geometry.
 
     Examples
     --------
@@ -95,8 +95,8 @@ def sensitivities(
         secondary side [force]; ``("pressure_max", pair)``, at the node of the largest pressure, or ``("pressure",
         pair, point)`` [pressure].
     parameters : sequence of sequences
-        ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, which is given by one of its
-        groups or by its number in the model; of an `Orthotropic` with the numbers of the axes, as ``("E", material,
+        ``("E", material)`` [pressure] and ``("nu", material)`` [-] of a `LinearElastic`, where `material` is one of its
+        groups or its number in the model; for an `Orthotropic` with the numbers of the axes, such as ``("E", material,
         "1")``, ``("nu", material, "12")`` and ``("G", material, "12")`` [pressure]; ``("expansion", material)``, or
         ``("expansion", material, "1")`` along one axis [1 / temperature]; ``("load", group)``, the factor of all loads
         on a group, or of the force on a rigid obstacle by its name [-]; ``("speed", group)``, the angular speed of
@@ -107,7 +107,7 @@ def sensitivities(
         ``("motion", obstacle)``, the factor of its motion [-]; ``("clearance", pair)``, a length added to the gap
         [length]. All factors have the value 1.
     ramp, criteria, linear_solver
-        Those of `solve`.
+        Described for `solve`.
     margin : float
         Smallest admissible `Sensitivities.margin` [-].
 
@@ -118,9 +118,10 @@ def sensitivities(
     Raises
     ------
     ModelError
-        If there is no such quantity or parameter; with friction, wear, or locked pretension sections, since results
-        then depend on earlier steps; if an active constraint is about to open or an open one to close; if a node
-        projects onto the edge between two facets, and the one-sided derivatives differ there.
+        If there is no such quantity or parameter; with nonlinear bodies or conduction of heat; with friction, wear, or
+        locked pretension sections, since results then depend on earlier steps; if an active constraint is about to open
+        or an open one to close; if a node projects onto the edge between two facets, and the one-sided derivatives
+        differ there.
 
     Examples
     --------

@@ -119,7 +119,7 @@ class Path:
     traction : ndarray (m, dim)
         Vectors of the tangential forces [force].
     closing : ndarray (m, dim)
-        Tangential relative displacement while the whole gap closes, which is no slip [length].
+        Tangential relative displacement while the whole gap closes, which is not slip [length].
     waiting : ndarray of bool (m,)
         Constraints that are open at the beginning of the step, and close at some instant if at all.
     """

@@ -66,7 +66,7 @@ class State:
         at that time [length]; for a temporary constraint, the initial values (m,) of its m equations [length]; for a
         temperature that begins after the first step, the temperature rise (n_points,) at its beginning [temperature].
     extrapolation : Extrapolation
-        The last two converged steps, from which the displacements of the next one are extrapolated.
+        The last converged steps, at most three, from which the displacements of the next one are extrapolated.
     largest_force, largest_rigid_force : float
         The largest nodal force of all steps so far, and the largest generalised force of the loads on a rigid-body motion
         that is free [force].

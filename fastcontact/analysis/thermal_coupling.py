@@ -108,7 +108,7 @@ def settle_heat(
         rise = mixing.mixed(rise, heated.rise)
         equilibrium = solve(expanded(problem, load, rise), equilibrium)
     raise ConvergenceError(
-        f"heat and contact do not settle: after {most} times temperatures still change by {change:.3g}, for "
+        f"heat and contact do not converge: after {most} times temperatures still change by {change:.3g}, for "
         "instance because a contact opens when heat flows through it and closes when none does; let its "
         "conductance fall gradually with the gap, or grow from zero with the pressure",
         equilibrium.history,

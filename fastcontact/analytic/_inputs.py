@@ -25,7 +25,7 @@ def number(name: str, value: object) -> float:
     if not size < math.inf:
         raise ModelError(f"{name} is {value!r}: it must be a finite number")
     if size > LARGEST:
-        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g}, in any unit")
+        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, in any unit")
     return float(value)  # type: ignore[arg-type]
 
 

@@ -133,7 +133,7 @@ def finite_half_spheres(approach: float, *, R: float = 50.0, E: float = 20_000.0
     """
     R, E, delta = positive("R", R), positive("E", E), positive("approach", approach)
     if abs(number("nu", nu) - NU) > 1e-12:
-        raise ModelError(f"nu is {nu:g}: the table of finite half spheres holds nu = {NU:g} only")
+        raise ModelError(f"nu is {nu:g}: the table of finite half spheres contains only nu = {NU:g}")
     table, x = _table(), delta / R
     low, high = table[0, 0], table[-1, 0]
     if not low * (1.0 - 1e-12) <= x <= high * (1.0 + 1e-12):

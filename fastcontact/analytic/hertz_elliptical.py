@@ -73,8 +73,8 @@ class HertzElliptical:
 def _ratio_of_radii(ratio: float) -> float:
     """Return the ratio R'/R'' >= 1 of the relative radii for an ellipse with semi-axes b <= a (Johnson 1985, eq. 4.28).
 
-    `ratio` is b/a. Textbooks use [(a/b)^2 E - K]/[K - E] with complete elliptic integrals K and E, where both differences
-    cancel for nearly circular ellipses; Carlson's integral R_D avoids this cancellation.
+    `ratio` is b/a. Textbooks use [(a/b)^2 E - K]/[K - E] with complete elliptic integrals K and E, whose differences
+    suffer from cancellation for nearly circular ellipses. Carlson's integral R_D avoids it.
     """
     from scipy.special import elliprd
 
@@ -88,7 +88,9 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
     if ratio_of_radii == 1.0:
         return 1.0
     if ratio_of_radii > _ratio_of_radii(_FLATTEST):
-        raise ModelError(f"the relative radii differ by a factor {ratio_of_radii:g}: a line contact, use hertz_line")
+        raise ModelError(
+            f"the relative radii differ by a factor of {ratio_of_radii:g}, so this is a line contact: use hertz_line"
+        )
     goal = math.log(ratio_of_radii)
     return math.exp(
         brentq(lambda x: math.log(_ratio_of_radii(math.exp(x))) - goal, math.log(_FLATTEST), 0.0, xtol=1e-15)

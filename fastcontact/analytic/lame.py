@@ -78,7 +78,7 @@ class LameShell:
     def axial_stress(self, r: ArrayLike) -> Array:
         """Return the axial stress (...) [pressure] of a cylinder at radii `r` (...) [length]; ModelError for a sphere."""
         if self.kinematics == "sphere":
-            raise ModelError("a sphere has no axial stress: ask for radial_stress or hoop_stress")
+            raise ModelError("a sphere has no axial stress: use radial_stress or hoop_stress")
         radii, _, uniform, _ = self._fields(r)
         strength = 2.0 * self.nu * uniform if self.kinematics == "plane_strain" else 0.0
         return np.full(radii.shape, strength)

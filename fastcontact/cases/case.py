@@ -324,7 +324,7 @@ def _ramp(data: dict[str, Any]) -> Ramp:
         raise CaseError("'ramp' takes either 'instants', or 'steps' and 'end', not both")
     wrong = [t for t in data["instants"] if isinstance(t, bool) or not isinstance(t, NUMBER)]
     if wrong:
-        raise CaseError(f"ramp.instants holds {wrong[0]!r}, which is not a number")
+        raise CaseError(f"ramp.instants contains {wrong[0]!r}, which is not a number")
     instants = tuple(float(t) for t in data["instants"])
     table = points(data["table"]) if "table" in data else ((0.0, 0.0), (1.0, 1.0))
     return Ramp(instants, table)

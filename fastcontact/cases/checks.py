@@ -27,7 +27,7 @@ NEEDED = {
 
 
 def at_point(step: StepResult, point: int) -> tuple[ContactResult, int] | None:
-    """Return the last contact whose secondary side contains a point and the row of the point there; None if there is none."""
+    """Return the last contact whose secondary side contains a point, and the row of the point on this side, or None."""
     contact_row = None
     for contact in step.contact.values():
         rows = np.flatnonzero(contact.points == point)
@@ -152,12 +152,12 @@ def read_check(
     theories: Mapping[str, Any],
     kinematics: str = "3d",
 ) -> Check:
-    """Return the check of an entry of a case file with checked keys; CaseError if a value is invalid."""
+    """Return the check that an entry of a case file describes, whose keys are known; CaseError if a value is invalid."""
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")
     if ("theory" in entry) == ("value" in entry):
-        raise CaseError(f"{where} needs either 'theory', the contact pair whose theory it is, or 'value'")
+        raise CaseError(f"{where} needs either 'theory', the name of a contact pair with a theory, or 'value'")
     owner, _, field = entry["quantity"].partition(".")
     check_known(f"contact pair or probe in {where}.quantity", owner, [*probes, *pairs], CaseError)
     _check_quantity(where, field, OF_PROBES if owner in probes else OF_PAIRS, kinematics)
@@ -172,11 +172,11 @@ def read_check(
             f"{where}.tolerance = {check.tolerance:g} must be a positive number, e.g. 0.01 for one per cent"
         )
     if not (math.isfinite(check.factor) and check.factor):
-        raise CaseError(f"{where}.factor = {check.factor:g} must be a number other than 0")
+        raise CaseError(f"{where}.factor = {check.factor:g} must be finite and nonzero")
     if check.value is not None and not math.isfinite(check.value):
         raise CaseError(f"{where}.value = {check.value:g} must be finite")
     if check.value == 0.0:
-        raise CaseError(f"{where}: the value is 0, so there is no relative deviation; check another quantity")
+        raise CaseError(f"{where}: the value is 0, so the relative deviation is undefined; check another quantity")
     if check.theory:
         check_known(f"theory in {where}", check.theory, theories, CaseError)
         check_target(where, check, theories[check.theory]["theory"])
@@ -205,7 +205,7 @@ def check_target(where: str, check: Check, theory: Any) -> None:
         numbers = [name for name in dir(theory) if not name.startswith("_") and _is_number(theory, name)]
         raise CaseError(unknown(f"number of the theory in {where}.of", check.of, numbers)) from None
     if not (math.isfinite(target) and target):
-        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so there is no relative deviation")
+        raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so the relative deviation is undefined")
 
 
 def _is_number(theory: Any, name: str) -> bool:

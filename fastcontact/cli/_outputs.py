@@ -79,7 +79,7 @@ def write_text(path: str, content: str) -> None:
 
 
 def say_written(options: Any, *paths: object) -> None:
-    """Print the names of the files written, unless ``--quiet`` is set; None stands for no file."""
+    """Print the names of the files written, unless ``--quiet`` is set; None means no file."""
     if not options.quiet:
         say(f"wrote {', '.join(str(path) for path in paths if path)}")
 

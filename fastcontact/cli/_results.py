@@ -25,11 +25,11 @@ ARGUMENTS: Arguments = {
 def chosen_step(results: Any, number: int) -> Any:
     """Return the step with a number counted from 1, or the last step for -1; CaseError if it does not exist."""
     if not len(results):
-        raise CaseError(f"'{results.path}' holds no finished step yet")
+        raise CaseError(f"'{results.path}' contains no finished step yet")
     if number == -1:
         return results[-1]
     if not 1 <= number <= len(results):
-        raise CaseError(f"there is no step {number} in '{results.path}': it holds steps 1 to {len(results)}")
+        raise CaseError(f"there is no step {number} in '{results.path}': it contains steps 1 to {len(results)}")
     return results[number - 1]
 
 
@@ -40,7 +40,7 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
     contact pair, or none with the name.
     """
     if not step.contact:
-        raise CaseError("this result holds no contact pair")
+        raise CaseError("this result contains no contact pair")
     if options.contact is not None:
         check_known("contact pair", options.contact, step.contact, CaseError)
         return str(options.contact)

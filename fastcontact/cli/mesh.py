@@ -28,7 +28,7 @@ def add_generators(parser: argparse.ArgumentParser) -> None:
             {"-o --output OUTPUT": ({"required": True}, "mesh file, format by suffix: .med, .msh, .inp, .vtu, ...")},
         )
         declare(sub, dict(_option(make, parameter) for parameter in inspect.signature(make).parameters.values()))
-        add_loudness(sub, default=argparse.SUPPRESS)  # does not override options before the name of the generator
+        add_loudness(sub, default=argparse.SUPPRESS)  # keeps -q and -v given before the name of the generator
 
 
 class _Raw(argparse.RawDescriptionHelpFormatter):

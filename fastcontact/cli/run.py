@@ -191,7 +191,7 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
     others = [factor for factor in done if not any(math.isclose(factor, instant, rel_tol=1e-9) for instant in known)]
     if others:
         warn(
-            f"'{output}' holds {len(done)} steps, the case now has {len(known)}: those in the file are kept, with that at "
+            f"'{output}' contains {len(done)} steps, the case now has {len(known)}: those in the file are kept, with that at "
             f"load factor {others[0]:g}, which is not in the case; without --resume all steps are solved again"
         )
 
@@ -199,7 +199,7 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
 def _kept_steps(output: Path, steps: int) -> str:
     """Return a message on the complete steps in the result file of a run that was stopped."""
     if not steps:
-        return f"'{output}' holds no complete step"
+        return f"'{output}' contains no complete step"
     many = "one complete step" if steps == 1 else f"all {steps} complete steps"
     return f"'{output}' keeps {many}: 'fastcontact run --resume' continues from there"
 

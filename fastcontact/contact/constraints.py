@@ -173,7 +173,7 @@ class Tied(Protocol):
 class Constraints:
     """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0`` with multipliers that are not negative.
 
-    An optional attribute that is None stands for zero, or means that the constraints do not have the feature.
+    An optional attribute that is None means zero, or means that the constraints do not have the feature.
 
     Attributes
     ----------

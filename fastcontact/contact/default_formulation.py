@@ -57,11 +57,11 @@ def against_obstacle(
     """
     if facets and "integration" not in options:
         if of_simplices and all(elements.get(name).linear == name for name in facets):
-            why = "the pressures of the continuous one oscillate on linear triangles and tetrahedra"
+            why = "the pressures of continuous contact oscillate on linear triangles and tetrahedra"
             return "node_to_segment", dict(options), why
         if dim == 3 and all(all_nodes_carry(name) for name in facets):
-            return "node_to_segment", dict(options), "the continuous one costs many times as much in three dimensions"
+            return "node_to_segment", dict(options), "continuous contact costs many times as much in three dimensions"
         if dim == 3 and options.get("friction") and not any(name in options for name in OF_STANDARD):
-            why = "multigrid cannot eliminate the continuous one with friction in three dimensions"
+            why = "multigrid cannot eliminate continuous contact with friction in three dimensions"
             return "mortar", {**options, "multipliers": "dual"}, why
     return "continuous", dict(options), "it also covers the region between nodes"

@@ -159,7 +159,7 @@ def find_contacts(
     Raises
     ------
     ContactError
-        If a number is out of range, groups share cells, or a group holds no solid cells.
+        If a number is out of range, groups share cells, or a group contains no solid cells.
 
     Examples
     --------
@@ -222,7 +222,7 @@ def _bodies_of_cells(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
         return body_of_cell
     for number, group in enumerate(groups):
         if not mesh.cells_of(group, dim=mesh.dim):
-            raise ContactError(f"group '{group}' holds no solid cells, so it is not a body")
+            raise ContactError(f"group '{group}' contains no solid cells, so it is not a body")
         rows = mesh.split(mesh.cell_groups[group])
         cells = np.concatenate([mesh.offsets[name] + rows[name] for name in rows if name in mesh.solids])
         if (body_of_cell[cells] >= 0).any():

@@ -183,12 +183,12 @@ def surface(mesh: Mesh, group: str) -> Surface:
     MeshError
         If there is no such group.
     ContactError
-        If the group holds no facets, or a facet inside a solid or without one.
+        If the group contains no facets, or a facet inside a solid or without one.
     """
     cells = mesh.cells_of(group, dim=mesh.dim - 1)
     if not cells:
         raise ContactError(
-            f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
+            f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}): name a boundary group"
         )
     outer = outer_facets(mesh)
     facets = {name: _outward(mesh, group, name, block, outer) for name, block in cells.items()}

@@ -45,7 +45,7 @@ def owned(cells, c, owner, part, inside):
 
 @kernel
 def _cell(points, cell, N, dN, weights, D, axisymmetric, gradient, local):
-    """Fill `local` (n_nodes, n_nodes, 2, 2), zero before, for moduli D (4, 4); return whether the Jacobian is positive."""
+    """Add the stiffness for moduli D (4, 4) to `local` (n_nodes, n_nodes, 2, 2); return whether the Jacobian is positive."""
     n_nodes = cell.shape[0]
     for q in range(weights.shape[0]):
         det, radius = _map(points, cell, N, dN, q, gradient)
@@ -145,7 +145,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     gradient = np.empty((n_nodes, 2))
-    largest, number, first = 0.0, -1, np.int64(0)  # a literal would compile the map once more
+    largest, number, first = 0.0, -1, np.int64(0)  # with an int literal, `_map` would be compiled a second time
     for c in range(n_cells):
         _map(points, cells[c], N, dN, first, gradient)
         curl = 0.0
@@ -162,8 +162,8 @@ def largest_rotation(points, cells, N, dN, displacement):
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
     """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and sum them per node, in place.
 
-    `extrapolation` (n_nodes, n_q), `at_points` (n_cells, n_q, n_components); `total` (n_points, n_components) and
-    `count` (n_points,) are added to.
+    `extrapolation` is (n_nodes, n_q) and `at_points` (n_cells, n_q, n_components). The sums are added to `total`
+    (n_points, n_components), the numbers of cells to `count` (n_points,).
     """
     n_cells, n_nodes = cells.shape
     for c in range(n_cells):

@@ -241,7 +241,7 @@ def largest_rotation(points, cells, N, dN, displacement):
     """
     n_cells, n_nodes = cells.shape
     slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    largest, number, first = 0.0, -1, np.int64(0)  # a literal would compile the map once more
+    largest, number, first = 0.0, -1, np.int64(0)  # with an int literal, `_map` would be compiled a second time
     for c in range(n_cells):
         _gather(points, cells, c, x)
         map_3d(x, slopes, first, gradient)

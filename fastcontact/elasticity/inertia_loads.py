@@ -23,7 +23,7 @@ class Densities:
     ----------
     materials : sequence of Material
     number : mapping of str to ndarray of int (n_cells,)
-        By solid element: every cell's material.
+        Material of each cell, by solid element type.
     """
 
     materials: Sequence[Material]

@@ -244,7 +244,7 @@ class TotalForce(Load):
 
 
 def listed(groups: Sequence[str] | None) -> str:
-    """Return a description of groups of solid cells, for messages; None stands for all."""
+    """Return a description of groups of solid cells, for messages; None means all."""
     return EVERYWHERE if groups is None else ", ".join(f"'{group}'" for group in groups)
 
 
@@ -264,14 +264,14 @@ def solid_points(mesh: Mesh, groups: Sequence[str] | None) -> Indices:
 
 
 def check_solids(mesh: Mesh, groups: Sequence[str] | None, otherwise: str) -> None:
-    """Raise ModelError that ends with `otherwise` if one of the groups holds no solid cells."""
+    """Raise ModelError that ends with `otherwise` if one of the groups contains no solid cells."""
     for group in groups or ():
         if not mesh.cells_of(group, dim=mesh.dim):
-            raise ModelError(f"group '{group}' holds no solid cells{otherwise}")
+            raise ModelError(f"group '{group}' contains no solid cells{otherwise}")
 
 
 def check_points(mesh: Mesh, group: str, otherwise: str) -> None:
-    """Raise ModelError that ends with `otherwise` if a group holds no points."""
+    """Raise ModelError that ends with `otherwise` if a group is empty."""
     if not len(mesh.points_of(group)):
         raise ModelError(f"group '{group}' is empty: {otherwise}")
 
@@ -282,10 +282,12 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
     Raises MeshError if there is no such group of cells, ModelError if it has no facets.
     """
     if group in mesh.point_groups and group not in mesh.cell_groups:
-        raise ModelError(f"group '{group}' holds points only: this load needs a group of facets")
+        raise ModelError(f"group '{group}' contains only points: this load needs a group of facets")
     blocks = mesh.cells_of(group, dim=mesh.dim - 1)
     if not blocks:
-        raise ModelError(f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}) that a load can act on")
+        raise ModelError(
+            f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}) that a load can act on"
+        )
     once = {name: np.unique(np.sort(block, axis=1), axis=0, return_index=True)[1] for name, block in blocks.items()}
     return {name: block[np.sort(once[name])] for name, block in blocks.items()}
 
@@ -325,7 +327,7 @@ def evaluated(value: Value, points: Array, name: str) -> Array:
     if len(bad):
         raise ModelError(f"{name} is {array[bad[0]]} at {flat[bad[0]]}: it must be finite everywhere")
     if np.abs(array).max(initial=0.0) > LARGEST:
-        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g} everywhere, in any unit")
+        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g} everywhere, in any unit")
     return array.astype(np.float64).reshape(points.shape[:-1])
 
 
@@ -335,7 +337,7 @@ def check_number(name: str, value: Any) -> None:
     if not abs(number) < math.inf:
         raise ModelError(f"{name} is {value!r}, which is not a finite number")
     if abs(number) > LARGEST:
-        raise ModelError(f"{name} is out of range: its size must be at most {LARGEST:g}, in any unit")
+        raise ModelError(f"{name} is out of range: its magnitude must be at most {LARGEST:g}, in any unit")
 
 
 def check_value(name: str, value: Any) -> None:

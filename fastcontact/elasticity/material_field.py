@@ -59,9 +59,9 @@ class MaterialField:
     owner : ndarray of int (n_moduli,)
         Material of each of the moduli.
     number, rows : dict of str to ndarray of int (n_cells,)
-        By solid element: every cell's material, and its row in `moduli` (at the middle of the cell if the material varies).
+        Material of each cell, and its row in `moduli` (at the cell centre if the material varies), by solid element type.
     inside : dict of str to ndarray of int (n_cells, n_q)
-        By solid element with materials that vary inside cells: row in `moduli` of every quadrature point.
+        Row in `moduli` of each quadrature point, by solid element type, where materials vary inside cells.
     """
 
     materials: Sequence[Material]
@@ -75,7 +75,7 @@ class MaterialField:
 
     @cached_property
     def loops(self) -> dict[str, Numbers]:
-        """Rows of moduli for the element loops, by solid element: `inside` if materials vary in cells, otherwise `rows`."""
+        """Rows of moduli for the element loops, by element type: `inside` if materials vary in cells, otherwise `rows`."""
         return {**self.rows, **self.inside}
 
     @property
@@ -190,7 +190,7 @@ def material_field(
     kinematics : str
     materials : sequence of Material
     number : mapping of str to ndarray of int (n_cells,)
-        By solid element: material of each cell.
+        Material of each cell, by solid element type.
     """
     size = 6 if kinematics == "3d" else 4
     moduli = [np.zeros((1, size, size)) if m.varies else m.moduli(kinematics)[None] for m in materials]

@@ -46,7 +46,7 @@ class Material:
     conductivity : float, Varying, tuple or None
         Thermal conductivity, or one conductivity along each axis [power / (length temperature)].
     axes : sequence, callable or None
-        Material axes: unit vectors in rows (3, 3) [-], or a function of position, see `Orthotropic`; None stands for the
+        Material axes: unit vectors in rows (3, 3) [-], or a function of position, see `Orthotropic`; None means the
         axes of the mesh.
     averaged : bool
         Whether elements that support a mean dilatation use it, except in plane stress.
@@ -172,7 +172,7 @@ class Material:
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
             raise ModelError(
-                "constants of the material depend on the position: take the material from the `materials` of a model"
+                "constants of the material depend on the position: use the material in the `materials` of a model"
             )
         return varying_constants[0].cells
 
@@ -205,7 +205,7 @@ class Material:
         columns of zz are zero. ModelError if the material axes depend on position.
         """
         if self.varies:
-            raise ModelError("the axes of the material depend on the position: ask for moduli_at(points, kinematics)")
+            raise ModelError("the axes of the material depend on the position: call moduli_at(points, kinematics)")
         return np.asarray(self.moduli_at(np.zeros((1, 3 if kinematics == "3d" else 2)), kinematics)[0])
 
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
@@ -474,7 +474,7 @@ class LinearElastic(Material):
         """
         if self.graded:
             raise ModelError(
-                "constants of the material depend on the position: ask for moduli_at(points, kinematics, ...)"
+                "constants of the material depend on the position: call moduli_at(points, kinematics, ...)"
             )
         return np.asarray(isotropic_moduli(np.array([self.E], float), np.array([self.nu], float), kinematics)[0])
 

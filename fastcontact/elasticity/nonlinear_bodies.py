@@ -200,7 +200,7 @@ class NonlinearBodies:
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
         measure = self._measures(name, cell, displacement).min()
-        failure = f"turns inside out (J = {measure:.3g})"
+        failure = f"is inverted (J = {measure:.3g})"
         if status != body_kernels.INVERTED:
             failure = "has no out-of-plane strain of zero stress"
         return f"cell {cell} of {name} near {where} {failure}: smaller load steps, or a mesh that is coarser there, may help"

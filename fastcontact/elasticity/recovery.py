@@ -34,7 +34,7 @@ def stress_at_points(
     averaged: dilatation.Mask | None = None,
     offset: StressOffset | None = None,
 ) -> dict[str, Array]:
-    """Return by solid element the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points.
+    """Return the stress (n_cells, n_q, n_components) [pressure] at the default quadrature points, by solid element type.
 
     Components are xx, yy, zz, xy, in 3D also yz, xz, and in axisymmetry rr, yy, hoop, ry.
 
@@ -46,7 +46,7 @@ def stress_at_points(
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
-        By solid element: material number of each cell, or of each quadrature point (`MaterialField.loops`).
+        Material number of each cell, or of each quadrature point, by solid element type (`MaterialField.loops`).
     displacement : ndarray (n_points, dim)
         Displacements of all points [length].
     averaged : ndarray of bool (n_materials,), optional
@@ -126,7 +126,7 @@ class NodalAverage:
 
 @typed(ModelError)
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
-    """Return by solid element the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell.
+    """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell, by solid element type.
 
     They are extrapolated by `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO
     of code_aster.

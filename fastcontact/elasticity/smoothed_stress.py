@@ -4,7 +4,7 @@ At the centres of linear cells, and at the reduced Gauss points of quadratic one
 (Barlow, 1976). They are extrapolated from there to the nodes and averaged over the cells of one material at each node.
 Polynomials fitted to patches of cells (Zienkiewicz and Zhu, 1992) are less accurate near the edge of a contact, where the
 pressure decreases like a square root: they smooth the decrease over two cells, and overestimate the error of quadratic cells
-two to four times.
+by a factor of two to four.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fastcontact.elasticity.material_field import MaterialField
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-# Distance of the sampling points of quadratic triangles and tetrahedra from the centre over that of the corners.
+# Distance of the sampling points of quadratic triangles and tetrahedra from the centre, divided by that of the corners.
 SIMPLEX_FRACTION = {3: 0.5, 4: 1.0 / math.sqrt(5.0)}
 
 

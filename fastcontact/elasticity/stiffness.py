@@ -42,9 +42,9 @@ class Sparsity:
     Attributes
     ----------
     indptr, indices : ndarray of int (n_points + 1,), (n_blocks,)
-        Node-block rows and columns, sorted.
+        Row pointers and sorted column indices of the nodal blocks.
     slots : dict of str to ndarray (n_cells, n_nodes, n_nodes)
-        By solid element: position in `indices` of every node pair of every cell.
+        Position in `indices` of each node pair of each cell, by solid element type.
     """
 
     indptr: Numbers
@@ -107,7 +107,7 @@ def stiffness(
     moduli : ndarray (n_materials, 4, 4), in 3D (n_materials, 6, 6)
         From `LinearElastic.moduli` [pressure].
     material : dict of str to ndarray of int (n_cells,) or (n_cells, n_q)
-        By solid element: material number of each cell, or of each quadrature point.
+        Material number of each cell, or of each quadrature point, by solid element type.
     pattern : Sparsity, optional
         From `sparsity`, to reuse it.
     averaged : ndarray of bool (n_materials,), optional
@@ -122,7 +122,7 @@ def stiffness(
     Raises
     ------
     MeshError
-        If a cell is degenerate or turned inside out.
+        If a cell is degenerate or inverted.
     """
     pattern = pattern or sparsity(mesh)
     data = np.zeros((len(pattern.indices), mesh.dim, mesh.dim))
@@ -139,7 +139,7 @@ def stiffness(
         if bad >= 0:
             where = mesh.points[block[bad]].mean(axis=0)
             raise MeshError(
-                f"cell {bad} of {name} near {where} is degenerate or inside out: its Jacobian is not positive"
+                f"cell {bad} of {name} near {where} is degenerate or inverted: its Jacobian is not positive"
             )
     size = mesh.n_points * mesh.dim
     return bsr_array((data, pattern.indices, pattern.indptr), shape=(size, size))
@@ -241,8 +241,8 @@ def _owners(cells: Numbers, n_points: int, ends: Indices) -> tuple[Owners, Indic
 def rigid_modes(points: Array, kinematics: str) -> Array:
     """Return the rigid-body modes (n_points * dim, n_modes) [-], displacements of `points` (n_points, dim) [length].
 
-    The columns are the translation along the axis in axisymmetry, two translations and the rotation in the plane, and three
-    translations and three rotations in 3D [length]. Rotations are about the mean point.
+    The columns are the translation along the axis in axisymmetry, two translations and one rotation in plane models, and
+    three translations and three rotations in 3D [length]. Rotations are about the mean point.
     """
     (n, dim), x = points.shape, points - points.mean(axis=0)
     planes = [(0, 1)] if dim == 2 else [(1, 2), (2, 0), (0, 1)]

@@ -70,7 +70,7 @@ class Tabulated:
         elif AXES.index(self.along) < points.shape[1]:
             at = points[:, AXES.index(self.along)]
         else:
-            raise ModelError("a table is along z, but the mesh is plane: take x, y or radius")
+            raise ModelError("a table is along z, but the mesh is plane: use x, y or radius")
         places, values = np.array(self.table).T
         return np.interp(at, places, values)
 
@@ -209,8 +209,8 @@ class CellAxes(Varying):
         total = sum(map(len, cells.mesh.solids.values()))
         if len(values) not in (cells.count, total):
             raise ModelError(
-                f"the axes of a material are {len(values)}: they must be as many as its cells, {cells.count}, or those of "
-                f"the mesh, {total}"
+                f"a material has {len(values)} axes: there must be one for each of its cells, {cells.count}, or of the cells "
+                f"of the mesh, {total}"
             )
         self._by_cell = _by_cell(values, cells)
 

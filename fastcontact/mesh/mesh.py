@@ -226,7 +226,9 @@ class Mesh:
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
         if not self.group_names:
-            return f"the mesh has no groups, and thus no '{group}': name groups in the mesher, or with Mesh.with_groups"
+            return (
+                f"the mesh has no groups, and thus no '{group}': define groups in the mesher, or with Mesh.with_groups"
+            )
         return unknown(kind, group, known)
 
     def point(self, group: str) -> int:
@@ -236,7 +238,7 @@ class Mesh:
         """
         numbers = self.points_of(group)
         if len(numbers) != 1:
-            raise MeshError(f"group '{group}' holds {len(numbers)} points where exactly one is needed")
+            raise MeshError(f"group '{group}' contains {len(numbers)} points where exactly one is needed")
         return int(numbers[0])
 
     def replace(self, **changes: Any) -> Mesh:
@@ -296,7 +298,7 @@ class Mesh:
         [[2, 3]]
         """
         if name in self.point_groups:
-            raise MeshError(f"'{name}' is a group of points already: give the facets another name")
+            raise MeshError(f"'{name}' is already a group of points: give the facets another name")
         chosen = np.asarray(where(np.array(self.points)))
         if chosen.shape != (self.n_points,) or chosen.dtype != bool:
             raise MeshError(
@@ -307,9 +309,9 @@ class Mesh:
         if not facets:
             inside = f" of '{of}'" if of else ""
             raise MeshError(
-                f"facet group '{name}' would be empty: its function chooses {int(chosen.sum())} points, but no facet{inside} "
+                f"facet group '{name}' would be empty: its function selects {int(chosen.sum())} points, but no facet{inside} "
                 f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
-                "with a tolerance, or make a group of points by with_groups"
+                "with a tolerance, or define a group of points with with_groups"
             )
         return self.with_facets({name: facets})
 

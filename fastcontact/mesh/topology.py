@@ -256,7 +256,7 @@ def ordered_line(mesh: Mesh, group: str, start: str | int | None = None) -> Orde
     """
     blocks = mesh.cells_of(group, dim=1)
     if not blocks:
-        raise MeshError(f"group '{group}' holds no line cells, so its nodes have no order along a line")
+        raise MeshError(f"group '{group}' contains no line cells, so its nodes have no order along a line")
     pieces = [block[:, [0, 2, 1]] if block.shape[1] == 3 else block for block in blocks.values()]
     segments = np.concatenate([np.column_stack([p[:, i], p[:, i + 1]]) for p in pieces for i in range(p.shape[1] - 1)])
     nodes, local = np.unique(segments, return_inverse=True)

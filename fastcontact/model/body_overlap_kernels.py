@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Winding numbers of closed polygons and of closed surfaces of triangles, which tell inside from outside."""
+"""Winding numbers of closed polygons and of closed surfaces of triangles, which distinguish inside from outside."""
 
 import numpy as np
 

@@ -87,7 +87,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
         points = mesh.points_of(group)
         if not carried[points].any():
             raise ModelError(
-                f"{name} holds {len(points)} points that belong to no solid cell (first: point {points[0]}): name a group "
+                f"{name} contains {len(points)} points that belong to no solid cell (first: point {points[0]}): name a group "
                 "of the body"
             )
 
@@ -104,7 +104,7 @@ def check_penetration(name: str, pair: Formulation) -> None:
         point = pair.secondary.points[row]
         raise ContactError(
             f"contact '{name}' begins with a penetration of {-gap[row]:.4g} at point {point} {pair.points[point]}, more than "
-            f"the length of the element there ({size[row]:.4g}): move a body apart, turn a surface that is inside out, or "
+            f"the length of the element there ({size[row]:.4g}): move a body apart, reverse the orientation of a surface, or "
             "give an interference that is meant as clearance"
         )
 
@@ -121,7 +121,7 @@ def facet_lengths(pair: Formulation) -> Array:
 def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
     """Return gaps (n_nodes,) before any load, with clearances that increase them [length], and normals (n_nodes, dim).
 
-    Gaps are infinite at nodes that face nothing or are excluded, and in pairs that admit penetration: tied and gap_only.
+    Gaps are infinite at nodes that are unpaired or excluded, and in pairs that admit penetration: tied and gap_only.
     """
     if pair.options.tied or pair.options.gap_only:
         shape = len(pair.secondary.points), pair.points.shape[1]

@@ -28,7 +28,7 @@ class Harmonic:
     Attributes
     ----------
     ramp : Table, optional
-        History of the angle; None stands for the history of the analysis.
+        History of the angle; None means the history of the analysis.
     angle : float
         Angle at multiplier 1 [radian].
     versine : bool
@@ -45,7 +45,7 @@ class Harmonic:
         return 2.0 * math.sin(0.5 * angle) ** 2 if self.versine else math.sin(angle)
 
 
-# History of a part of the prescribed displacements; None stands for the history of the analysis.
+# History of a part of the prescribed displacements; None means the history of the analysis.
 PartHistory = Table | Harmonic | None
 # Largest number of equal steps; more are probably a typing error.
 MOST_STEPS = 1_000_000
@@ -59,12 +59,12 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
     except (OverflowError, TypeError, ValueError):
-        raise ModelError(f"the table of {caption} must hold pairs (instant, multiplier of the loads)") from None
+        raise ModelError(f"the table of {caption} must contain pairs (instant, multiplier of the loads)") from None
     times = np.asarray([time for time, _ in table])
     if len(table) < 2 or not (np.diff(times) > 0).all():
         raise ModelError(f"the table of {caption} needs at least two points with ascending instants")
     if not np.isfinite(table).all():
-        raise ModelError(f"the table of {caption} holds a number that is not finite: {table}")
+        raise ModelError(f"the table of {caption} contains a number that is not finite: {table}")
     if np.abs(table).max() > LARGEST:
         raise ModelError(f"the table of {caption} is out of range: the size of its numbers must be at most {LARGEST:g}")
     return table
@@ -173,7 +173,7 @@ def linear_ramp(steps: int = 20, end: float = 1.0) -> Ramp:
     if int(steps) != steps or steps < 1:
         raise ModelError(f"the number of load steps must be a positive whole number, not {steps}")
     if steps > MOST_STEPS:
-        raise ModelError(f"{steps} load steps are more than {MOST_STEPS}, which nobody waits for: ask for fewer steps")
+        raise ModelError(f"{steps} load steps are more than {MOST_STEPS}, the largest possible number: use fewer steps")
     if not end > 0:
         raise ModelError(f"the ramp must end at a positive load factor, not {end}")
     return Ramp(tuple(end * (i + 1) / int(steps) for i in range(int(steps))), ((0.0, 0.0), (end, 1.0)))
@@ -183,7 +183,7 @@ RampLike = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
 
 
 def ramp_of(steps: RampLike | None) -> Ramp:
-    """Return the ramp that `steps` describes: a `Ramp`, a number of equal steps, or an array; None stands for 20 steps.
+    """Return the ramp that `steps` describes: a `Ramp`, a number of equal steps, or an array; None means 20 steps.
 
     An array (n,) contains the load factors at the ends of the steps; the multiplier of the loads is equal to the load
     factor, also beyond 1. An array (n, 2) contains the points (load factor, multiplier) of the load function, and each

@@ -255,9 +255,7 @@ class ResultWriter:
         if step.index <= index:
             raise FileError(f"step {step.index} cannot be written after step {index}: write each step once, in order")
         if None not in (case, _case_of(step)) and case != _case_of(step):
-            raise FileError(
-                f"step {step.index} belongs to another case than step {index}: write it to a file of its own"
-            )
+            raise FileError(f"step {step.index} belongs to another case than step {index}: write it to a separate file")
 
     def close(self, log: Any = None, warnings: Iterable[str] = ()) -> None:
         """Finish the file; further calls have no effect.
@@ -349,8 +347,8 @@ class ResultWriter:
         """Raise FileError if another program has changed the file."""
         if not self._committed.intact():
             raise FileError(
-                f"'{self.path}' was changed by another program after {self.n_steps} steps, what it holds now is left "
-                "alone: let no other program write to it, name another file and start again"
+                f"'{self.path}' was changed by another program after {self.n_steps} steps, its contents are left "
+                "unchanged: let no other program write to it, name another file and start again"
             )
 
     def _gone(self) -> str:
@@ -450,7 +448,7 @@ def _steps_to_resume(
         names = sorted(old.cell_field_names)
         if names != sorted(cell_fields):
             raise FileError(
-                f"the steps in '{path}' hold the cell fields {names or 'none'}, not {sorted(cell_fields) or 'none'}: ask "
+                f"the steps in '{path}' contain the cell fields {names or 'none'}, not {sorted(cell_fields) or 'none'}: ask "
                 f"for the same ones, {begin_anew}"
             )
         steps = StoredSteps(old)

@@ -42,7 +42,7 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
     with open_results(result_path) as results:
         mesh, load_factors, fields = results.mesh, results.load_factors.tolist(), results.point_field_names
     if not load_factors:
-        raise FileError(f"'{result_path}' holds no complete step yet: export it after the first one")
+        raise FileError(f"'{result_path}' contains no complete step yet: export it after the first one")
     topology = layout.xdmf_topology(mesh)
     if topology is None:
         names = ", ".join(mesh.solids) or "no solid cells"

@@ -25,7 +25,7 @@ from fastcontact.results.units import labelled
 
 # Theories that are exact for the bodies of the model, unlike theories of half-spaces or beams.
 EXACT_THEORIES = (PressFit, HertzBox)
-# Title and kind of unit, empty for ratios, of the standard quantities, which studies show if they are known.
+# Title and kind of unit (empty for ratios) of the standard quantities, which studies show if they have values.
 LABELS = {
     "force": ("contact force", "force"),
     "pressure_max": ("largest pressure", "pressure"),
@@ -51,7 +51,7 @@ def measure(case: Case, last: StepResult, pair: str | None) -> dict[str, float]:
 
 
 def check_names(case: Case, names: Iterable[str]) -> None:
-    """Raise CaseError if a name is not one of a quantity of the case that `measure` may return."""
+    """Raise CaseError if a name is not that of a quantity of the case that `measure` may return."""
     of_probes = [f"{probe}.{kind}" for probe in case.probes for kind in _kinds(case)]
     for name in names:
         check_known("quantity", name, [*LABELS, *of_probes], CaseError)

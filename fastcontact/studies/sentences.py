@@ -67,7 +67,7 @@ def _not_to_theory(series: Series, quantity: str, start: str, split: Split) -> s
     tends = f"tends to {number(limit.value, 6)} +- {number(limit.uncertainty, 2)}"
     return (
         f"{start} {tends} where the theory has {number(split.theory, 6)}. That theory is exact for the bodies of the model, "
-        f"so this is no model error: {series.combination} does not converge to it on these meshes. Compare formulations "
+        f"so this is not a model error: {series.combination} does not converge to it on these meshes. Compare formulations "
         "(--formulations all), or let the meshes of the two sides match."
     )
 

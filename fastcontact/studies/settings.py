@@ -16,7 +16,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, Circle
 
 SHAPES = {"triangles": ("tri3", "tri6"), "quadrangles": ("quad4", "quad8", "quad9")}
-# Elements that "all" stands for.
+# Elements that "all" selects.
 ALL_ELEMENTS = ("quad4", "quad8", "tri3", "tri6")
 
 

@@ -132,7 +132,7 @@ MISTAKES = [
     Mistake("cells of numbers beyond 32 bits", lambda: Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2**40]]}),
             fc.MeshError, r"contain the number 1099511627776: the largest that a mesh can hold is 2147483647"),
     Mistake("an order of what is no line", no_lines, fc.MeshError,
-            r"group 'BLOCK' holds no line cells, so its nodes have no order along a line"),
+            r"group 'BLOCK' contains no line cells, so its nodes have no order along a line"),
     Mistake("a line in two pieces", lambda: two_lines(), fc.MeshError,
             r"group 'LINE' is not one open line: it has 4 ends, not 2"),
     Mistake("a line with a ring beside it", line_and_ring, fc.MeshError,

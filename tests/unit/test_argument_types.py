@@ -216,11 +216,11 @@ def test_imaginary_parts_are_not_lost_without_a_word(what):
     [
         (
             lambda model: model.add_contact("pair", "TOP", "BOTTOM"),
-            "Model.add_contact takes name by position and all else by name: write secondary=..., primary=...",
+            "Model.add_contact takes name by position and all other arguments by keyword: write secondary=..., primary=...",
         ),
         (
             lambda model: model.add_pressure("TOP", 1.0, [(0.0, 1.0)]),
-            "Model.add_pressure takes group, value by position and all else by name: write ramp=...",
+            "Model.add_pressure takes group, value by position and all other arguments by keyword: write ramp=...",
         ),
         (
             lambda model: model.add_contact("pair", secondary="TOP"),

@@ -102,7 +102,7 @@ def test_the_curve_of_a_pin_is_its_pressure_over_the_arc():
 @pytest.mark.parametrize("pairs", [[("a", 1.0)], [(0.0, 0.0, 1.0)], [(0.0, 10**400)], [1.0]])
 def test_a_history_that_is_no_list_of_pairs(pairs):
     """Iterators are looked into as they are used."""
-    with pytest.raises(fc.ModelError, match=r"must hold pairs \(instant, multiplier of the loads\)"):
+    with pytest.raises(fc.ModelError, match=r"must contain pairs \(instant, multiplier of the loads\)"):
         model().add_pressure(GROUP, 1.0, ramp=iter(pairs))
 
 

@@ -153,7 +153,7 @@ def test_a_case_file_has_couplings_moments_and_liquids():
         (lambda m: m.add_coupling("REF", "REF"), "the group needs points, without the reference point itself"),
         (lambda m: m.add_coupling("REF", "LEFT", components="z"), "unknown component 'z'"),
         (lambda m: m.add_coupling("REF", "LEFT", kind="distributing", components="x"), "has all components"),
-        (lambda m: m.add_moment("REF", x=1.0), "in the plane moments are about z"),
+        (lambda m: m.add_moment("REF", x=1.0), "in two dimensions a moment has the component z only"),
         (lambda m: m.add_moment("REF", z=np.nan), "the moment on 'REF' is nan"),
         (
             lambda m: m.add_hydrostatic_pressure("LEFT", weight=np.inf, level=1.0),

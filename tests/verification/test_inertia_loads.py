@@ -99,7 +99,7 @@ def test_the_axis_may_lie_anywhere_in_space():
     [
         (lambda m: m.add_gravity(), "has no component"),
         (lambda m: m.add_gravity(y=np.inf), "is inf, which is not a finite number"),
-        (lambda m: m.add_gravity("TOP", y=1.0), "holds no solid cells: no gravity can act on it"),
+        (lambda m: m.add_gravity("TOP", y=1.0), "contains no solid cells: no gravity can act on it"),
         (lambda m: m.add_centrifugal(1.0, direction=(0, 0, 0)), "has no length"),
         (lambda m: m.add_centrifugal(1.0, origin=(0,)), "needs three components"),
         (lambda m: m.add_centrifugal("fast"), "must be a number, not the string 'fast'"),

@@ -225,7 +225,7 @@ def test_initial_states_in_a_case_file(tmp_path):
         (
             "[[initial_stress]]\ngroups = 'TOP'\nxx = 1.0",
             "plane_stress",
-            "group 'TOP' holds no solid cells: it has no initial",
+            "group 'TOP' contains no solid cells: it has no initial",
         ),
         (
             "[[initial_strain]]\nxx = 1.0\naxes = [[1, 0, 1], [0, 1, 0]]",

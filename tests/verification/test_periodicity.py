@@ -253,7 +253,7 @@ def fitted(sectors, cells, element, **options):
     ),
 )
 def test_a_closed_contact_at_the_ends_of_a_sector_is_that_inside_of_a_larger_one(sectors, cells, element, options):
-    """Both nodes of a place have one condition: the split of their forces was round-off, and the geometry did not settle.
+    """Both nodes of a place have one condition: the split of their forces was round-off, and the geometry did not converge.
 
     Normals there are means over the facets of both ends, as those of the nodes in the midst of two sectors are.
     """

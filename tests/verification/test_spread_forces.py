@@ -185,7 +185,11 @@ def test_one_node_is_joined_with_all_of_a_group():
             {"group": "TOP", "y": 1.0, "at": (9.0, 1.0), "radius": 1.0},
             "no part of 'TOP' lies within the radius",
         ),
-        ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0), "distribute": False}, "leave out at or distribute"),
+        (
+            "add_force",
+            {"group": "TOP", "y": 1.0, "at": (1.0, 1.0), "distribute": False},
+            "leave out 'at' or 'distribute'",
+        ),
         ("add_force", {"group": "TOP_LEFT", "y": 1.0, "at": (1.0, 1.0)}, "are collinear or coincide"),
         (
             "add_coupling",

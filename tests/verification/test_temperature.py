@@ -176,7 +176,7 @@ def test_mistakes_are_refused_before_any_numerics():
             model.add_temperature(value)
     with pytest.raises(fc.ModelError, match="not finite at point 2"):
         model.add_temperature(np.where(np.arange(model.mesh.n_points) == 2, np.nan, 1.0))
-    with pytest.raises(fc.ModelError, match="holds no solid cells: it has no temperature"):
+    with pytest.raises(fc.ModelError, match="contains no solid cells: it has no temperature"):
         model.add_temperature(1.0, "TOP")
     model.add_temperature(1.0)
     with pytest.raises(fc.ModelError, match="acts on 6 solid cells whose material has no coefficient of thermal"):

@@ -241,7 +241,7 @@ def test_fields_in_case_files(folder):
         ),
         (
             "file = 'heat.med'\nfield = 'TEMP'\ngroups = 'TOP'",
-            "group 'TOP' holds no solid cells: it has no temperature",
+            "group 'TOP' contains no solid cells: it has no temperature",
         ),
     ],
 )

@@ -11,7 +11,7 @@ Let ``(g, s) = free + F y`` be the gaps and slips at the end of the step for for
 forces y0 and no slips. At a fraction p of the step, gaps and slips for forces y are
 ``free + (1 - p) * ((g0, 0) - free - F y0) + F y``.
 
-If normals are inclined, a constraint that closes has a tangential relative displacement that is no slip. The correction for
+If normals are inclined, a constraint that closes has a tangential relative displacement that is not slip. The correction for
 closing the whole gap g0 is part of `free`; each increment counts the fraction of it by which this increment closes the gap.
 
 The last increment depends on the earlier ones only through their slips, which stay fixed while the geometry converges.

@@ -67,7 +67,7 @@ def solve(
         equilibrium = _eliminated(loaded, constraints, closed, accuracy, u, forces, path)
         if equilibrium is not None:
             return equilibrium
-        log.info("friction: the iteration on eliminated constraints did not settle, their compliance is formed")
+        log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
     usable = constraints.usable
     begun = closed if constraints.equality is None else closed | constraints.equality
     begun = begun if path is None else begun | ~path.waiting
@@ -94,7 +94,7 @@ def _eliminated(
         nonlocal u
         solution = eliminated.solve(loaded, constraints, closed & usable, accuracy, u, forces)
         if solution is None:
-            raise ConvergenceError("friction: the iteration on eliminated constraints did not settle")
+            raise ConvergenceError("friction: the iteration on eliminated constraints did not converge")
         u, cone = solution
         cone.gaps[:, ~usable] = 0.0
         return cone

@@ -300,7 +300,7 @@ def _notes(content: Content, thickness: float) -> tuple[str, ...]:
     requests = {location.keyword for location in content.outputs}
     if output := sorted(requests - {"CONTROLS"}):
         kinds = ", ".join(f"*{keyword}" for keyword in output)
-        notes.append(f"{kinds}: no effect, the result file holds all output of all steps")
+        notes.append(f"{kinds}: no effect, the result file contains all output of all steps")
     if "CONTROLS" in requests:
         notes.append("*CONTROLS: no effect, the package has its own convergence criteria")
     if thickness != 1.0:

@@ -95,7 +95,7 @@ def _points(deck_mesh: DeckMesh, link: Link) -> list[int]:
     reference = deck_mesh.node(link.reference, link.location)
     kept = sorted(set(points) - {reference, deck_mesh.rotations[reference]})
     if not kept:
-        raise link.refuse(f"'{link.group}' holds no nodes that could follow the reference node")
+        raise link.refuse(f"'{link.group}' contains no nodes that could follow the reference node")
     return kept
 
 

@@ -83,7 +83,7 @@ class Formulation(ABC):
         - A vector (dim,) of any length: a constant normal, which points out of the primary body. Points are projected along
           it.
     slip : str
-        ``"symmetric"``: a relative displacement that closes a gap along the mean of the normals of both sides is no slip.
+        ``"symmetric"``: a relative displacement that closes a gap along the mean of the normals of both sides is not slip.
         ``"primary"``: all relative displacement along the tangents of the primary side is slip, also if the gap closes
         obliquely, as in code_aster.
     surface_smoothing : bool
@@ -418,7 +418,7 @@ class Formulation(ABC):
             Derivatives of the slips along each tangent with respect to the displacements [-].
         slip0 : ndarray (k, n) or None
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
-            closes the gap, if `slip` is ``"symmetric"`` [length]. None stands for zero.
+            closes the gap, if `slip` is ``"symmetric"`` [length]. None means zero.
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0: Array | None = None
@@ -503,7 +503,7 @@ class Formulation(ABC):
         return held
 
     def undetermined(self, at: Configuration) -> Mask:
-        """Return which nodes (n_nodes,) belong to facets between which and what they face nothing determines a traction.
+        """Return which nodes (n_nodes,) belong to facets whose traction is undetermined.
 
         Supports hold all their nodes, and the other side, in one direction. Where they hold the whole side along the
         contact, as in a slice in plane strain, the traction in this direction vanishes.
@@ -559,7 +559,7 @@ class Formulation(ABC):
             both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))
-        # Where the normal is held, a motion along it closes the gap and is no slip. Elsewhere the normal may be inclined to
+        # Where the normal is held, a motion along it closes the gap and is not slip. Elsewhere the normal may be inclined to
         # the held directions, such as at the edge of a plane of symmetry.
         closing = np.where(
             np.linalg.norm(along, axis=1) > np.sqrt(0.5), np.einsum("nd,nd->n", moved, pairing.normal), 0.0

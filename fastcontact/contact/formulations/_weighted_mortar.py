@@ -47,12 +47,12 @@ from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 
 MULTIPLIERS = ("standard", "dual")
-# A tangent of which a smaller fraction, squared, is free counts as held.
+# Smallest fraction of the squared length of a tangent, not held by supports, at which slip along the tangent is computed.
 FREE = 0.1
 
 
 class Coverage(NamedTuple):
-    """The overlap of both sides, and what of the test functions lies on it.
+    """The overlap of both sides, and the integrals of the test functions over it.
 
     Attributes
     ----------
@@ -75,10 +75,10 @@ class WeightedMortar(Formulation):
     Parameters
     ----------
     normals : str or sequence of float
-        Normals that are averaged to that of a node: ``"facet"``, those of the opposite primary facets; ``"averaged"``,
-        their nodal means. ``"secondary"`` and vectors as in `Formulation`.
+        Normals whose mean is the normal of a node: ``"facet"``, those of the opposite primary facets; ``"averaged"``,
+        their nodal averages. ``"secondary"`` and vectors as in `Formulation`.
     multipliers : str
-        ``"dual"`` or, between faces, ``"standard"``.
+        ``"dual"``, or in 3D ``"standard"``.
     """
 
     projection_tolerance: float = SINGLE_PRECISION
@@ -135,7 +135,7 @@ class WeightedMortar(Formulation):
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
         coverage = Coverage(overlap, weights, self._taking_part(weights))
         rows, across, closer = self._weighted(coverage)
-        # Left out altogether: the functions of its neighbours are not extended over the area of an excluded node.
+        # An excluded node only loses its gap: the functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
         weight = np.where(sums > 0.0, sums, np.inf)
         mean = scaled(csr_array(rows - across), 1.0 / weight)
@@ -153,7 +153,7 @@ class WeightedMortar(Formulation):
         if not self.slides:
             return constraints
         candidates = Candidates(points[:, None], np.ones((len(constraints), 1)))
-        held = [] if self.options.tied else self.without_slip(at)  # ties have equations of their own there
+        held = [] if self.options.tied else self.without_slip(at)  # ties have separate equations there
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for along, where in held:
             projectors[where] += along[where, :, None] * along[where, None, :]
@@ -229,7 +229,7 @@ class WeightedMortar(Formulation):
         return OverlapPoints(facet, np.tile(elements.get(block.element).shape(xi), (len(area), 1)), area.ravel())
 
     def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
-        """Return the variation of the nodal normals, where they are no means over the primary side."""
+        """Return the variation of the nodal normals, or None if they are means of primary normals."""
         if isinstance(self.primary, RigidSide):
             nodes = self.secondary.points[:, None]
             here, all_nodes = Candidates(nodes, np.ones(nodes.shape)), np.arange(len(nodes))
@@ -276,14 +276,15 @@ class WeightedMortar(Formulation):
         return tested, full_area
 
     def _closing(self, part: Constraints, normal: Array, at: Configuration) -> tuple[Array, Array]:
-        """Return by which lengths (m,) the step closes gaps [length], and in which directions (m, dim) that is no slip.
+        """Return the lengths (m,) by which the step closes gaps [length], and the directions (m, dim) in which it does so.
 
-        As in `Formulation`: along the mean of both sides' normals, or along the normal of an obstacle.
+        Closing in these directions is not slip. As in `Formulation`, they are along the mean of both sides' normals, or along
+        the normal of an obstacle.
         """
         between = normal
         if not isinstance(self.primary, RigidSide):
             between = normal - nodal_normals(self.secondary, self.points + at.displacement)
-            between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), TINY)  # zero where nothing is faced
+            between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), TINY)  # zero at unpaired nodes
         lean = np.einsum("nd,nd->n", normal, between)
         gap = np.where(part.usable & (lean > 0.0), part.gaps(at.start), 0.0)
         return gap / np.where(lean > 0.0, lean, 1.0), between
@@ -297,8 +298,8 @@ class WeightedMortar(Formulation):
         Usually these are the rows of the `mean` relative motion. In a direction in which both sides are held at a node, as in
         a plane of symmetry, the mean would contain only the motion of the other side beside the plane: there the functions of
         neighbouring nodes replace the node's own (`Formulation.without_slip`). For each such direction (m, dim) the matrix
-        (m, m) of the additional motion of secondary nodes in these functions is returned, too: on curved sides they close
-        their gaps along other normals.
+        (m, m) of the additional motion of secondary nodes in these functions is also returned, because on curved sides these
+        nodes close their gaps along other normals.
         """
         rows, beside = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
@@ -321,7 +322,7 @@ class WeightedMortar(Formulation):
     def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].
 
-        The third result are the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
+        The third result contains the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
         [volume].
         """
         overlap, weights, kept = coverage
@@ -358,14 +359,14 @@ class WeightedMortar(Formulation):
             np.add.at(complete, block.local, full)
         enough = total > (COVERED if self.multipliers == "dual" else NO_AREA) * complete
         for block, weights, full in zip(self.secondary.blocks, covered, self._whole, strict=True):
-            # The overlap of a facet is not lost: where no node has a sufficient part, the node with the largest takes it.
+            # If no node of a facet has sufficient weight, the one with the largest has a gap, so that no overlap is lost.
             lost = ~enough[block.local].any(axis=1) & (weights.sum(axis=1) > NO_AREA * full.sum(axis=1))
             most = np.argmax(total[block.local[lost]], axis=1)
             rescued[block.local[lost][np.arange(len(most)), most]] = True
         return (enough | rescued) & (complete > 0.0)
 
     def _mean_normals(self, overlap: Overlap, deformed: Array, pose: Pose) -> Array:
-        """Return unit means (m, dim) of the primary normals that the nodes face; where there are none, that of all nodes.
+        """Return unit means (m, dim) of the opposite primary normals; at unpaired nodes, the mean of all nodes.
 
         Against an obstacle these are the normals at the nodes themselves, which lie in planes of symmetry.
         """
@@ -413,7 +414,7 @@ class WeightedPressures(NodalField):
     Attributes
     ----------
     weight : ndarray (m,)
-        Area of each gap, infinite where it takes no part [area].
+        Area of each gap, infinite where there is no gap [area].
     tested : ndarray (m,)
         Integrals of the positive functions over the whole secondary side [area].
     nodal_areas : ndarray (m,)
@@ -421,7 +422,7 @@ class WeightedPressures(NodalField):
     quadratic : list of (int, ndarray (n_nodes, n_nodes), ndarray of int (n_facets, n_nodes))
         Kinds of quadratic facets: number of corners, coefficients of positive functions in shape functions, nodes.
     held : ndarray of bool (m,)
-        Nodes prescribed in all directions: their forces act between supports and say nothing about those of their neighbours.
+        Nodes prescribed in all directions, whose forces act between supports and are unrelated to those of their neighbours.
     """
 
     weight: Array
@@ -446,16 +447,16 @@ class WeightedPressures(NodalField):
     def over_whole_side(self, force: Array) -> Array:
         """Return forces over the whole areas of the positive functions; see `_at_nodes`.
 
-        The part of a node's area that faces the other side may be arbitrarily small, and its force vanishes with it: per
-        facing area its pressure is nearly undetermined, per whole area it is not.
+        The part of a node's area that faces the other side may be arbitrarily small, and its force vanishes with this part.
+        The ratio of both is sensitive to round-off; the force divided by the whole area is not.
         """
         return self._at_nodes(np.divide(force, self.tested, out=np.zeros_like(force), where=self.tested > 0.0))
 
     def _at_nodes(self, coefficients: Array, only_without_gap: bool = False) -> Array:
         """Return the nodal values (m,) of a field with `coefficients` (m,) of the positive functions.
 
-        They are the coefficients themselves except at mid nodes of quadratic facets, where corner functions are not
-        zero, or the only ones.
+        They are the coefficients themselves, except at mid nodes of quadratic facets, where the functions of the corners do
+        not vanish.
         """
         values = coefficients.copy()
         for corners, T, local in self.quadratic:

@@ -54,7 +54,7 @@ __all__ = [
 ]
 
 
-if not TYPE_CHECKING:  # type checkers know all names
+if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
 
     def __getattr__(name: str) -> object:
         raise no_attribute("fastcontact.obstacles", name, __all__)

@@ -93,7 +93,7 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
     rows = {name: block for name, block in rows.items() if elements.get(name).dim == mesh.dim - 1}
     if not rows:
         raise ContactError(
-            f"group '{group}' holds no facets (cells of dimension {mesh.dim - 1}), so it is not a rigid surface: "
+            f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}), so it is not a rigid surface: "
             "name a group of lines in 2D, of triangles or quadrangles in 3D"
         )
     outer = outer_facets(mesh) if mesh.solids else {}

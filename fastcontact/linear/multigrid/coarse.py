@@ -46,7 +46,7 @@ class Coarse:
         return self._factor.nbytes if self._lu is None else 12 * int(self._lu.nnz)
 
     def set(self, change: csc_array | None) -> None:
-        """Factorise the sum of the matrix and the symmetric matrix `change` (n, n); None stands for zero."""
+        """Factorise the sum of the matrix and the symmetric matrix `change` (n, n); None means zero."""
         if change is None and not self._changed:
             return
         self._changed = change is not None

@@ -58,7 +58,7 @@ class ConstrainedHierarchy:
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """Change the hierarchy to that of the matrix with `springs` added and the equations eliminated.
 
-        None stands for no equations, or no springs. Earlier changes are undone.
+        None means no equations, or no springs. Earlier changes are undone.
         """
         self._undo()
         self.stiffening = 0.0

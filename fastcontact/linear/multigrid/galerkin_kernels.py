@@ -2,7 +2,7 @@
 """Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
 
 Block matrices are given by arrays, see `matrix.BlockMatrix`, and block sizes m and n by tuples of zeros, `rows` and `cols`.
-Numbers that may be split are tuples, see `split_matrix_kernels`, and `storage` tells which blocks are stored, see
+Numbers that may be split are tuples, see `split_matrix_kernels`, and `storage` defines which blocks are stored, see
 `symmetric_storage_kernels`. Kernels compute rows `low` to ``high - 1``, one by one in a fixed order.
 """
 

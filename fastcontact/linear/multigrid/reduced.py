@@ -141,7 +141,7 @@ class _Excess:
         self._u = np.empty(len(diagonal))
 
     def begin(self, x: Array, multiplier: Array | None) -> None:
-        """Replace the pivots of x (n,), in place, by the excesses that belong to multipliers (m,); None stands for zero."""
+        """Replace the pivots of x (n,), in place, by the excesses that belong to multipliers (m,); None means zero."""
         x[self._pivots] = 0.0 if multiplier is None else -self._compliance * multiplier
 
     def displacement(self, x: Array, offset: Array | None) -> Array:

@@ -72,13 +72,13 @@ def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
 def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
     names = list(file["ENS_MAA"]) if "ENS_MAA" in file else []
     if not names:
-        raise FileError(f"'{path}' holds no MED mesh (no entry in ENS_MAA): name a MED file that has one")
+        raise FileError(f"'{path}' contains no MED mesh (no entry in ENS_MAA): name a MED file that has one")
     if mesh_name is not None:
         check_known("mesh", mesh_name, names, FileError, f"'{path}': ")
         return mesh_name
     if len(names) > 1:
         listed = ", ".join(f"'{name[:NAME_SIZE]}'" for name in names[:12]) + (", ..." if len(names) > 12 else "")
-        raise FileError(f"'{path}' holds {len(names)} meshes ({listed}): say which one with mesh_name")
+        raise FileError(f"'{path}' contains {len(names)} meshes ({listed}): say which one with mesh_name")
     return str(names[0])
 
 

@@ -24,7 +24,7 @@ MAIL_SUFFIX = ".mail"
 class MeshReport:
     """Report on a mesh file: its format with the version, the name of the mesh, and the changes made while reading.
 
-    The nodes of `n_turned` solid cells, which were inside out (clockwise in 2D), were reordered. `dropped` contains the
+    The nodes of `n_turned` solid cells, which were inverted (clockwise in 2D), were reordered. `dropped` contains the
     numbers of omitted cells: ``"vertex"``, cells of one node, whose groups became groups of points, and ``"duplicate"``,
     cells that Gmsh repeats for each of their groups.
     """

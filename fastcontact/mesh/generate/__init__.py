@@ -46,5 +46,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # type checkers know all names
+if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
     __getattr__, __dir__ = names_of("fastcontact.generate", __all__)

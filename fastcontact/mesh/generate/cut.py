@@ -54,7 +54,7 @@ def cut(mesh: Mesh, group: str, normal: Sequence[float] | None = None) -> Mesh:
     """
     facets = {name: block for name, block in mesh.cells_of(group).items() if elements.get(name).dim == mesh.dim - 1}
     if not facets:
-        raise MeshError(f"group '{group}' holds no facets, so nothing can be cut along it")
+        raise MeshError(f"group '{group}' contains no facets, so nothing can be cut along it")
     section = _as_sets(facets)
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
     direction = _direction(mesh, group, points, normal)

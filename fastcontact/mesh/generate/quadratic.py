@@ -27,7 +27,7 @@ class Curve(Protocol):
 
     @property
     def group(self) -> str | None:
-        """Name of the group of facets on the curve; None stands for all outer facets whose ends lie on it."""
+        """Name of the group of facets on the curve; None means all outer facets whose ends lie on it."""
         ...
 
     def project(self, points: Array) -> Array:

@@ -57,11 +57,11 @@ class Support:
     value : float or callable
         Displacement at multiplier 1 [length], a number or a function of position.
     ramp : Table, optional
-        History of `value`; None stands for the history of the analysis.
+        History of `value`; None means the history of the analysis.
     rotation : Rotation, optional
         Rigid rotation of the group, whose displacement is added to `value`.
     rotation_ramp : Table, optional
-        History of the angle of rotation; None stands for `ramp`.
+        History of the angle of rotation; None means `ramp`.
     """
 
     group: str

@@ -116,7 +116,7 @@ class ModelConnections(ModelInitialStates):
         """
         nodes = self.mesh.points_of(group)
         if len(nodes) < 2:
-            raise ModelError(f"group '{group}' holds {len(nodes)} points: at least two are needed to couple")
+            raise ModelError(f"group '{group}' contains {len(nodes)} points: at least two are needed to couple")
         directions = [component] if component == NORMAL else list(dict.fromkeys(component))
         if component != NORMAL:
             axes_of(f"couple('{group}')", dict.fromkeys(component, 1.0), self.mesh.dim)

@@ -65,7 +65,7 @@ class ModelContact(ModelConnections):
             ``"node_to_segment"``, ``"continuous"`` or ``"mortar"``; by default mortar with dual Lagrange multipliers, which
             suits any two surfaces. ``repr(model)`` and the log state the formulation.
         **options
-            The options below apply to all formulations; each formulation has further options. None stands for the default.
+            The options below apply to all formulations; each formulation has further options. None means the default.
 
             - ``friction``: coefficient of Coulomb friction.
             - ``kind``: the kinematic condition.
@@ -108,7 +108,7 @@ class ModelContact(ModelConnections):
             - ``adhesion``: reversible attraction without tangential resistance, as a mapping of the ``work`` of adhesion
               per unit area [pressure length], the ``strength`` [pressure] and the ``stiffness`` [pressure / length].
             - ``slip``: definition of the slip. ``"symmetric"``, the default: a relative displacement that closes a gap
-              along the mean normal of both sides is no slip. ``"primary"``: any relative displacement tangential to the
+              along the mean normal of both sides is not slip. ``"primary"``: any relative displacement tangential to the
               primary side is slip, as in code_aster.
             - ``wear``: Archard's wear coefficient divided by the hardness [1 / pressure]. At the end of each load step the
               depth ``wear * pressure * slip`` is removed from the secondary side.

@@ -202,7 +202,7 @@ class ModelLoads(ModelHeat):
     ) -> None:
         """Apply the pressure of a liquid at rest to a group of outer facets.
 
-        The pressure is `weight` times the depth below the free surface.
+        The pressure is `weight` times the depth below the free surface, and zero above it.
 
         Parameters
         ----------
@@ -281,22 +281,22 @@ class ModelLoads(ModelHeat):
         if spread is not None:
             if distribute is False:
                 raise ModelError(
-                    f"the force on '{group}' acts through a place or on every node: leave out at or distribute"
+                    f"the force on '{group}' acts through a point or on every node: leave out 'at' or 'distribute'"
                 )
             axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
             self._add(SpreadForce(group, axes, spread, table_of(ramp, f"the ramp of the force on '{group}'")))  # type: ignore[arg-type]
             return
         if distribute is None and group in self.mesh.cell_groups and self.mesh.cells_of(group, dim=self.mesh.dim):
             raise ModelError(
-                f"'{group}' is a group of solid cells: name facets or points for the force, or take add_body_force; "
-                "distribute=False loads every node of the cells with it"
+                f"'{group}' is a group of solid cells: name facets or points for the force, or use add_body_force; "
+                "with distribute=False it acts on every node of the cells"
             )
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
         if distribute and any(callable(component) for component in (x, y, z)):
             raise ModelError(
-                f"the total force on '{group}' must be a number: a function of position is the force on each node, with "
-                "distribute=False; or take add_traction"
+                f"the total force on '{group}' must be a number: a function of position gives the force on each node, with "
+                "distribute=False; or use add_traction"
             )
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
         axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
@@ -332,7 +332,7 @@ class ModelLoads(ModelHeat):
         name = f"the moment on '{group}'"
         components = {"x": x, "y": y, "z": z}
         if self.mesh.dim == 2 and (x is not None or y is not None):
-            raise ModelError(f"{name}: in the plane moments are about z")
+            raise ModelError(f"{name}: in two dimensions a moment has the component z only")
         axes = axes_of(name, components, 3)
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
 

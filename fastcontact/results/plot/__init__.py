@@ -25,5 +25,5 @@ __all__ = [
 ]  # fmt: skip
 
 
-if not TYPE_CHECKING:  # type checkers know all names
+if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
     __getattr__, __dir__ = names_of("fastcontact.plot", __all__)

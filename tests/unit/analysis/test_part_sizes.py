@@ -55,5 +55,5 @@ def test_a_cell_that_turns_inside_out_is_told_with_its_measure() -> None:
     prepared = problem()
     u = np.zeros((4, 2))
     u[prepared.model.mesh.points_of("TOP"), 1] = -1.5
-    with pytest.raises(fc.ConvergenceError, match=r"cell 0 of quad4 near \[0.5 0.5\] turns inside out \(J = -0.5\)"):
+    with pytest.raises(fc.ConvergenceError, match=r"cell 0 of quad4 near \[0.5 0.5\] is inverted \(J = -0.5\)"):
         prepared.deformed(u.ravel(), prepared.initial_state(), None)

@@ -49,7 +49,7 @@ def test_keys_of_another_kind_than_a_generator_takes_are_told(write):
 
 
 @pytest.mark.parametrize(
-    ("value", "said"), [("1e300", r"its size must be at most 1e\+60"), ("1e-320", "it must be at least")]
+    ("value", "said"), [("1e300", r"its magnitude must be at most 1e\+60"), ("1e-320", "it must be at least")]
 )
 def test_theories_out_of_the_range_of_numbers_are_told(value, said, write):
     with pytest.raises(fc.CaseError, match=f"'theory.hertz': approach is out of range: {said}"):

@@ -252,7 +252,7 @@ def test_a_run_that_fails_at_once_keeps_nothing_and_says_so(solved, tmp_path, ca
     case = tmp_path / "hard.toml"
     case.write_text(text)
     assert main(["run", str(case), "-o", str(tmp_path / "hard.vtkhdf")]) == 2
-    assert capsys.readouterr().err.splitlines()[-1] == f"  '{tmp_path / 'hard.vtkhdf'}' holds no complete step"
+    assert capsys.readouterr().err.splitlines()[-1] == f"  '{tmp_path / 'hard.vtkhdf'}' contains no complete step"
 
 
 def test_errors_of_cells_are_estimated_on_request(solved, tmp_path):

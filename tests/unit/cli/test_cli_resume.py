@@ -101,7 +101,9 @@ def test_a_resumed_run_tells_that_its_steps_are_others(whole, path, capsys, tmp_
     other = tmp_path / "other.toml"
     other.write_text(case.read_text().replace(f"steps = {STEPS}", f"steps = {STEPS + 1}"))
     assert main(["run", str(other), "-o", str(path), "--resume"]) == 0
-    assert f"holds {STEPS} steps, the case now has {STEPS + 1}: those in the file are kept" in capsys.readouterr().err
+    assert (
+        f"contains {STEPS} steps, the case now has {STEPS + 1}: those in the file are kept" in capsys.readouterr().err
+    )
 
 
 def test_without_resume_a_run_begins_anew(whole, begun, path):

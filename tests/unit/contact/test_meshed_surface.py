@@ -182,7 +182,7 @@ def test_what_is_no_surface_is_refused():
         MeshedSurface(branch, "B")
     with pytest.raises(fc.ContactError, match=r"facet 0 .* has no area"):
         MeshedSurface(Mesh([[0.0, 0.0], [0.0, 0.0]], {"line2": [[0, 1]]}, cell_groups={"N": [0]}), "N")
-    with pytest.raises(fc.ContactError, match="holds no facets"):
+    with pytest.raises(fc.ContactError, match="contains no facets"):
         MeshedSurface(block((1.0, 1.0), (1, 1), "quad4", name="B").with_groups(cells={"E": []}), "E")
     with pytest.raises(fc.MeshError, match="did you mean 'STRIP'"):
         MeshedSurface(strip(), "STRIPE")

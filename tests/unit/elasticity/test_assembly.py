@@ -157,7 +157,7 @@ def test_the_loop_names_the_first_cell_that_is_inside_out(element):
     block = mesh.cells[element].copy()
     block[1:3] = block[1:3][:, elements.get(element).reversed]
     turned = mesh.replace(cells={element: block}, cell_groups={})
-    with pytest.raises(fc.MeshError, match=f"cell 1 of {element} near .* inside out"):
+    with pytest.raises(fc.MeshError, match=f"cell 1 of {element} near .* inverted"):
         assembled(turned)
 
 

@@ -20,7 +20,7 @@ def test_the_first_cell_that_is_inside_out_is_told(element, material):
     turned = mesh.points * np.array([-1.0, *[1.0] * (mesh.dim - 1)])
     bad = mesh.replace(points=turned)
     moduli, numbers = material.moduli(kinematics)[None], {element: np.zeros(count, np.int32)}
-    with pytest.raises(fc.MeshError, match=rf"cell 0 of {element} near .* is degenerate or inside out"):
+    with pytest.raises(fc.MeshError, match=rf"cell 0 of {element} near .* is degenerate or inverted"):
         stiffness.stiffness(bad, kinematics, moduli, numbers)
     assert stiffness.stiffness(mesh, kinematics, moduli, numbers).shape[0] == mesh.n_points * mesh.dim
 

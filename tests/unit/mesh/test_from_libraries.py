@@ -210,5 +210,5 @@ def test_other_groups_keep_their_cells():
 
 def test_a_group_of_points_is_not_shadowed():
     mesh = a_body("quad4")
-    with pytest.raises(fc.MeshError, match="'CORNER' is a group of points already"):
+    with pytest.raises(fc.MeshError, match="'CORNER' is already a group of points"):
         mesh.with_facet_group("CORNER", lambda x: x[:, 0] < 1)

@@ -104,7 +104,7 @@ REFUSED = [
     (
         lambda: plate().add_material(ALONG_Z),
         fc.ModelError,
-        "a table is along z, but the mesh is plane: take x, y or radius",
+        "a table is along z, but the mesh is plane: use x, y or radius",
     ),
 ]
 

@@ -163,7 +163,7 @@ def test_what_another_program_writes_into_the_file_stays(path: Path) -> None:
             if not before_the_end:
                 out.write(step_result(1))
 
-    message = "was changed by another program after 1 steps, what it holds now is left alone"
+    message = "was changed by another program after 1 steps, its contents are left unchanged"
     for before_the_end in (False, True):
         with pytest.raises(FileError, match=message):
             overwritten(before_the_end)

@@ -294,7 +294,7 @@ def test_another_mesh_is_refused(path: Path) -> None:
         ResultWriter(path, spheres(arc=2.0), resume=True)
     with pytest.raises(FileError, match="belongs to another kinematics"):
         ResultWriter(path, spheres().mesh, kinematics="plane_strain", resume=True)
-    with pytest.raises(FileError, match=r"hold the cell fields none, not \['error'\]: ask for the same ones"):
+    with pytest.raises(FileError, match=r"contain the cell fields none, not \['error'\]: ask for the same ones"):
         ResultWriter(path, spheres(), cell_fields=("error",), resume=True)
     assert path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]

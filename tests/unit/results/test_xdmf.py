@@ -115,7 +115,7 @@ def test_vtk_reads_every_step_through_it(sidecar: Path) -> None:
 def test_one_written_during_the_run_stays_right(tmp_path: Path) -> None:
     path, sidecar = tmp_path / "result.vtkhdf", tmp_path / "result.xdmf"
     with ResultWriter(path, MESH) as out:
-        with pytest.raises(FileError, match="holds no complete step yet"):
+        with pytest.raises(FileError, match="contains no complete step yet"):
             write_xdmf(path, sidecar)
         out.write(step_result(0))
         write_xdmf(path, sidecar)

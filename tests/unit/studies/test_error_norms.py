@@ -156,7 +156,7 @@ def test_wrong_arguments_are_told():
     u = field.displacement(model.mesh.points)
     with pytest.raises(fc.ModelError, match=r"displacement has shape \(2, 2\)"):
         fc.error_against(field, model, u[:2])
-    with pytest.raises(fc.ModelError, match="group 'TOP' holds no solid cells"):
+    with pytest.raises(fc.ModelError, match="group 'TOP' contains no solid cells"):
         fc.error_against(field, model, u, groups="TOP")
     with pytest.raises(fc.MeshError, match="BLOCK"):
         fc.error_against(field, model, u, groups="BLOC")

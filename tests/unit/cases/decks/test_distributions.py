@@ -94,5 +94,5 @@ def test_axes_of_cells_from_python():
     with pytest.raises(fc.ModelError, match="not unit vectors at right angles"):
         fc.Orthotropic((8.0, 1.0, 1.0), (0.0,) * 3, (1.0,) * 3, axes=2.0 * turned)
     wrong = fc.Model(mesh, "3d")
-    with pytest.raises(fc.ModelError, match="they must be as many as its cells, 2"):
+    with pytest.raises(fc.ModelError, match="there must be one for each of its cells, 2"):
         wrong.add_material(fc.Orthotropic((8.0, 1.0, 1.0), (0.0,) * 3, (1.0,) * 3, axes=np.tile(np.eye(3), (3, 1, 1))))

@@ -37,7 +37,7 @@ def test_a_keyword_goes_on_over_comments_and_to_the_end_of_the_file(tmp_path):
 @pytest.mark.parametrize("asked", ["*Node Print, nset=x0\nU\n", "*Controls, reset\n", ""])
 def test_notes_tell_of_output_and_of_controls_by_themselves(tmp_path, asked):
     notes = notes_of(deck_of(tmp_path, WHOLE.replace("*End Step", asked + "*End Step")))
-    assert ("*NODE PRINT: no effect, the result file holds all output" in notes) == asked.startswith("*Node")
+    assert ("*NODE PRINT: no effect, the result file contains all output" in notes) == asked.startswith("*Node")
     assert ("*CONTROLS: no effect, the package has" in notes) == asked.startswith("*Controls")
     assert ("convergence" in notes) == asked.startswith("*Controls")
 

@@ -206,7 +206,7 @@ RELATIONS = {
     ),
     "rigid body of its own node": (
         before("*Boundary", "*Rigid Body, nset=alone, ref node=15\n", before("*Nset, nset=top", "*Nset, nset=alone\n15\n")),
-        "'alone' holds no nodes that could follow the reference node",
+        "'alone' contains no nodes that could follow the reference node",
     ),
     "springs of two": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1.\n2.\n"), "need an empty line, followed by"),
     "spring with a law": (before("*Boundary", SPRING + "*Spring, elset=springs\n\n1., 2.\n"), "only linear springs are supp"),

@@ -504,7 +504,7 @@ def test_no_mesh_and_two_meshes(tmp_path):
     path = tmp_path / "meshes.med"
     with h5py.File(path, "w"):
         pass
-    with pytest.raises(FileError, match="holds no MED mesh"):
+    with pytest.raises(FileError, match="contains no MED mesh"):
         read_med(path)
     write_med_mesh(path, all_elements(), mesh_name="upper")
     with h5py.File(path, "a") as file:

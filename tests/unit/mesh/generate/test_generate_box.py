@@ -16,7 +16,7 @@ SIDES = {f"{axis}{end}": (k, end) for k, axis in enumerate("XYZ") for end in ("M
 @pytest.mark.parametrize("element", SOLIDS)
 def test_volume_points_and_sides(element):
     mesh = box(SIZE, (3, 2, 2), element, ORIGIN)
-    fc.Model(mesh, "3d")  # no cell is degenerate or inside out
+    fc.Model(mesh, "3d")  # no cell is degenerate or inverted
     assert list(mesh.solids) == [element]
     assert corner_volumes(mesh, element).sum() == pytest.approx(np.prod(SIZE), rel=1e-13)
     assert fc.quality(mesh).measure == pytest.approx(np.prod(SIZE), rel=1e-13)
