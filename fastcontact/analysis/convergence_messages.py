@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
@@ -19,8 +20,6 @@ from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.model.rigid_motions import least_held
 
 Nodes = dict[str, list[int]]
-# Change of closed gaps by a motion relative to that by others below which a failure is ascribed to this motion.
-SLACK = 0.05
 # Fraction of the friction of all pairs that floating bodies use when they are about to slide.
 NEARLY_SLIDING = 0.9
 
@@ -91,7 +90,7 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
     """
     if len(bodies.names) > 1:
         (weakest,), ratio = least_held(bodies.motions, gaps)
-        if ratio < SLACK:
+        if ratio < NOTABLE:
             return (
                 f"contact hardly resists one motion, {weakest}, which changes the gaps {ratio:.1g} times as much as others "
                 "do: fix or prescribe a displacement component that stops it"

@@ -26,9 +26,9 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.linearised_geometry import Linearised
 from fastcontact.round_off import SINGLE_PRECISION
 
-# Relative residual of the change over what suffices at the end, and the largest number of iterations. With as much as
-# suffices, steps of plastic bodies take a tenth more pairings.
-AT_END, MOST = 0.01, 20
+# Relative residual of the change over what suffices at the end. With as much as suffices, steps of plastic bodies take a
+# tenth more pairings.
+AT_END = 0.01
 
 
 def newton_step(
@@ -81,9 +81,7 @@ def newton_step(
     changed = (image - before)[where]
     system = LinearOperator((len(changed),) * 2, matvec=lambda v: v - varied(v)[where], dtype=float)
     size = largest(changed) or 1.0
-    v, _ = gmres(
-        system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, restart=MOST, maxiter=1
-    )
+    v, _ = gmres(system, changed / size, rtol=max(SINGLE_PRECISION, AT_END * accuracy), atol=0.0, maxiter=1)
     responding = largest_difference(size * v, changed)
     # Far from the solution, a step in which the response exceeds the change itself is unreliable.
     if not responding <= size:

@@ -14,24 +14,23 @@ import numpy as np
 from fastcontact.analysis.problem import Problem
 from fastcontact.arrays import Array
 from fastcontact.elasticity.energy import gradients_at
+from fastcontact.elasticity.recovery import BATCH
 from fastcontact.mesh import elements
 from fastcontact.mesh.topology import bodies
 from fastcontact.model.rigid_motions import body_name
 from fastcontact.results.step import StepResult
+from fastcontact.round_off import SINGLE_PRECISION, TINY
 
 # Work of the stresses on neglected strains over that on strains, above which a warning is given.
 NEGLECTED = 0.1
-# Work on strains relative to that of the body with most, below which a body counts as free of stress.
-STRESSED = 1e-6
-# Number of cells that are evaluated together.
-BATCH = 10_000
 
 
 def neglected_rotation(problem: Problem, last: StepResult, angle: float) -> Iterator[str]:
     """Yield a warning for the body in which linear kinematics neglect most; `angle` is the largest rotation [radian]."""
     mesh = problem.model.mesh
     neglected, strained = _works(problem, last)
-    ratio = np.abs(neglected) / np.maximum(strained, max(STRESSED * strained.max(initial=0.0), np.finfo(float).tiny))
+    # Bodies whose work on strains is round-off of that of other bodies are free of stress.
+    ratio = np.abs(neglected) / np.maximum(strained, max(SINGLE_PRECISION * strained.max(initial=0.0), TINY))
     worst = int(np.argmax(ratio))
     if ratio[worst] > NEGLECTED:
         name = body_name(mesh, bodies(mesh)[1], worst)
@@ -51,7 +50,7 @@ def _works(problem: Problem, last: StepResult) -> tuple[Array, Array]:
         element = elements.get(name)
         places, weights = element.quadrature
         N, dN = element.shape(places), element.gradient(places)
-        for cells in np.array_split(block, -(-len(block) // BATCH)):
+        for cells in np.array_split(block, len(block) * dN.nbytes // BATCH + 1):
             gradient, volume = gradients_at(mesh.points[cells], dN)
             stress, volume = N @ last.stress[cells], np.abs(volume) * weights
             slope = np.einsum("cad,cqak->cqdk", last.displacement[cells], gradient, optimize=True)

@@ -26,6 +26,7 @@ from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium, balance, solve_displacements, with_loads
 from fastcontact.analysis.terms import Fluid, Terms
+from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
 from fastcontact.errors import ConvergenceError, ModelError
@@ -35,18 +36,18 @@ from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 log = logging.getLogger("fastcontact")
 # Largest number of Newton iterations of a load step, and of halvings of an iteration that inverts cells.
 MOST, HALVINGS = 40, 6
-# Trials of a line search, ratio of final to initial slope above which a step overshoots, and smallest step length.
-SEARCHES, OVERSHOT, LEAST = 3, 0.8, 0.1
-# Number of iterations within which the change of the displacement must have decreased at least once by the factor FALL.
-PATIENCE, FALL = 12, 0.5
+# Trials of a line search.
+SEARCHES = 3
+# Number of iterations within which the change of the displacement must have decreased at least once by the factor DECLINE.
+PATIENCE = 12
 # Stiffnesses of springs along closed gaps, over the largest stiffness of the bodies. Motions that contact does not constrain,
-# such as gaps between values of a pressure field, creep with stiff springs: an O-ring takes 5, 7, 11 iterations with 5e-5,
-# 2e-4, 1e-3, and an O-ring under fluid pressure, for which the first is too soft, takes 13 and 22 with the others.
-HELD = 5e-5, 2e-4, 1e-3
+# such as gaps between values of a pressure field, creep with stiff springs: an O-ring takes 5 and 7 iterations with 5e-5 and
+# 2e-4, and an O-ring under fluid pressure, for which the first is too soft, takes 13 with the second.
+HELD = 5e-5, 2e-4
 # The contact geometry of the linearised bodies converges to this fraction of the last relative change of the displacement.
 FORCING = 1e-3
 # Relative error of the displacement at which iterations end. A change that is small enough to be round-off
-# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction FALL of the previous
+# (SINGLE_PRECISION, reached in slender bodies) counts as such if it exceeds the fraction DECLINE of the previous
 # one.
 UNCHANGED = 100 * ROUND_OFF
 
@@ -166,7 +167,7 @@ class _Newton:
             if fraction == 1.0 and balanced.excess <= 1.0 and small:
                 return StepEquilibrium(self._settled, u, balanced, self._terms, history)
             u = self._accelerated(before, u, changes) if fraction == 1.0 else u
-            if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > FALL * min(changes[:-PATIENCE]):
+            if len(changes) > PATIENCE and min(changes[-PATIENCE:]) > DECLINE * min(changes[:-PATIENCE]):
                 break
         raise ConvergenceError(
             f"Newton's method does not converge: after {len(history)} iterations displacements change by {changes[-1]:.1e} "
@@ -205,7 +206,7 @@ class _Newton:
         rate = min(last / before, 1.0) if before else 1.0
         if self._by.linear:
             return last * rate <= self._enough * (1.0 - rate) or (last <= SINGLE_PRECISION and rate == 1.0)
-        return last * rate <= self._enough or (last <= SINGLE_PRECISION and rate > FALL)
+        return last * rate <= self._enough or (last <= SINGLE_PRECISION and rate > DECLINE)
 
     def _accelerated(self, before: Array, u: Array, changes: list[float]) -> Array:
         """Return the displacements (n_dofs,) [length] to continue from; the last iteration led from `before` (n_dofs,) to u.
@@ -365,7 +366,7 @@ class _Newton:
         """Return the result of `_reach` after a line search (Crisfield, 1991, section 9.2).
 
         With fixed contact forces (n_dofs,) [force] the potential decreases at the beginning of the step; if its slope at
-        the end is positive and a large fraction of the initial one, the step is shortened.
+        the end is positive and larger than the initial one, the step is shortened.
         """
         system, fluid = self._problem.system, self._fluid(u)
         change, along = target - u, system.unknowns(target - u)
@@ -376,9 +377,9 @@ class _Newton:
 
         first, last, fraction = slope(u), slope(target), 1.0
         for _ in range(SEARCHES):
-            if not last > OVERSHOT * abs(first):
+            if not last > abs(first):
                 break
-            fraction *= max(abs(first) / (abs(first) + last), LEAST)
+            fraction *= abs(first) / (abs(first) + last)
             target = u + fraction * change
             last = slope(target)
         return target, fraction

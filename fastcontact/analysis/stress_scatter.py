@@ -17,6 +17,7 @@ from fastcontact.elasticity.cell_stress import CellStress
 from fastcontact.elasticity.energy import cell_volumes, elastic_energy, integration_rule
 from fastcontact.elasticity.incompatible_modes import BENDING as BENDING_ELEMENTS
 from fastcontact.elasticity.materials import LinearElastic
+from fastcontact.elasticity.recovery import BATCH
 from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.mesh import elements
 from fastcontact.results.step import StepResult
@@ -31,8 +32,6 @@ SUSPICIOUS, ALTERNATING = 0.45, 0.3
 BENDING = 0.45
 # Elements that are over-constrained by one dilatation per cell.
 SIMPLICES = ("tri3", "tet4")
-# Number of cells processed at a time.
-BATCH = 50_000
 
 
 class StressScatter:
@@ -90,8 +89,8 @@ class StressScatter:
         xi, weights = integration_rule(element, 2)
         N, dN = np.ascontiguousarray(element.shape(xi)), np.ascontiguousarray(element.gradient(xi))
         simplex, sums = element.n_corners == element.dim + 1, np.zeros(4)
-        for first in range(0, len(mesh.cells[name]), BATCH):
-            rows = np.arange(first, min(first + BATCH, len(mesh.cells[name])))
+        n = len(mesh.cells[name])
+        for rows in np.array_split(np.arange(n), n * dN.nbytes // BATCH + 1):
             cells, numbers = mesh.cells[name][rows], field.rows[name][rows]
             rough = stress.at(name, xi, cells, field.loops[name][rows], rows)
             off = N @ smooth[rows] - rough

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
@@ -22,8 +23,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF
 
 # Shear of nodes that close and slide, relative to the friction capacity, that is neglected by default.
 NEGLIGIBLE = 1e-3
-# Relative change of the displacements at which the next solution of Newton's method for the geometry is accurate.
-NEARLY = 1e-3
 
 
 class Touching:
@@ -47,7 +46,7 @@ class Touching:
     """
 
     def __init__(self, step: StepContext, newton: bool) -> None:
-        self._allowed, self._near = _allowed(step.problem), NEARLY if newton else 0.0
+        self._allowed, self._near = _allowed(step.problem), NOTABLE if newton else 0.0
         self.due = self.done = self.unfinished = False
 
     def step(

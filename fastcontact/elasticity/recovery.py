@@ -18,7 +18,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Materials = dict[str, Numbers]
-# Memory for stresses at points during the computation of nodal ones [bytes].
+# Memory for values at the points of cells that are processed together [bytes].
 BATCH = 16_000_000
 # Sampling interval of cells by which the distribution of nodes is estimated.
 SAMPLED = 16

@@ -27,13 +27,13 @@ from fastcontact.linear.delassus import lu_factors
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
-EDGES, LARGEST = (8, 16, 32), 2500
+EDGES, LARGEST = (8, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique; examples are nodes that belong to several surfaces, and
-# nodes that supports hold on one side. F counts as dependent if a squared pivot of its scaled Cholesky factor is below
-# DEPENDENT. All slips then get the first compliance YIELDING, relative to the compliance of the gaps, and the second one if
+# nodes that supports hold on one side. F counts as dependent if a squared pivot of its scaled Cholesky factor is round-off
+# of lengths. All slips then get the first compliance YIELDING, relative to the compliance of the gaps, and the second one if
 # the first does not suffice. If the elastic slip due to this compliance exceeds SINGLE_PRECISION, relative to the scale of
 # gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
-YIELDING, DEPENDENT = (10 * ROUND_OFF, LENGTH_ROUND_OFF), 1e-8
+YIELDING = 10 * ROUND_OFF, LENGTH_ROUND_OFF
 
 
 def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
@@ -88,7 +88,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
 def _dependent(F: Array) -> bool:
     """Return whether rows of F, scaled to a diagonal of ones for the gaps, are linearly dependent up to round-off."""
     try:
-        return bool(np.diag(np.linalg.cholesky(F)).min() ** 2 < DEPENDENT)
+        return bool(np.diag(np.linalg.cholesky(F)).min() ** 2 < LENGTH_ROUND_OFF)
     except np.linalg.LinAlgError:
         return True
 

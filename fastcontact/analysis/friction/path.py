@@ -28,13 +28,13 @@ from fastcontact.analysis.friction.cone_newton import Forces
 from fastcontact.analysis.solution import FrictionalEquilibrium, Slid
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
+from fastcontact.round_off import SINGLE_PRECISION
 
 # Calculation of an increment from gaps and slips (1 + k, m) [length] to be added, constraints (m,) that may close, those of
 # them that are closed initially, and initial forces (1 + k, m) [force] or None.
 Increment = Callable[[Array, Mask, Mask, Array | None], Forces]
-# Largest number of constraints that begin to carry forces together, relative to the number of closed ones; and relative
-# difference of instants that are equal but for round-off.
-GROWTH, EQUAL = 1 / 32, 1e-6
+# Largest number of constraints that begin to carry forces together, relative to the number of closed ones.
+GROWTH = 1 / 32
 
 
 def along(
@@ -109,7 +109,7 @@ def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[float,
     closing = waiting & (end < 0.0)
     fraction = np.divide(np.maximum(now, 0.0), now - end, out=np.full_like(now, np.inf), where=closing & (now > end))
     first = np.sort(fraction[closing])[:count]
-    return min(float(first.mean()), 1.0), closing & (fraction <= first[-1] * (1.0 + EQUAL))
+    return min(float(first.mean()), 1.0), closing & (fraction <= first[-1] * (1.0 + SINGLE_PRECISION))
 
 
 def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:

@@ -14,13 +14,13 @@ import numpy as np
 from scipy.sparse import block_array, csr_array, diags_array
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.round_off import ROUND_OFF, TINY
+from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, TINY
 
 # A tangent is idle if its compliance relative to the compliance of the gap is less than this.
 IDLE = 100 * ROUND_OFF
 # Compliance of a prescribed slip relative to the compliance of its gap. It is negligible, but with it the equation of stick
 # has a solution. The force of this solution lies outside the friction cone, so that the constraint slides.
-GIVING = 1e-8
+GIVING = LENGTH_ROUND_OFF
 
 
 def own_compliance(F: Array, parts: int) -> Array:

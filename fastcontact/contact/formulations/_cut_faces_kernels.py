@@ -12,9 +12,6 @@ from fastcontact.contact.search.box_tree_kernels import DEPTH
 from fastcontact.contact.search.limits import MAX_ITERATIONS
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF
 
-# A polygon of up to 4 corners clipped by one of up to 4 has at most 8.
-MOST = 12
-
 
 @interpretable_kernel
 def planes(corners, n_corners, origin, axes):
@@ -173,7 +170,8 @@ def facing_pairs(
     int
         Number of pairs; if it exceeds the capacity of `pairs`, only the first ones are filled.
     """
-    subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
+    room = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
+    subject, window, spare = np.empty((room, 2)), np.empty((room, 2)), np.empty((room, 2))
     stack, leaves, count = np.empty(DEPTH, np.int64), len(tree.low) // 2, 0
     for s in range(secondary.shape[0]):
         normal = axes[s, 2]
@@ -339,7 +337,8 @@ def integrate(
 
     Returns -1, or the number of a pair with a facet too distorted to be projected.
     """
-    subject, window, spare = np.empty((MOST, 2)), np.empty((MOST, 2)), np.empty((MOST, 2))
+    room = n_secondary + 2 * n_primary  # each side of the window adds at most two corners
+    subject, window, spare = np.empty((room, 2)), np.empty((room, 2)), np.empty((room, 2))
     n, m = to_terms.shape[0], other_to_terms.shape[0]
     terms, other_terms, shape, other_shape = np.empty((n, 3)), np.empty((m, 3)), np.empty(n), np.empty(m)
     flat, other_flat, xi, other_xi = np.empty((n, 2)), np.empty((m, 2)), np.empty(2), np.empty(2)

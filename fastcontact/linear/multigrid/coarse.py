@@ -15,8 +15,8 @@ from fastcontact.arrays import AnyArray
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.round_off import ROUND_OFF
 
-# Number of unknowns above which a dense factorisation costs more than a sparse one.
-DENSE_UP_TO = 1500
+# Number of unknowns up to which a level is not coarsened. Its factors are then dense.
+COARSEST = 200
 
 
 class Coarse:
@@ -51,7 +51,7 @@ class Coarse:
             return
         self._changed = change is not None
         A = self.matrix if change is None else csc_array(self.matrix + change)
-        if self.n <= DENSE_UP_TO:
+        if self.n <= COARSEST:
             self._factor = A.toarray(order="C")
             cycle_kernels.factorise_dense(self._factor, self._reciprocal)
             return

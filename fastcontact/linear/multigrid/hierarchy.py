@@ -22,14 +22,11 @@ from scipy.sparse import csr_matrix
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
-from fastcontact.linear.multigrid.coarse import Coarse
+from fastcontact.linear.multigrid.coarse import COARSEST, Coarse
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointers, widest_row
 from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
-
-# Number of unknowns up to which a level is not coarsened.
-COARSEST = 200
 
 
 class Hierarchy:
