@@ -150,7 +150,13 @@ class _Newton:
         u, changes = origin, [1.0]
         for _ in range(MOST):
             before = u
-            target, contact_force = self._solve(before, changes)
+            try:
+                target, contact_force = self._solve(before, changes)
+            except ConvergenceError as error:
+                if not history or error.smaller_steps_help:
+                    raise
+                log.info("an iterate is refused: %s", error)  # which says nothing about the equilibrium
+                break
             u, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)
             if self._terms.prepared:

@@ -65,7 +65,7 @@ def _parts(
             part = (
                 f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
             )
-            limit = limit_load(problem, state) + friction_used(problem, state)
+            limit = limit_load(problem, state) or friction_used(problem, state)
             final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
             # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
             raise final.with_traceback(error.__traceback__) from None

@@ -32,7 +32,7 @@ ARGUMENTS: Arguments = {
     "--phases N": (int, "with --animate: one period of vibration with the shape of --step, in N pictures"),
     "--zoom LENGTH": (float, "half width of the part around the largest value to draw"),
     "--mirrored": "draw the mirror image about the axis as well",
-    "--scale SCALE": (1.0, "factor on the displacements (default 1)"),
+    "--scale SCALE": (float, "factor on the displacements (default 1; a tenth of the size of the mesh for mode shapes)"),
 }
 
 
@@ -90,10 +90,12 @@ def _of_bodies(
 ) -> Any:
     """Draw the deformed mesh, or a section through it."""
     from fastcontact.results import plot
+    from fastcontact.results.plot.shape import scale_of
 
     at = f"section {options.section}, " if plane else ""
-    title = f"{case['title']}\n{at}{step.instant}, displacements x {options.scale:g}".strip()
-    labels = {"field": options.field, "scale": options.scale, "zoom": options.zoom, "title": title}
+    scale = scale_of(options.scale, results.mesh, [step])
+    title = f"{case['title']}\n{at}{step.instant}, displacements x {scale:g}".strip()
+    labels = {"field": options.field, "scale": scale, "zoom": options.zoom, "title": title}
     if plane is None:
         return plot.deformed_shape(results.mesh, step, mirrored=options.mirrored, **labels)
     point, normal = [0.0] * 3, [0.0] * 3

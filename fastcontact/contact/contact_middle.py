@@ -1,11 +1,11 @@
 """Centre of a contact zone, and distances from it on the secondary surface.
 
-In axisymmetry the middle is the axis. Otherwise it is the centre of pressure of the contact, completed by reflection at the
+In axisymmetry the middle is the axis where the radius increases or decreases along the surface. Otherwise it is the centre of pressure of the contact, completed by reflection at the
 planes of symmetry that it reaches: a half or quarter model has its middle on these planes. A plane of symmetry is one in
 which supports hold the nodes at an end of the surface normal to the plane.
 
 In the plane, coordinates are arc lengths along the surface: a ring is unrolled. The same holds in axisymmetry where the
-surface runs along the axis rather than across it, as in a press fit of cylinders. In 3D they are distances from the line
+surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, as that of an O-ring. In 3D they are distances from the line
 through the middle along the mean normal.
 
 The half-width of a contact in the plane is that of its projection along the mean normal: half the chord of a pin in its hole,
@@ -95,7 +95,9 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     weight = _weights(force, gap)
     mean = weight @ normal
     dim = points.shape[1]
-    if pair.axisymmetric and (_meets_axis(points) or abs(mean[0]) <= abs(mean[1])):
+    if pair.axisymmetric and (
+        _meets_axis(points) or (abs(mean[0]) <= abs(mean[1]) and _told_apart_by_radius(surface, pair.points))
+    ):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(surface, pair.points, pair.held)
     if closed.any():
@@ -124,6 +126,15 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], m
 def _meets_axis(points: Array) -> bool:
     """Return whether one of the `points` (n, 2) [length] lies on the axis x = 0."""
     return bool(np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max())
+
+
+def _told_apart_by_radius(surface: Surface, coordinates: Array) -> bool:
+    """Return whether no two points of a surface have the same radius, or it has no order along it."""
+    line = unrolled(surface, coordinates, None)
+    if line is None:
+        return True
+    steps, noise = np.diff(line.nodes[:, 0]), LENGTH_ROUND_OFF * float(np.ptp(line.nodes, axis=0).max())
+    return bool(steps.min() >= -noise or steps.max() <= noise)
 
 
 def symmetry_planes(surface: Surface, coordinates: Array, motions: HeldMotions | None) -> list[tuple[int, Indices]]:

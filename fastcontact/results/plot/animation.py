@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, settled
 from fastcontact.results.plot.fields import field_of
 from fastcontact.results.plot.framing import size_around
-from fastcontact.results.plot.shape import deformed_shape, scaled
+from fastcontact.results.plot.shape import deformed_shape, scale_of, scaled
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.step import StepResult
 
@@ -59,7 +59,7 @@ def animate(
     path: str | os.PathLike[str],
     *,
     field: str = "von_mises",
-    scale: float = 1.0,
+    scale: float | None = None,
     mirrored: bool = False,
     pictures_per_second: int = 5,
     title: str = "",
@@ -112,7 +112,7 @@ def animate(
         raise FastcontactError("there are no steps to animate")
     if pictures_per_second < 1:
         raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
-    target = checked_target(path)
+    target, scale = checked_target(path), scale_of(scale, mesh, steps)
     doubled = [2.0 if mirrored else 1.0, 1.0]
     size, projection = (size_around(mesh.points * doubled, 3.8), None) if mesh.dim == 2 else ((6.4, 6.0), "3d")
     figure = new_axes(None, size, projection).figure

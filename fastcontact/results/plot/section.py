@@ -18,7 +18,7 @@ from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.framing import framed, part_shown, size_around
 from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import shaded
-from fastcontact.results.plot.shape import scaled
+from fastcontact.results.plot.shape import scale_of, scaled
 from fastcontact.results.plot.solid import MOST_EDGES
 from fastcontact.results.step import StepResult
 
@@ -37,7 +37,7 @@ def section(
     normal: Sequence[float],
     *,
     field: str = "von_mises",
-    scale: float = 1.0,
+    scale: float | None = None,
     edges: bool | None = None,
     zoom: float | None = None,
     title: str = "",
@@ -89,6 +89,7 @@ def section(
     at, direction = _plane(mesh, point, normal)
     shown, units = field_of(mesh, step, field), units or step.units
     triangles, lines = _touching(shown, step, at, direction)
+    scale = scale_of(scale, mesh, [step])
     basis, labels = seen_along(direction, 1.0 - 1e-12)
     corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])
     flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,18 @@ from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view
 from fastcontact.results.step import StepResult
 
 LARGEST = 1e30  # largest coordinate that can be plotted without overflow in products of coordinates
+VIBRATION = 0.1  # largest displacement of vibration modes, over the size of the mesh, at which they are drawn by default
+
+
+def scale_of(scale: float | None, mesh: Mesh, steps: Sequence[StepResult]) -> float:
+    """Return the factor on the displacements [-]: `scale` or, by default, 1 or that of vibration modes.
+
+    The amplitude of a mode is arbitrary; by default the largest displacement is a tenth of the size of the mesh.
+    """
+    largest = max(float(np.abs(step.displacement).max(initial=0.0)) for step in steps)
+    if scale is not None or largest == 0.0 or "parameter" not in steps[0].iterations:
+        return 1.0 if scale is None else scale
+    return float(f"{VIBRATION * float(np.ptp(mesh.points, axis=0).max()) / largest:.2g}")
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
@@ -36,7 +49,7 @@ def deformed_shape(
     step: StepResult,
     *,
     field: str = "von_mises",
-    scale: float = 1.0,
+    scale: float | None = None,
     edges: bool | None = None,
     mirrored: bool = False,
     zoom: float | None = None,
@@ -59,8 +72,9 @@ def deformed_shape(
         ``"stress.xx"``, or a principal stress ``"stress.principal_max"``, ``"stress.principal_mid"`` or
         ``"stress.principal_min"``; ``"displacement"`` for its magnitude, or a component such as ``"displacement.x"``; or a
         name in `StepResult.cell_fields`.
-    scale : float
-        Factor by which displacements are multiplied [-].
+    scale : float, optional
+        Factor by which displacements are multiplied [-]. By default it is 1, but the largest displacement of a vibration
+        mode is a tenth of the size of the mesh.
     edges : bool, optional
         Whether to draw the edges of cells; by default if there are at most 5000 cells or, in 3D, facets of the surface.
     mirrored : bool
@@ -104,6 +118,7 @@ def deformed_shape(
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
     shown, units = field_of(mesh, step, field), units or step.units
+    scale = scale_of(scale, mesh, [step])
     points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
     if mesh.dim == 3:

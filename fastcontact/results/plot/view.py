@@ -7,11 +7,13 @@ import sys
 from typing import Any
 
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot.shape import scaled
+from fastcontact.results.plot.shape import scale_of, scaled
 from fastcontact.results.step import StepResult
 
 
-def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "", screenshot: str | None = None) -> None:
+def view(
+    results: Any, step: StepResult, *, scale: float | None = None, title: str = "", screenshot: str | None = None
+) -> None:
     """Show the deformed mesh, coloured by the von Mises stress, in an interactive window.
 
     Parameters
@@ -20,8 +22,8 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
         An open result file.
     step : StepResult
         The step to show.
-    scale : float
-        Factor by which displacements are multiplied [-].
+    scale : float, optional
+        Factor by which displacements are multiplied, see `deformed_shape` [-].
     title : str
         Title of the plot.
     screenshot : str, optional
@@ -45,7 +47,7 @@ def view(results: Any, step: StepResult, *, scale: float = 1.0, title: str = "",
     if screenshot is None and not _has_display():
         raise FastcontactError("there is no display to open a window on: write a picture instead, with --png FILE")
     grid = results.to_pyvista(step)
-    grid.points = scaled(grid.points, scale, grid.point_data["displacement"])
+    grid.points = scaled(grid.points, scale_of(scale, results.mesh, [step]), grid.point_data["displacement"])
     plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
     plotter.add_mesh(
         grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
