@@ -18,11 +18,11 @@ def blocks(element="quad4", lower=(3, 2), upper=(3, 2), apart=0.0):
     return mesh.replace(points=points)
 
 
-def boxes(element="hex8", lower=(2, 3, 2), upper=(2, 3, 2), apart=0.0):
+def boxes(element="hex8", lower=(2, 3, 2), upper=(2, 3, 2), apart=0.0, upper_element=None):
     """Two boxes of 10 by 10 by 5 on each other along z = 0, the upper one lifted; groups as of `box`, after L_ or U_."""
     parts = []
-    for side, divisions, z in (("L", lower, -5.0), ("U", upper, apart)):
-        part = box((10.0, 10.0, 5.0), divisions, element, (0.0, 0.0, z))
+    for side, kind, divisions, z in (("L", element, lower, -5.0), ("U", upper_element or element, upper, apart)):
+        part = box((10.0, 10.0, 5.0), divisions, kind, (0.0, 0.0, z))
         parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
     return union(*parts)
 

@@ -82,12 +82,3 @@ def test_grows_smoothly():
 def test_range_of_the_table_is_kept(approach):
     with pytest.raises(ModelError, match=r"runs from 4e-05 to 0\.08"):
         finite_half_spheres(approach)
-
-
-def test_bad_input_is_named():
-    with pytest.raises(ModelError, match=r"nu is 0\.25"):
-        finite_half_spheres(1.0, nu=0.25)
-    with pytest.raises(ModelError, match="R is -1"):
-        finite_half_spheres(1.0, R=-1.0)
-    with pytest.raises(ModelError, match="approach is 0"):
-        finite_half_spheres(0.0)
