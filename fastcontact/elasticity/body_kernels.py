@@ -11,7 +11,6 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.constitutive_kernels import (
-    add_second_derivative,
     cofactor,
     determinant,
     extreme_eigenvalues,
@@ -31,36 +30,42 @@ INVERTED, NO_PLANE_STRESS = 1, 2
 
 
 @kernel
-def _tables(dN, lines, rows):
-    """Fill derivatives (n_q, n_nodes, dim) into `lines` (n_q * n_nodes, 4) and, by components, `rows` (n_q * 3, width)."""
+def _tables(dN, columns, rows):
+    """Fill derivatives dN (n_q, n_nodes, dim) into `columns` and `rows`: those of point q are three from 3 q on."""
     n_q, n_nodes, dim = dN.shape
-    lines[:], rows[:] = 0.0, 0.0
+    columns[:], rows[:] = 0.0, 0.0
     for q in range(n_q):
         for a in range(n_nodes):
             for i in range(dim):
-                lines[q * n_nodes + a, i] = rows[3 * q + i, a] = dN[q, a, i]
+                columns[a, 3 * q + i] = rows[3 * q + i, a] = dN[q, a, i]
 
 
 @kernel
-def _gather(values, cells, c, x):
-    """Fill `x` (n_nodes, 4) with the vectors of `values` (n_points, dim) at the nodes of cell `c`."""
-    for a in range(cells.shape[1]):
+def _map(points, displacement, cells, c, columns, x, maps):
+    """Fill `maps`: three rows for each point, the derivatives of positions (columns 0 to 2) and displacements (4 to 6).
+
+    `columns` (n_nodes, n_rows) are the derivatives of the shape functions, see `_tables`. Positions and displacements of the
+    nodes of cell `c` are filled into `x` (n_nodes, 8).
+    """
+    n_nodes = cells.shape[1]
+    for a in range(n_nodes):
         p = cells[c, a]
-        for i in range(values.shape[1]):
-            x[a, i] = values[p, i]
+        for i in range(points.shape[1]):
+            x[a, i], x[a, 4 + i] = points[p, i], displacement[p, i]
+    for row in range(0, columns.shape[1], 4):
+        tile(columns, 0, row, x, 0, 0, n_nodes, maps, row, True)
+        tile(columns, 0, row, x, 0, 4, n_nodes, maps, row, True)
 
 
 @kernel
-def _at_point(x, u, q, dim, lines, rows, J, inverse, gradient, F):
+def _at_point(maps, q, dim, rows, inverse, gradient, F):
     """Fill the rows from 3 q on of `gradient` (n_q * 3 + 1, width) and F (3, 3); return det J.
 
-    `x` and `u` (n_nodes, 4) are positions and displacements of the nodes. J (4, 4) and `inverse` (3, 4) are overwritten.
+    `maps` are from `_map`, and `rows` from `_tables`. `inverse` (3, 4) is overwritten.
     """
-    n_nodes = len(x)
-    first = q * n_nodes
-    tile(lines, first, 0, x, 0, 0, n_nodes, J, 0, True)
-    j00, j01, j02, j10, j11, j12 = J[0, 0], J[0, 1], J[0, 2], J[1, 0], J[1, 1], J[1, 2]
-    j20, j21, j22 = J[2, 0], J[2, 1], 1.0 if dim == 2 else J[2, 2]
+    k = 3 * q
+    j00, j01, j02, j10, j11, j12 = maps[k, 0], maps[k, 1], maps[k, 2], maps[k + 1, 0], maps[k + 1, 1], maps[k + 1, 2]
+    j20, j21, j22 = maps[k + 2, 0], maps[k + 2, 1], 1.0 if dim == 2 else maps[k + 2, 2]
     c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
     c10, c11, c12 = j02 * j21 - j01 * j22, j00 * j22 - j02 * j20, j01 * j20 - j00 * j21
     c20, c21, c22 = j01 * j12 - j02 * j11, j02 * j10 - j00 * j12, j00 * j11 - j01 * j10
@@ -72,10 +77,9 @@ def _at_point(x, u, q, dim, lines, rows, J, inverse, gradient, F):
     inverse[1, 0], inverse[1, 1], inverse[1, 2] = i10, i11, i12
     inverse[2, 0], inverse[2, 1], inverse[2, 2] = i20, i21, i22
     for a in range(0, gradient.shape[1], 4):
-        tile(inverse, 0, 0, rows, 3 * q, a, 3, gradient, 3 * q, True)
-    tile(lines, first, 0, u, 0, 0, n_nodes, J, 0, True)
+        tile(inverse, 0, 0, rows, k, a, 3, gradient, k, True)
     for i in range(3):
-        r, s, t = J[0, i], J[1, i], J[2, i]
+        r, s, t = maps[k, 4 + i], maps[k + 1, 4 + i], maps[k + 2, 4 + i]
         F[i, 0], F[i, 1], F[i, 2] = (
             r * i00 + s * i10 + t * i20,
             r * i01 + s * i11 + t * i21,
@@ -86,12 +90,12 @@ def _at_point(x, u, q, dim, lines, rows, J, inverse, gradient, F):
 
 
 @kernel
-def _about_axis(x, u, N, q, gradient, F):
+def _about_axis(x, N, q, gradient, F):
     """Fill the third row of `gradient` of point q with N / r, add the hoop strain to F, and return 2 pi r."""
     radius = hoop = 0.0
     for a in range(len(x)):
         radius += N[q, a] * x[a, 0]
-        hoop += N[q, a] * u[a, 0]
+        hoop += N[q, a] * x[a, 4]
     for a in range(len(x)):
         gradient[3 * q + 2, a] = N[q, a] / radius
     F[2, 2] += hoop / radius
@@ -137,24 +141,10 @@ def _dilatation(F, finite, G):
 
 
 @kernel
-def _add_volumetric(F, G, pressure, turning, bulk, tangent, P, A):
-    """Add the volumetric parts `pressure` dJ/dF to P and, if `tangent`, `bulk` dJ/dF dJ/dF + `turning` d2J/dF2 to A."""
-    for i in range(3):
-        for j in range(3):
-            P[i, j] += pressure * G[i, j]
-    for row in range(9 if tangent else 0):  # reshaping G would take longer than the loops
-        factor = bulk * G[row // 3, row % 3]
-        for column in range(9):
-            A[row, column] += factor * G[column // 3, column % 3]
-    if turning != 0.0:
-        add_second_derivative(F, turning, A)
-
-
-@kernel
-def _leave_out_initial_stress(G, J, P, turning, A):
+def _leave_out_initial_stress(G, J, P, pressure, turning, A):
     """Subtract the initial-stress term delta_ik S_JL from A.
 
-    S is the second Piola-Kirchhoff stress of P plus `turning` times G = dJ/dF. In compression, `turning` < 0, the effect of
+    S is the second Piola-Kirchhoff stress of P plus `turning` minus `pressure` times G = dJ/dF. In compression, `turning` < 0, the effect of
     the variation of the dilatation within a cell is subtracted as well.
     """
     for row in range(9):
@@ -164,7 +154,7 @@ def _leave_out_initial_stress(G, J, P, turning, A):
         for m in range(3):
             S = 0.0
             for k in range(3):
-                S += G[k, j] * (P[k, m] + turning * G[k, m])
+                S += G[k, j] * (P[k, m] + (turning - pressure) * G[k, m])
             for i in range(3):
                 A[3 * i + j, 3 * i + m] -= S / J
 
@@ -178,9 +168,9 @@ def _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G):
     F[2, 2] = (1.0 + old[8]) / thicker if finite else 2.0 + old[8] - thicker
     for _ in range(THROUGH):
         J = _dilatation(F, finite, G)
-        energy = respond(constants, D, F, J, G, True, old, new, P, A)
         pressure = bulk * (J - 1.0)
-        _add_volumetric(F, G, pressure, pressure if finite else 0.0, bulk, True, P, A)
+        volumetric = (pressure, bulk, pressure if finite else 0.0)
+        energy = respond(constants, D, F, J, G, volumetric, True, old, new, P, A)
         if not A[8, 8] > 0.0:
             return energy, False
         if abs(P[2, 2]) <= ENOUGH * A[8, 8]:
@@ -205,22 +195,22 @@ def _respond(
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
         if finite and geometric == 0:
-            _leave_out_initial_stress(G, determinant(F), P, 0.0, A)
+            _leave_out_initial_stress(G, determinant(F), P, 0.0, 0.0, A)
         return energy, settled
-    energy = respond(constants, D, F, J, G, everywhere, old, new, P, A) + 0.5 * bulk * (J - 1.0) ** 2
     pressure += bulk * (J - 1.0)
     turning = pressure if finite and geometric == 2 and everywhere else 0.0
     if finite and geometric == 0 and everywhere:
         turning = min(pressure, 0.0)
-        _leave_out_initial_stress(G, J, P, turning, A)
-    _add_volumetric(F, G, pressure, turning, bulk, everywhere or new[6] > old[6], P, A)
-    return energy, True
+    energy = respond(constants, D, F, J, G, (pressure, bulk, turning), everywhere, old, new, P, A)
+    if finite and geometric == 0 and everywhere:
+        _leave_out_initial_stress(G, J, P, pressure, turning, A)
+    return energy + 0.5 * bulk * (J - 1.0) ** 2, True
 
 
 @kernel
 def _subtract_elastic(constants, D, bulk, plane_stress, A):
-    """Subtract the elastic tangent at small strains from A (9, 9), without the part of the projected dilatation."""
-    none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9))
+    """Subtract the elastic tangent at small strains from A (18, 12), without the part of the projected dilatation."""
+    none, new, P, G, of_elasticity = np.zeros(9), np.empty(9), np.empty((3, 3)), np.empty((3, 3)), np.zeros((18, 12))
     F = np.eye(3)
     J = _dilatation(F, False, G)
     _respond(constants, D, bulk, 0.0, 1.0, plane_stress, False, 2, True, F, J, G, none, new, P, of_elasticity)
@@ -228,36 +218,51 @@ def _subtract_elastic(constants, D, bulk, plane_stress, A):
 
 
 @kernel
-def _add_forces(gradient, q, weight, P, dim, factors, out, row):
-    """Add the nodal forces of point q to the rows from `row` on of `out` (n_rows, width); `factors` (3, 4) is work space.
+def _weigh(P, first, weight, dim, out, row):
+    """Fill the rows from `row` on of `out` (n_rows, 4) with `weight` times the transpose of P, which begins at row `first`.
 
     The third row of shape derivatives is that along z or, about an axis, N / r, which belongs to the radial displacement.
     """
     for i in range(3):
-        factors[0, i], factors[1, i], factors[2, i] = weight * P[i, 0], weight * P[i, 1], weight * P[i, 2]
+        for j in range(3):
+            out[row + j, i] = weight * P[first + i, j]
     if dim == 2:
-        factors[2, 0], factors[0, 2], factors[1, 2], factors[2, 2] = weight * P[2, 2], 0.0, 0.0, 0.0
+        out[row + 2, 0], out[row, 2], out[row + 1, 2], out[row + 2, 1], out[row + 2, 2] = weight * P[first + 2, 2], 0.0, 0.0, 0.0, 0.0
+
+
+@kernel
+def _integrate(factors, gradient, out, row):
+    """Fill four rows of `out` (n_rows, width) with the nodal forces of all points; `factors` (3 n_q, 4) are from `_weigh`."""
     for a in range(0, gradient.shape[1], 4):
-        tile(factors, 0, 0, gradient, 3 * q, a, 3, out, row, False)
+        tile(factors, 0, 0, gradient, 0, a, len(factors), out, row, True)
+
+
+@kernel
+def _copy(source, first, out, row):
+    """Copy the matrix (3, 3) that begins at row `first` of `source` to that at `row` of `out`."""
+    for i in range(3):
+        for j in range(3):
+            out[row + i, j] = source[first + i, j]
 
 
 @kernel
 def _project(polynomials, volume, gradient, dim, J, G, factors, mass, projected, slopes):
     """Project the dilatation of a cell on polynomials.
 
-    J (n_q,) are one plus the dilatation, and G (n_q, 3, 3) its derivatives. `projected` (m, 1) is the dilatation, `slopes`
+    J (n_q,) are one plus the dilatation, and G (3 n_q, 3) its derivatives. `projected` (m, 1) is the dilatation, `slopes`
     (4 m, width) are its derivatives by displacements, four rows for each polynomial, computed if `slopes` is not empty.
     """
     m = len(mass)
-    mass[:], projected[:], slopes[:] = 0.0, 0.0, 0.0
-    for q in range(len(volume)):
-        for k in range(m):
+    mass[:], projected[:] = 0.0, 0.0
+    for k in range(m):
+        for q in range(len(volume)):
             share = volume[q] * polynomials[q, k]
             for n in range(k + 1):
                 mass[k, n] += share * polynomials[q, n]
             projected[k, 0] += share * (J[q] - 1.0)
-            if len(slopes):
-                _add_forces(gradient, q, share, G[q], dim, factors, slopes, 4 * k)
+            _weigh(G, 3 * q, share, dim, factors, 3 * q)
+        if len(slopes):
+            _integrate(factors, gradient, slopes, 4 * k)
     reduce(mass, projected)
     for k in range(m if len(slopes) else 0):
         for n in range(k):
@@ -286,29 +291,26 @@ def _pressures(bulk, polynomials, mass, projected, pressure):
 
 
 @kernel
-def _keep_tangent(gradient, q, weight, A, dim, n, factors, left, right):
+def _keep_tangent(gradient, q, weight, A, dim, n, left, right):
     """Fill the rows from n on of the factors of the stiffness, for `_stiffness`, with those of point q.
 
     `left` (3 n_q, width) are weighted shape derivatives. The stress change due to component k of a node is a column of A
     times its shape derivatives; its product with component i of the others is in `right` (n_pairs * (3 n_q + 1), width), for
-    the pairs i <= k. `factors` (3, 4 n_pairs) is work space.
+    the pairs i <= k. If dim is 2, rows and columns of A change places, since the third shape derivative belongs to the radial
+    displacement.
     """
     step, pair = len(left) + 1, 0
+    for e in range(9 if dim == 2 else 0):
+        A[2, e], A[5, e] = A[8, e], 0.0
+    for e in range(9 if dim == 2 else 0):
+        A[e, 2], A[e, 5] = A[e, 8], 0.0
     for row in range(3):
         for a in range(left.shape[1]):
             left[n + row, a] = weight * gradient[3 * q + row, a]
     for k in range(dim):
         for i in range(k + 1):
-            last, scale = (3 * i + 2, 1.0) if dim == 3 else (8, 1.0 if i == 0 else 0.0)
-            for row in range(3):
-                column, by = 3 * k + row, 1.0
-                if dim == 2 and row == 2:
-                    column, by = 8, 1.0 if k == 0 else 0.0
-                factors[0, 4 * pair + row] = by * A[3 * i, column]
-                factors[1, 4 * pair + row] = by * A[3 * i + 1, column]
-                factors[2, 4 * pair + row] = by * scale * A[last, column]
             for a in range(0, left.shape[1], 4):
-                tile(factors, 0, 4 * pair, gradient, 3 * q, a, 3, right, pair * step + n, True)
+                tile(A, 3 * i, 3 * k, gradient, 3 * q, a, 3, right, pair * step + n, True)
             pair += 1
 
 
@@ -333,18 +335,12 @@ def _stiffness(left, right, n, dim, bulk, slopes, local):
 
 
 @kernel
-def _cauchy(F, P, finite, out):
-    """Fill `out` with the Cauchy stress xx, yy, zz, xy and, in 3D, yz, xz."""
-    J = determinant(F) if finite else 1.0
-    for c in range(out.shape[0]):
-        i, j = (c, c) if c < 3 else ((0, 1) if c == 3 else ((1, 2) if c == 4 else (0, 2)))
-        if not finite:
-            out[c] = P[i, j]
-            continue
-        value = 0.0
-        for k in range(3):
-            value += P[i, k] * F[j, k]
-        out[c] = value / J
+def _cauchy(F, P, finite, c, q, out):
+    """Fill `out` at point q of cell `c` with the Cauchy stress xx, yy, zz, xy and, in 3D, yz, xz."""
+    factor = 1.0 / determinant(F) if finite else 1.0
+    for e in range(out.shape[2]):
+        i, j = (e, e) if e < 3 else ((0, 1) if e == 3 else ((1, 2) if e == 4 else (0, 2)))
+        out[c, q, e] = factor * (P[i, 0] * F[j, 0] + P[i, 1] * F[j, 1] + P[i, 2] * F[j, 2]) if finite else P[i, j]
 
 
 @kernel
@@ -392,58 +388,68 @@ def linearise(
     n_cells, n_nodes = cells.shape
     n_q, dim, m, tangent = N.shape[0], points.shape[1], polynomials.shape[1], len(data) > 0
     stiff, width, n_pairs = tangent and not elastic, -(-n_nodes // 4) * 4, dim * (dim + 1) // 2
-    lines, of_reference = np.empty((n_q * n_nodes, 4)), np.empty((3 * n_q, width))
-    _tables(dN, lines, of_reference)
-    x, u, J, inverse = np.zeros((n_nodes, 4)), np.zeros((n_nodes, 4)), np.empty((4, 4)), np.zeros((3, 4))
+    columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, width))
+    _tables(dN, columns, rows)
+    x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
     gradient, volume, forces = np.empty((3 * n_q + 1, width)), np.empty(n_q), np.empty((4, width))
-    F, G, ratio, thicker = np.empty((n_q, 3, 3)), np.empty((n_q, 3, 3)), np.empty(n_q), np.ones(n_q)
-    pressure = np.empty(n_q)
-    P, A, history, inside = np.empty((3, 3)), np.empty((9, 9)), np.empty(9), np.empty(n_nodes, np.bool_)
+    F, G, Fs, Gs = np.empty((3, 3)), np.empty((3, 3)), np.empty((3 * n_q, 3)), np.empty((3 * n_q, 3))
+    ratio, thicker, pressure = np.empty(n_q), np.ones(n_q), np.empty(n_q)
+    P, A, inside = np.empty((3, 3)), np.zeros((18, 12)), np.empty(n_nodes, np.bool_)
+    before, after, factors = np.zeros(9), np.empty(9), np.zeros((3 * n_q, 4))
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
-    factors, factors_of_pairs, local = np.zeros((3, 4)), np.zeros((3, 4 * n_pairs)), np.empty((n_pairs * width, width))
+    local = np.empty((n_pairs * width, width))
     mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
+    row, law, D = 0, constants[0], moduli[0]  # views within the loop would take as long as a law
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):
             continue
-        _gather(points, cells, c, x)
-        _gather(displacement, cells, c, u)
+        _map(points, displacement, cells, c, columns, x, maps)
         for q in range(n_q):
-            volume[q] = weights[q] * _at_point(x, u, q, dim, lines, of_reference, J, inverse, gradient, F[q])
+            volume[q] = weights[q] * _at_point(maps, q, dim, rows, inverse, gradient, F)
             if axisymmetric:
-                volume[q] *= _about_axis(x, u, N, q, gradient, F[q])
+                volume[q] *= _about_axis(x, N, q, gradient, F)
             if len(rise):
-                strain, rows = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
-                expansion_ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F[q], gradient[rows])
+                strain, three = expansion[material[c, q]], slice(3 * q, 3 * q + 3)
+                expansion_ratio, thicker[q] = _expanded(strain, N[q], cells[c], rise, finite, F, gradient[three])
                 volume[q] *= expansion_ratio
-            ratio[q] = _dilatation(F[q], finite, G[q])
+            ratio[q] = _dilatation(F, finite, G)
             if finite and not ratio[q] > 0.0:
                 return INVERTED, c
-        forces[:], pressure[:] = 0.0, 0.0
+            _copy(F, 0, Fs, 3 * q)
+            _copy(G, 0, Gs, 3 * q)
+        pressure[:] = 0.0
         stored, dissipated, mean, n_factors = 0.0, 0.0, bulk[material[c, 0], 0], 0
         if mean > 0.0:
-            _project(polynomials, volume, gradient, dim, ratio, G, factors, mass, projected, slopes)
+            _project(polynomials, volume, gradient, dim, ratio, Gs, factors, mass, projected, slopes)
             stored += _pressures(mean, polynomials, mass, projected, pressure)
         for q in range(n_q):
-            row = material[c, q]
+            if material[c, q] != row:
+                row = material[c, q]
+                law, D = constants[row], moduli[row]
+            for e in range(9 if len(new) else 0):
+                before[e] = old[c, q, e]
+            _copy(Fs, 3 * q, F, 0)
+            _copy(Gs, 3 * q, G, 0)
             density, settled = _respond(
-                constants[row], moduli[row], bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric,
-                stiff, F[q], ratio[q], G[q], old[c, q], history, P, A,
+                law, D, bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric, stiff, F, ratio[q], G, before,
+                after, P, A,
             )  # fmt: skip
             if not settled:
                 return NO_PLANE_STRESS, c
             stored += volume[q] * density
-            dissipated += volume[q] * history[7]
-            _add_forces(gradient, q, volume[q], P, dim, factors, forces, 0)
-            flows = history[6] > old[c, q, 6]
+            dissipated += volume[q] * after[7]
+            _weigh(P, 0, volume[q], dim, factors, 3 * q)
+            flows = after[6] > before[6]
             if tangent and elastic and flows:
-                _subtract_elastic(constants[row], moduli[row], bulk[row, 1], plane_stress, A)
+                _subtract_elastic(law, D, bulk[row, 1], plane_stress, A)
             if tangent and (flows or not elastic):
-                _keep_tangent(gradient, q, volume[q], A, dim, n_factors, factors_of_pairs, left, right)
+                _keep_tangent(gradient, q, volume[q], A, dim, n_factors, left, right)
                 n_factors += 3
             if inside[0]:
-                for e in range(9):
-                    new[c, q, e] = history[e]
-                _cauchy(F[q], P, finite, stress[c, q])
+                for e in range(9 if len(new) else 0):
+                    new[c, q, e] = after[e]
+                _cauchy(F, P, finite, c, q, stress)
+        _integrate(factors, gradient, forces, 0)
         if inside[0]:
             energy[c, 0], energy[c, 1] = stored, dissipated
         for b in range(n_nodes):
@@ -464,18 +470,17 @@ def strains(points, cells, N, dN, weights, axisymmetric, across, displacement, J
     extremes over the points of a cell.
     """
     n_nodes, dim, n_q, F = cells.shape[1], points.shape[1], len(N), np.empty((3, 3))
-    lines, of_reference = np.empty((n_q * n_nodes, 4)), np.empty((3 * n_q, -(-n_nodes // 4) * 4))
-    _tables(dN, lines, of_reference)
-    x, u, jacobian, inverse = np.zeros((n_nodes, 4)), np.zeros((n_nodes, 4)), np.empty((4, 4)), np.zeros((3, 4))
-    gradient, C = np.empty((3 * n_q + 1, of_reference.shape[1])), np.empty((3, 3))
+    columns, rows = np.empty((n_nodes, -(-3 * n_q // 4) * 4)), np.empty((3 * n_q, -(-n_nodes // 4) * 4))
+    _tables(dN, columns, rows)
+    x, maps, inverse = np.zeros((n_nodes, 8)), np.empty((columns.shape[1], 8)), np.zeros((3, 4))
+    gradient, C = np.empty((3 * n_q + 1, rows.shape[1])), np.empty((3, 3))
     for c in range(len(cells)):
-        _gather(points, cells, c, x)
-        _gather(displacement, cells, c, u)
+        _map(points, displacement, cells, c, columns, x, maps)
         least, most, before, after = np.inf, 0.0, 0.0, 0.0
         for q in range(n_q):
-            volume = weights[q] * _at_point(x, u, q, dim, lines, of_reference, jacobian, inverse, gradient, F)
+            volume = weights[q] * _at_point(maps, q, dim, rows, inverse, gradient, F)
             if axisymmetric:
-                volume *= _about_axis(x, u, N, q, gradient, F)
+                volume *= _about_axis(x, N, q, gradient, F)
             F[2, 2] += across[c, q]
             J[c, q] = determinant(F)
             before += volume

@@ -12,8 +12,11 @@ and in plane stress F_zz - 1. The element loop adds the volumetric part, U(J) = 
 import numpy as np
 
 from fastcontact._jit.decorators import kernel
+from fastcontact.elasticity.tile_product import tile
 
 LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
+# First rows of A that are work space of `_invariants`.
+LEFT, RIGHT = 12, 15
 # Relative excess of the trial stress over the yield stress that counts as round-off.
 YIELDING = 1e-12
 # Relative difference of squared stretches below which the tangent treats them as equal.
@@ -47,16 +50,32 @@ def cofactor(F, G):
 
 
 @kernel
-def add_second_derivative(F, factor, A):
+def _add_second_derivative(F, factor, A):
     """Add factor d2J/dF2 to A (9, 9)."""
+    for m in range(3):
+        i, k = (m + 1) % 3, (m + 2) % 3
+        for n in range(3):
+            j, p = (n + 1) % 3, (n + 2) % 3
+            change = factor * F[m, n]
+            A[3 * i + j, 3 * k + p] += change
+            A[3 * k + p, 3 * i + j] += change
+            A[3 * i + p, 3 * k + j] -= change
+            A[3 * k + j, 3 * i + p] -= change
+
+
+@kernel
+def _add_volumetric(F, G, volumetric, tangent, P, A):
+    """Add the `volumetric` part to P and, if `tangent`, to A; see `respond`."""
+    pressure, bulk, turning = volumetric
     for i in range(3):
-        for step in range(1, 3):
-            k = (i + step) % 3
-            for j in range(3):
-                for other in range(1, 3):
-                    p = (j + other) % 3
-                    sign = 1.0 if step == other else -1.0
-                    A[3 * i + j, 3 * k + p] += factor * sign * F[3 - i - k, 3 - j - p]
+        for j in range(3):
+            P[i, j] += pressure * G[i, j]
+    for row in range(9 if tangent else 0):  # reshaping G would take longer than the loops
+        factor = bulk * G[row // 3, row % 3]
+        for column in range(9):
+            A[row, column] += factor * G[column // 3, column % 3]
+    if turning != 0.0:
+        _add_second_derivative(F, turning, A)
 
 
 @kernel
@@ -309,11 +328,12 @@ def _saint_venant(D, F, everywhere, P, A):
 
 
 @kernel
-def _add_isochoric(value, first, power, scale, F, J, G, slope, bend, everywhere, P, A):
-    """Add to P and A the terms of an energy of the invariant `scale` times `value`, except for the value's curvature.
+def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everywhere, P, A):
+    """Add to P and A the terms of an energy of the invariant `scale` times `value`, except for second derivatives.
 
     `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
-    with respect to the invariant. Return `slope` times `scale`, the factor of the second derivative of the value.
+    with respect to the invariant. The terms of A are stored as factors, see `_invariants`. Returns the factors of the second
+    derivatives of the value and of J.
     """
     inverse, factor = power / J, slope * scale
     ratio, by_volume = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
@@ -322,45 +342,63 @@ def _add_isochoric(value, first, power, scale, F, J, G, slope, bend, everywhere,
         for j in range(3):
             change = first[i, j] - ratio * G[i, j]
             P[i, j] += factor * change
-            if not everywhere:
-                continue
-            along = curvature * change - shrinks * G[i, j]
-            across = by_volume * G[i, j] - shrinks * first[i, j] - curvature * ratio * change
-            for k in range(3):
-                for m in range(3):
-                    A[3 * i + j, 3 * k + m] += along * first[k, m] + across * G[k, m]
-    if everywhere:
-        add_second_derivative(F, -factor * ratio, A)
-    return factor
+            if everywhere:
+                e = 3 * i + j
+                A[RIGHT + number, e] = first[i, j]
+                A[LEFT + number, e] = curvature * change - shrinks * G[i, j]
+                A[LEFT, e] += by_volume * G[i, j] - shrinks * first[i, j] - curvature * ratio * change
+    return factor, -factor * ratio
 
 
 @kernel
-def _invariants(constants, F, J, G, everywhere, P, A):
-    """Apply a polynomial law of the isochoric invariants; return the energy density.
+def _invariants(constants, F, J, G, volumetric, everywhere, P, A):
+    """Apply a polynomial law of the isochoric invariants with its `volumetric` part; return the energy density of the former.
 
     The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3); see Rivlin and Saunders (1951) and Yeoh
-    (1993). `_add_isochoric` is called with half of each invariant; the derivative of I1 / 2 is F.
+    (1993). `_add_isochoric` is called with half of each invariant; the derivative of I1 / 2 is F. Except for second
+    derivatives, A is a sum of products of the rows of A from LEFT on and those from RIGHT on: G, F and the derivative of I2 / 2.
     """
     C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
-    P[:], I1 = 0.0, 0.0
-    if everywhere:
-        A[:] = 0.0
-    for row in range(9):
-        I1 += F[row // 3, row % 3] ** 2
+    pressure, bulk, turning = volumetric
+    I1 = 0.0
+    for i in range(3):
+        for j in range(3):
+            I1 += F[i, j] ** 2
+            P[i, j] = pressure * G[i, j]
+            if everywhere:
+                A[RIGHT, 3 * i + j], A[LEFT, 3 * i + j] = G[i, j], bulk * G[i, j]
     root = np.cbrt(J)
     scale = 1.0 / (root * root)
     x = scale * I1 - 3.0
     slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    factor = _add_isochoric(0.5 * I1, F, 2.0 / 3.0, scale, F, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
-    for row in range(9 if everywhere else 0):
-        A[row, row] += factor
     energy = C10 * x + C20 * x**2 + C30 * x**3
-    return energy if C01 == 0.0 else energy + _second_invariant(C01, I1, scale * scale, F, J, G, everywhere, P, A)
+    factor, turns = _add_isochoric(
+        0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A
+    )
+    if C01 == 0.0:
+        if everywhere:
+            _multiply(2, factor, A)
+            _add_second_derivative(F, turning + turns, A)
+        return energy
+    return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, turning + turns, everywhere, P, A)
 
 
 @kernel
-def _second_invariant(C01, I1, scale, F, J, G, everywhere, P, A):
-    """Add C01 (I2 - 3) to P and A, see `_invariants`; return its energy density."""
+def _multiply(n, factor, A):
+    """Fill A with the sum of the products of n rows from LEFT and RIGHT on, plus a `factor` on the diagonal."""
+    for row in range(0, 12, 4):
+        for column in range(0, 12, 4):
+            tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
+    for row in range(9):
+        A[row, row] += factor
+
+
+@kernel
+def _second_invariant(C01, I1, scale, F, J, G, factor, turning, everywhere, P, A):
+    """Add C01 (I2 - 3) to P, and fill A with all terms, see `_invariants`; return its energy density.
+
+    `factor` and `turning` are the factors of the second derivatives of I1 / 2 and, without I2, of J.
+    """
     C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
     right_cauchy_green(F, C)
     for i in range(3):
@@ -368,15 +406,17 @@ def _second_invariant(C01, I1, scale, F, J, G, everywhere, P, A):
             first[i, j] = I1 * F[i, j] - F[i, 0] * C[0, j] - F[i, 1] * C[1, j] - F[i, 2] * C[2, j]
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
-    factor = _add_isochoric(0.5 * I2, first, 4.0 / 3.0, scale, F, J, G, 2.0 * C01, 0.0, everywhere, P, A)
+    own, turns = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, everywhere, P, A)
+    if everywhere:
+        _multiply(3, factor + own * I1, A)
+        _add_second_derivative(F, turning + turns, A)
     for i in range(3 if everywhere else 0):
         for j in range(3):
-            A[3 * i + j, 3 * i + j] += factor * I1
             for k in range(3):
-                A[3 * i + j, 3 * i + k] -= factor * C[k, j]
-                A[3 * i + j, 3 * k + j] -= factor * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
+                A[3 * i + j, 3 * i + k] -= own * C[k, j]
+                A[3 * i + j, 3 * k + j] -= own * (F[i, 0] * F[k, 0] + F[i, 1] * F[k, 1] + F[i, 2] * F[k, 2])
                 for m in range(3):
-                    A[3 * i + j, 3 * k + m] += factor * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
+                    A[3 * i + j, 3 * k + m] += own * (2.0 * F[i, j] * F[k, m] - F[i, m] * F[k, j])
     return C01 * (scale * I2 - 3.0)
 
 
@@ -436,24 +476,28 @@ def _ogden(constants, F, everywhere, P, A):
 
 
 @kernel
-def respond(constants, D, F, J, G, everywhere, old, new, P, A):
+def respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
-    The volumetric part of the law, with the bulk modulus ``constants[2]``, is not included. D (6, 6) are the moduli of
-    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is filled only where
-    plastic flow occurs at small strains.
+    The energy does not include the volumetric part of the law. `volumetric` are the pressure, the bulk modulus and the factor
+    of d2J/dF2: P contains pressure dJ/dF, and A contains bulk dJ/dF dJ/dF and the last term. D (6, 6) are the moduli of
+    Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is filled only where plastic
+    flow occurs at small strains.
     """
     law = int(constants[0])
     for e in range(9):
         new[e] = old[e]
-    if law == LINEAR:
-        return _linear(D, F, everywhere, P, A)
-    if law == PLASTIC:
-        return _plastic(constants, F, everywhere, old, new, P, A)
-    if law == LOGARITHMIC:
-        return _logarithmic(constants, F, everywhere, old, new, P, A)
-    if law == SAINT_VENANT:
-        return _saint_venant(D, F, everywhere, P, A)
     if law == INVARIANTS:
-        return _invariants(constants, F, J, G, everywhere, P, A)
-    return _ogden(constants, F, everywhere, P, A)
+        return _invariants(constants, F, J, G, volumetric, everywhere, P, A)
+    if law == LINEAR:
+        energy = _linear(D, F, everywhere, P, A)
+    elif law == PLASTIC:
+        energy = _plastic(constants, F, everywhere, old, new, P, A)
+    elif law == LOGARITHMIC:
+        energy = _logarithmic(constants, F, everywhere, old, new, P, A)
+    elif law == SAINT_VENANT:
+        energy = _saint_venant(D, F, everywhere, P, A)
+    else:
+        energy = _ogden(constants, F, everywhere, P, A)
+    _add_volumetric(F, G, volumetric, everywhere or new[6] > old[6], P, A)
+    return energy

@@ -105,6 +105,11 @@ class NonlinearBodies:
         return any(isinstance(law, ElasticPlastic) for law in self._materials)
 
     @property
+    def _remembers(self) -> bool:
+        """Whether the history may change."""
+        return self.yields or self.kinematics == "plane_stress"
+
+    @property
     def beginning(self) -> History:
         """The history before the first load step."""
         return {name: np.zeros((*numbers.shape, HISTORY)) for name, numbers in self._cells.items()}
@@ -170,7 +175,8 @@ class NonlinearBodies:
             if (bulk[:, 1] > 0.0).any():  # the remainder is not a linear function
                 polynomials = polynomials[:, :1].copy() if elements.get(name).dilatation == 0 else polynomials
             owner, row_ranges = pattern.owners(mesh, name)
-            new, cauchy = np.empty_like(before[name]), np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
+            cauchy = np.empty((*before[name].shape[:2], 6 if dim == 3 else 4))
+            new = np.empty_like(before[name]) if self._remembers else before[name][:0]
             energies, numbers = np.zeros((len(cells), 2)), self._cells[name]
             slots, old = pattern.slots[name], before[name]
 
@@ -186,7 +192,7 @@ class NonlinearBodies:
             for status, cell in parallel.shared(part, range(len(row_ranges))):
                 if status:
                     raise ConvergenceError(self._failure(status, name, cell, displacement))
-            history[name], stress[name] = new, cauchy
+            history[name], stress[name] = new if self._remembers else before[name], cauchy
             energy += energies.sum(axis=0)
         size = mesh.n_points * dim
 

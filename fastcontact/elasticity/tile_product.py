@@ -61,6 +61,7 @@ def tile_written(
             start = builder.gep(array.data, [builder.add(builder.mul(line, width), column)])
             return builder.bitcast(start, four.as_pointer())
 
+        first, everywhere = ir.Constant(ir.IntType(32), 0), ir.Constant(ir.VectorType(ir.IntType(32), 4), [0] * 4)
         of_left, of_right, sums = args[1], args[4], []
         for k in range(4):
             pointer = place(7, builder.add(args[8], args[8].type(k)), args[5])
@@ -68,11 +69,12 @@ def tile_written(
             builder.store(builder.select(args[9], ir.Constant(four, [0.0] * 4), before), total)
             sums.append((pointer, total))
         with cgutils.for_range(builder, args[6]) as loop:
-            y = builder.load(place(0, builder.add(of_left, loop.index), args[2]), align=8)
+            y = builder.bitcast(place(0, builder.add(of_left, loop.index), args[2]), ir.DoubleType().as_pointer())
             x = builder.load(place(3, builder.add(of_right, loop.index), args[5]), align=8)
             for k, (_, total) in enumerate(sums):
-                everywhere = ir.Constant(ir.VectorType(ir.IntType(32), 4), [k] * 4)
-                factor = builder.shuffle_vector(y, ir.Constant(four, ir.Undefined), everywhere)
+                one = builder.load(builder.gep(y, [ir.Constant(ir.IntType(64), k)]), align=8)
+                lane = builder.insert_element(ir.Constant(four, ir.Undefined), one, first)
+                factor = builder.shuffle_vector(lane, ir.Constant(four, ir.Undefined), everywhere)
                 builder.store(builder.fadd(builder.load(total), builder.fmul(factor, x)), total)
         for pointer, total in sums:
             builder.store(builder.load(total), pointer, align=8)
