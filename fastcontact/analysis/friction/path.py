@@ -74,21 +74,27 @@ def along(
         beside[1:] -= slip
         return solve(beside, ~waiting, closed, y if y.any() else None)
 
+    def slid(since: Array, gaps: Array) -> Array:
+        """Return the slips (k, m) of slips `since` (k, m) and the closing motion of gaps (m,), which is removed."""
+        left = np.divide(np.maximum(gaps, 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
+        return np.asarray(slip + since - left * added)
+
     begin = 0.0
     while begin < 1.0:
         end, forces = 1.0, increment(1.0)
         iterations += forces.iterations
         if (waiting & (forces.gaps[0] < 0.0)).any():
-            part, touching = _touching(now, forces.gaps[0], waiting, _together(len(slip), int(closed.sum())))
+            instants, touching = _touching(now, forces.gaps[0], waiting, _together(len(slip), int(closed.sum())))
+            part = min(float(instants[touching].max()), 1.0)
             end = begin + part * (1.0 - begin)
+            slip = np.where(touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], 0.0 * gap), slip)
+            waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-            waiting = waiting & ~touching
         before = slip, work.copy(), y[0]
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
         whole = slip + forces.gaps[1:]
-        left = np.divide(np.maximum(forces.gaps[0], 0.0), gap, out=np.zeros_like(gap), where=gap > 0.0)
-        slip = whole - left * added
+        slip = slid(forces.gaps[1:], forces.gaps[0])
         begin, y, closed, now = end, forces.y, forces.closed, forces.gaps[0]
         settled &= forces.settled
     gaps = np.vstack([forces.gaps[:1], whole])
@@ -100,16 +106,16 @@ def _together(k: int, closed: int) -> int:
     return max(int(closed ** (1.0 - 1.0 / k)), int(GROWTH * closed), 1)
 
 
-def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[float, Mask]:
-    """Return the fraction of the remaining step at which the next `count` constraints close, and which (m,) these are.
+def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[Array, Mask]:
+    """Return the fractions (m,) of the remaining step at which constraints close, and the next `count` of them (m,).
 
     `now` and `end` are the gaps (m,) now and at the end of the step, if the `waiting` constraints (m,) carry no forces
-    [length]. The fraction is the mean of theirs.
+    [length]. Fractions of constraints that do not close are infinite.
     """
     closing = waiting & (end < 0.0)
     fraction = np.divide(np.maximum(now, 0.0), now - end, out=np.full_like(now, np.inf), where=closing & (now > end))
-    first = np.sort(fraction[closing])[:count]
-    return min(float(first.mean()), 1.0), closing & (fraction <= first[-1] * (1.0 + SINGLE_PRECISION))
+    last = np.sort(fraction[closing])[:count][-1]
+    return fraction, closing & (fraction <= last * (1.0 + SINGLE_PRECISION))
 
 
 def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) -> Array:
