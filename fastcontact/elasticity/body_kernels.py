@@ -11,11 +11,14 @@ import numpy as np
 
 from fastcontact._jit.decorators import kernel
 from fastcontact.elasticity.constitutive_kernels import (
+    INVARIANTS,
     cofactor,
     determinant,
     extreme_eigenvalues,
+    first_invariant,
     respond,
     right_cauchy_green,
+    sum_products,
     voigt,
 )
 from fastcontact.elasticity.dilatation_kernels import back_substitute, reduce
@@ -141,16 +144,16 @@ def _dilatation(F, finite, G):
 
 
 @kernel
-def _leave_out_initial_stress(G, J, P, pressure, turning, A):
-    """Subtract the initial-stress term delta_ik S_JL from A.
+def _leave_out_initial_stress(omitted, G, J, P, pressure, turning, A):
+    """If `omitted`, subtract the initial-stress term delta_ik S_JL from A.
 
-    S is the second Piola-Kirchhoff stress of P plus `turning` minus `pressure` times G = dJ/dF. In compression, `turning` < 0, the effect of
-    the variation of the dilatation within a cell is subtracted as well.
+    S is the second Piola-Kirchhoff stress of P plus G = dJ/dF times `turning` minus `pressure`. In compression, where `turning`
+    is negative, the effect of the variation of the dilatation within a cell is subtracted as well.
     """
-    for row in range(9):
+    for row in range(9 if omitted else 0):
         for column in range(9):
             A[row, column] -= turning / J * G[row // 3, row % 3] * G[column // 3, column % 3]
-    for j in range(3):
+    for j in range(3 if omitted else 0):
         for m in range(3):
             S = 0.0
             for k in range(3):
@@ -192,18 +195,15 @@ def _respond(
     `pressure` is that of the projected dilatation, `bulk` the modulus of the remainder, J and G (3, 3) are the dilatation
     and its derivative; see `linearise`, `_through` and, for `everywhere`, `respond`.
     """
+    omitted = finite and geometric == 0 and everywhere
     if plane_stress:
         energy, settled = _through(constants, D, bulk, finite, thicker, F, old, new, P, A, G)
-        if finite and geometric == 0:
-            _leave_out_initial_stress(G, determinant(F), P, 0.0, 0.0, A)
+        _leave_out_initial_stress(omitted, G, determinant(F), P, 0.0, 0.0, A)
         return energy, settled
     pressure += bulk * (J - 1.0)
-    turning = pressure if finite and geometric == 2 and everywhere else 0.0
-    if finite and geometric == 0 and everywhere:
-        turning = min(pressure, 0.0)
+    turning = pressure if finite and geometric == 2 and everywhere else min(pressure, 0.0) if omitted else 0.0
     energy = respond(constants, D, F, J, G, (pressure, bulk, turning), everywhere, old, new, P, A)
-    if finite and geometric == 0 and everywhere:
-        _leave_out_initial_stress(G, J, P, pressure, turning, A)
+    _leave_out_initial_stress(omitted, G, J, P, pressure, turning, A)
     return energy + 0.5 * bulk * (J - 1.0) ** 2, True
 
 
@@ -226,8 +226,7 @@ def _weigh(P, first, weight, dim, out, row):
     for i in range(3):
         for j in range(3):
             out[row + j, i] = weight * P[first + i, j]
-    if dim == 2:
-        out[row + 2, 0], out[row, 2], out[row + 1, 2], out[row + 2, 1], out[row + 2, 2] = weight * P[first + 2, 2], 0.0, 0.0, 0.0, 0.0
+    out[row + 2, 0] = weight * P[first + (2 if dim == 2 else 0), 2]
 
 
 @kernel
@@ -399,7 +398,9 @@ def linearise(
     left, right = np.empty((3 * n_q, width)), np.empty((n_pairs * (3 * n_q + 1), width))
     local = np.empty((n_pairs * width, width))
     mass, projected, slopes = np.empty((m, m)), np.empty((m, 1)), np.empty((4 * m if stiff else 0, width))
-    row, law, D = 0, constants[0], moduli[0]  # views within the loop would take as long as a law
+    # Arrays are counted (by atomic operations) where a view is made, and in functions with branches that call others. This
+    # would take as long as the law of the first invariant, which is therefore called here, without such functions.
+    row, law, D, direct = -1, constants[0], moduli[0], False
     for c in range(n_cells):
         if not owned(cells, c, owner, part, inside):
             continue
@@ -426,20 +427,29 @@ def linearise(
             if material[c, q] != row:
                 row = material[c, q]
                 law, D = constants[row], moduli[row]
+                direct = finite and geometric == 2 and not plane_stress and law[0] == INVARIANTS and law[4] == 0.0
             for e in range(9 if len(new) else 0):
                 before[e] = old[c, q, e]
             _copy(Fs, 3 * q, F, 0)
             _copy(Gs, 3 * q, G, 0)
-            density, settled = _respond(
-                law, D, bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric, stiff, F, ratio[q], G, before,
-                after, P, A,
-            )  # fmt: skip
-            if not settled:
-                return NO_PLANE_STRESS, c
+            if direct:
+                total = pressure[q] + bulk[row, 1] * (ratio[q] - 1.0)
+                density, factor, turning, _, _ = first_invariant(
+                    law, F, ratio[q], G, (total, bulk[row, 1], total), stiff, P, A
+                )
+                sum_products(2, factor, turning, stiff, F, A)
+                density += 0.5 * bulk[row, 1] * (ratio[q] - 1.0) ** 2
+            else:
+                density, settled = _respond(
+                    law, D, bulk[row, 1], pressure[q], thicker[q], plane_stress, finite, geometric, stiff, F, ratio[q], G,
+                    before, after, P, A,
+                )  # fmt: skip
+                if not settled:
+                    return NO_PLANE_STRESS, c
+                dissipated += volume[q] * after[7]
             stored += volume[q] * density
-            dissipated += volume[q] * after[7]
             _weigh(P, 0, volume[q], dim, factors, 3 * q)
-            flows = after[6] > before[6]
+            flows = not direct and after[6] > before[6]
             if tangent and elastic and flows:
                 _subtract_elastic(law, D, bulk[row, 1], plane_stress, A)
             if tangent and (flows or not elastic):
@@ -447,7 +457,7 @@ def linearise(
                 n_factors += 3
             if inside[0]:
                 for e in range(9 if len(new) else 0):
-                    new[c, q, e] = after[e]
+                    new[c, q, e] = before[e] if direct else after[e]
                 _cauchy(F, P, finite, c, q, stress)
         _integrate(factors, gradient, forces, 0)
         if inside[0]:

@@ -11,11 +11,11 @@ and in plane stress F_zz - 1. The element loop adds the volumetric part, U(J) = 
 
 import numpy as np
 
-from fastcontact._jit.decorators import kernel
+from fastcontact._jit.decorators import innermost_kernel, kernel
 from fastcontact.elasticity.tile_product import tile
 
 LINEAR, PLASTIC, SAINT_VENANT, INVARIANTS, OGDEN, LOGARITHMIC = range(6)
-# First rows of A that are work space of `_invariants`.
+# First rows of A that are work space of `first_invariant`.
 LEFT, RIGHT = 12, 15
 # Relative excess of the trial stress over the yield stress that counts as round-off.
 YIELDING = 1e-12
@@ -49,10 +49,10 @@ def cofactor(F, G):
             G[i, j] = F[k, p] * F[m, r] - F[k, r] * F[m, p]
 
 
-@kernel
+@innermost_kernel
 def _add_second_derivative(F, factor, A):
     """Add factor d2J/dF2 to A (9, 9)."""
-    for m in range(3):
+    for m in range(3 if factor != 0.0 else 0):
         i, k = (m + 1) % 3, (m + 2) % 3
         for n in range(3):
             j, p = (n + 1) % 3, (n + 2) % 3
@@ -74,8 +74,7 @@ def _add_volumetric(F, G, volumetric, tangent, P, A):
         factor = bulk * G[row // 3, row % 3]
         for column in range(9):
             A[row, column] += factor * G[column // 3, column % 3]
-    if turning != 0.0:
-        _add_second_derivative(F, turning, A)
+    _add_second_derivative(F, turning, A)
 
 
 @kernel
@@ -327,13 +326,13 @@ def _saint_venant(D, F, everywhere, P, A):
     return energy
 
 
-@kernel
+@innermost_kernel
 def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everywhere, P, A):
     """Add to P and A the terms of an energy of the invariant `scale` times `value`, except for second derivatives.
 
     `scale` is ``J**-power``, and `first` (3, 3) the derivative of the value; `slope` and `bend` are derivatives of the energy
-    with respect to the invariant. The terms of A are stored as factors, see `_invariants`. Returns the factors of the second
-    derivatives of the value and of J.
+    with respect to the invariant. The terms of A are stored as factors, see `first_invariant`. Returns the factors of the
+    second derivatives of the value and of J.
     """
     inverse, factor = power / J, slope * scale
     ratio, by_volume = inverse * value, factor * inverse * (inverse + 1.0 / J) * value
@@ -350,15 +349,16 @@ def _add_isochoric(value, first, number, power, scale, J, G, slope, bend, everyw
     return factor, -factor * ratio
 
 
-@kernel
-def _invariants(constants, F, J, G, volumetric, everywhere, P, A):
-    """Apply a polynomial law of the isochoric invariants with its `volumetric` part; return the energy density of the former.
+@innermost_kernel
+def first_invariant(constants, F, J, G, volumetric, everywhere, P, A):
+    """Fill P, and A as factors, by a polynomial law of the isochoric first invariant and `volumetric` terms, see `respond`.
 
-    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 + C01 (I2 - 3); see Rivlin and Saunders (1951) and Yeoh
-    (1993). `_add_isochoric` is called with half of each invariant; the derivative of I1 / 2 is F. Except for second
-    derivatives, A is a sum of products of the rows of A from LEFT on and those from RIGHT on: G, F and the derivative of I2 / 2.
+    The energy is C10 (I1 - 3) + C20 (I1 - 3)^2 + C30 (I1 - 3)^3 (Yeoh, 1993). Except for second derivatives, A is a sum of
+    products of the rows of A from LEFT on and those from RIGHT on, which are G, F and, if there is another invariant, the
+    derivative of half of it. Returns the energy density, the factors of the second derivatives of I1 / 2 (the identity) and
+    J, I1 and ``J**(-2/3)``.
     """
-    C10, C01, C20, C30 = constants[3], constants[4], constants[5], constants[6]
+    C10, C20, C30 = constants[3], constants[5], constants[6]
     pressure, bulk, turning = volumetric
     I1 = 0.0
     for i in range(3):
@@ -371,33 +371,40 @@ def _invariants(constants, F, J, G, volumetric, everywhere, P, A):
     scale = 1.0 / (root * root)
     x = scale * I1 - 3.0
     slope, bend = C10 + 2.0 * C20 * x + 3.0 * C30 * x * x, 2.0 * C20 + 6.0 * C30 * x
-    energy = C10 * x + C20 * x**2 + C30 * x**3
-    factor, turns = _add_isochoric(
-        0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A
-    )
-    if C01 == 0.0:
-        if everywhere:
-            _multiply(2, factor, A)
-            _add_second_derivative(F, turning + turns, A)
-        return energy
-    return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, turning + turns, everywhere, P, A)
+    factor, turns = _add_isochoric(0.5 * I1, F, 1, 2.0 / 3.0, scale, J, G, 2.0 * slope, 4.0 * bend, everywhere, P, A)
+    return C10 * x + C20 * x**2 + C30 * x**3, factor, turning + turns, I1, scale
+
+
+@innermost_kernel
+def sum_products(n, factor, turning, everywhere, F, A):
+    """If `everywhere`, fill A with the products of n rows from LEFT and RIGHT on and the terms of second derivatives.
+
+    See `first_invariant` for their factors.
+    """
+    for row in range(0, 12 if everywhere else 0, 4):
+        for column in range(0, 12, 4):
+            tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
+    for row in range(9 if everywhere else 0):
+        A[row, row] += factor
+    _add_second_derivative(F, turning if everywhere else 0.0, A)
 
 
 @kernel
-def _multiply(n, factor, A):
-    """Fill A with the sum of the products of n rows from LEFT and RIGHT on, plus a `factor` on the diagonal."""
-    for row in range(0, 12, 4):
-        for column in range(0, 12, 4):
-            tile(A, LEFT, row, A, RIGHT, column, n, A, row, True)
-    for row in range(9):
-        A[row, row] += factor
+def _invariants(constants, F, J, G, volumetric, everywhere, P, A):
+    """Apply a polynomial law of the isochoric invariants (Rivlin and Saunders, 1951); see `first_invariant`, `respond`."""
+    C01 = constants[4]
+    energy, factor, turning, I1, scale = first_invariant(constants, F, J, G, volumetric, everywhere, P, A)
+    if C01 != 0.0:
+        return energy + _second_invariant(C01, I1, scale * scale, F, J, G, factor, turning, everywhere, P, A)
+    sum_products(2, factor, turning, everywhere, F, A)
+    return energy
 
 
 @kernel
 def _second_invariant(C01, I1, scale, F, J, G, factor, turning, everywhere, P, A):
-    """Add C01 (I2 - 3) to P, and fill A with all terms, see `_invariants`; return its energy density.
+    """Add C01 (I2 - 3) to P, and fill A with all terms; return its energy density.
 
-    `factor` and `turning` are the factors of the second derivatives of I1 / 2 and, without I2, of J.
+    `factor` and `turning` are those of `first_invariant`.
     """
     C, first, square = np.empty((3, 3)), np.empty((3, 3)), 0.0
     right_cauchy_green(F, C)
@@ -407,9 +414,7 @@ def _second_invariant(C01, I1, scale, F, J, G, factor, turning, everywhere, P, A
             square += C[i, j] ** 2
     I2 = 0.5 * (I1 * I1 - square)
     own, turns = _add_isochoric(0.5 * I2, first, 2, 4.0 / 3.0, scale, J, G, 2.0 * C01, 0.0, everywhere, P, A)
-    if everywhere:
-        _multiply(3, factor + own * I1, A)
-        _add_second_derivative(F, turning + turns, A)
+    sum_products(3, factor + own * I1, turning + turns, everywhere, F, A)
     for i in range(3 if everywhere else 0):
         for j in range(3):
             for k in range(3):
@@ -476,6 +481,21 @@ def _ogden(constants, F, everywhere, P, A):
 
 
 @kernel
+def _other(constants, D, F, everywhere, old, new, P, A):
+    """Apply any law but `_invariants`; return the elastic energy density without the volumetric part."""
+    law = int(constants[0])
+    if law == LINEAR:
+        return _linear(D, F, everywhere, P, A)
+    if law == PLASTIC:
+        return _plastic(constants, F, everywhere, old, new, P, A)
+    if law == LOGARITHMIC:
+        return _logarithmic(constants, F, everywhere, old, new, P, A)
+    if law == SAINT_VENANT:
+        return _saint_venant(D, F, everywhere, P, A)
+    return _ogden(constants, F, everywhere, P, A)
+
+
+@kernel
 def respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A):
     """Fill `new`, P and A by the law of `constants` and return the elastic energy [energy / volume].
 
@@ -484,20 +504,10 @@ def respond(constants, D, F, J, G, volumetric, everywhere, old, new, P, A):
     Hooke's laws, J and G (3, 3) the determinant of F and its derivative. Unless `everywhere`, A is filled only where plastic
     flow occurs at small strains.
     """
-    law = int(constants[0])
     for e in range(9):
         new[e] = old[e]
-    if law == INVARIANTS:
+    if int(constants[0]) == INVARIANTS:
         return _invariants(constants, F, J, G, volumetric, everywhere, P, A)
-    if law == LINEAR:
-        energy = _linear(D, F, everywhere, P, A)
-    elif law == PLASTIC:
-        energy = _plastic(constants, F, everywhere, old, new, P, A)
-    elif law == LOGARITHMIC:
-        energy = _logarithmic(constants, F, everywhere, old, new, P, A)
-    elif law == SAINT_VENANT:
-        energy = _saint_venant(D, F, everywhere, P, A)
-    else:
-        energy = _ogden(constants, F, everywhere, P, A)
+    energy = _other(constants, D, F, everywhere, old, new, P, A)
     _add_volumetric(F, G, volumetric, everywhere or new[6] > old[6], P, A)
     return energy
