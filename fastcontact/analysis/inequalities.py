@@ -22,7 +22,7 @@ from fastcontact.analysis.floating_bodies import FloatingBodies, Freed, RigidPos
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid, Solution
 from fastcontact.analysis.state import State
-from fastcontact.arrays import Array, Mask
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
@@ -30,6 +30,10 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.model.model import gaps_at_rest
 from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
+
+# Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
+# fluid a node may be neither dry, because its mean pressure is below that of the fluid, nor wet, because its gap would close.
+DISPLACED = 3
 
 
 @dataclass(eq=False)
@@ -52,6 +56,8 @@ class Iterate:
         Convergence data of each pairing, see `StepResult.iterations`.
     rounded : bool
         Whether edges between facets are rounded, because nodes alternated between facets.
+    fluid : dict of str to (ndarray of bool (n_nodes,), ndarray of int (n_nodes,))
+        For each contact pair with fluid pressure, the nodes that fluid reaches, and how many times contact displaced it.
     """
 
     u: Array
@@ -61,11 +67,24 @@ class Iterate:
     rigid: RigidPosition | None = None
     history: list[dict[str, Any]] = field(default_factory=list)
     rounded: bool = False
+    fluid: dict[str, tuple[Mask, AnyArray]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, state: State) -> Iterate:
         """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
+
+    def permeable(self, name: str) -> Array | None:
+        """Return the last nodal pressures of a contact pair, infinite where the fluid has been displaced too often."""
+        pressure, fluid = self.pressure.get(name), self.fluid.get(name)
+        return pressure if pressure is None or fluid is None else np.where(fluid[1] < DISPLACED, pressure, np.inf)
+
+    def remember_fluid(self, name: str, constraints: Constraints) -> None:
+        """Store which nodes of a contact pair the fluid has reached, and how many times contact has displaced it there."""
+        if constraints.wetted is not None:
+            wet = constraints.wetted.pressure > 0.0
+            before, displaced = self.fluid.get(name, (wet, np.zeros(len(wet), int)))
+            self.fluid[name] = wet, displaced + (before & ~wet)
 
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
         """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
@@ -84,8 +103,9 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
     parts = {}
     for name, pair in problem.pairs.items():
         at = problem.configuration(name, state, load, paired_at, u)
-        at = replace(at, pressure=iterate.pressure.get(name), rounded=iterate.rounded)
+        at = replace(at, pressure=iterate.permeable(name), rounded=iterate.rounded)
         parts[name] = pair.constraints(at)
+        iterate.remember_fluid(name, parts[name])
         if problem.force_driven.pairs:
             rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
             moved = at.obstacle_motion if rotates else None

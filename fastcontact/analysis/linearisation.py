@@ -25,7 +25,7 @@ from fastcontact.round_off import SINGLE_PRECISION
 
 def linearised(
     problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool,
-    friction: bool,
+    replaces: bool,
 ) -> Problem:  # fmt: skip
     """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
 
@@ -42,14 +42,14 @@ def linearised(
         Stiffness due to contact, which is added to K [force / length].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
-    friction : bool
-        Whether `contact` includes springs along slips. If it holds the floating bodies, they have no springs of their own:
-        with friction the iteration of their positions may not converge for a tangent that is nearly singular.
+    replaces : bool
+        Whether floating bodies have no springs of their own if `contact` resists all their motions. The iteration of their
+        positions may not converge for a tangent that is nearly singular.
     """
     K = problem.force_driven.stiffness(K)
     system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
     floating = _floating(problem, system, u, rigid, stiff)
-    if friction and floating is not None and contact is not None and _holds(contact, floating):
+    if replaces and floating is not None and contact is not None and _holds(contact, floating):
         floating = None
     solver = problem.solver.near()
     involved = system.involved(problem.contact_dofs)

@@ -117,11 +117,14 @@ class Regularisation:
         Stiffness of springs along closed gaps, over the largest stiffness of the bodies [-].
     stiff : bool
         Whether the springs of floating bodies are as stiff as the bodies.
+    replaces : bool
+        Whether the springs along closed gaps replace those of floating bodies, if they resist all motions of these bodies.
     """
 
     geometric: int = WHOLE
     held: float = 0.0
     stiff: bool = False
+    replaces: bool = False
 
     @property
     def linear(self) -> bool:
@@ -254,8 +257,6 @@ class _Newton:
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         failed: Exception | None = None
         for by in self._regularisations():
-            if self._by.held and by.geometric == WHOLE and not by.held:
-                continue  # it failed in the last iteration
             try:
                 solution = self._linearised_contact(u, changes, by)
             except (ModelError, ConvergenceError) as error:
@@ -274,12 +275,17 @@ class _Newton:
 
     def _regularisations(self) -> list[Regularisation]:
         """Return the regularisations to try, in order."""
-        floats = self._problem.floating_bodies is not None
-        closed = self._settled is not None and self._settled.solution.active.any()
+        floats, settled = self._problem.floating_bodies is not None, self._settled
+        closed = settled is not None and settled.solution.active.any()
         whole = [
             Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
         ]
-        held = [Regularisation(held=stiffness, stiff=floats) for stiffness in HELD] if closed else []
+        # Forces on an obstacle do not balance if it moves and these springs do not follow it.
+        replaces = closed and (settled.constraints.tangents != () or bool(self._problem.force_driven.pairs))
+        held = [Regularisation(held=k, stiff=floats, replaces=replaces) for k in HELD] if closed else []
+        if self._by in held:
+            held.remove(self._by)
+            whole, held = [], [self._by, *held]  # the whole tangent failed in an earlier iteration
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
     def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:
@@ -291,8 +297,7 @@ class _Newton:
         else:
             K = terms.tangent(u, by.geometric)
             contact = self._stiffness_of_contact(K, u, by) if by.geometric == WHOLE else None
-            friction = by.held > 0.0 and self._settled is not None and self._settled.constraints.tangents != ()
-            problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, friction)
+            problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, by.replaces)
             if by.geometric == WHOLE:
                 self._kept = problem
         load = load_about(problem, terms, u, self._load, iterate.rigid)
