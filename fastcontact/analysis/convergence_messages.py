@@ -17,7 +17,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
-from fastcontact.model.rigid_motions import least_held
+from fastcontact.model.rigid_motions import grouped, least_held
 
 Nodes = dict[str, list[int]]
 # Fraction of the friction of all pairs that floating bodies use when they are about to slide.
@@ -64,22 +64,22 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     )
 
 
-def no_contact_stops(bodies: FloatingBodies, work: Array) -> str:
-    """Return the message for loads that separate bodies; `work` (k,) is their resultant on each free motion [force]."""
-    return (
-        f"the loads pull bodies away, and no contact stops them ({'; '.join(bodies.names)}; resultant up to "
-        f"{np.abs(work).max():.3g}): reverse the loads or add supports"
+def no_contact_stops(bodies: FloatingBodies) -> str:
+    """Return the message for loads that separate bodies."""
+    return f"the loads pull bodies away, and no contact stops them ({grouped(bodies.names)}): reverse the loads or add supports"
+
+
+def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:
+    """Return the message for loads beyond the friction cone, which would hold with `factor` times the `coefficients`."""
+    given = np.unique(coefficients[coefficients > 0.0])
+    needed = (
+        f"a coefficient of about {factor * given[0]:.2g} where the largest is {given[0]:.3g}"
+        if np.isclose(given[0], given[-1])
+        else f"about {factor:.3g} times the coefficients given, which are from {given[0]:.3g} to {given[-1]:.3g}"
     )
-
-
-def friction_exceeded(bodies: FloatingBodies, work: Array, friction: tuple[float, float]) -> str:
-    """Return the message for loads beyond the friction cone; `friction` are the coefficients required and given."""
-    needed, largest = friction
     return (
-        f"friction cannot hold {', '.join(bodies.motions.by_body())} against loads of up to {np.abs(work).max():.3g}: that "
-        f"would take a coefficient of about {needed:.2g} where the largest is {largest:.3g}, so that "
-        f"{1.0 - largest / needed:.0%} of the loads along the contact have no reaction. Lower these, press harder, or "
-        "support the bodies along the contact"
+        f"friction cannot hold {', '.join(bodies.motions.by_body())} against the loads: that would take {needed}. Lower the "
+        "loads along the contact, press harder, or support the bodies along the contact"
     )
 
 
@@ -97,7 +97,7 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
             )
     more = "Add a support or more friction, for which the loads may be too large," if friction else "Add a support,"
     return (
-        f"contact does not hold {'; '.join(bodies.moving(rigid))}: after {rigid.positions} positions "
+        f"contact does not hold {grouped(bodies.moving(rigid))}: after {rigid.positions} positions "
         f"tried, a force of {np.abs(rigid.spring_force).max():.3g} is still missing for equilibrium under a load of "
         f"{load:.3g}. {more} or use more load steps"
     )

@@ -288,9 +288,10 @@ def _with_floating_bodies(
         solve_at, freed, dofs.numbers(bodies.dofs), start, state.largest_rigid_force, noise, state.gap_round_off
     )
     if rigid.state.settled and not rigid.slack:
-        rubbing = bool(constraints.coefficients.any())
+        more = _missing_friction(step, bodies, constraints, iterate.u)
         gaps = gaps_at_rest(problem.model, bodies.motions)
-        text = not_balanced(bodies, rigid, state.largest_rigid_force, rubbing, gaps)
+        text = not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.coefficients.any()), gaps)
+        text = text if more is None else friction_exceeded(bodies, more, constraints.coefficients)
         raise ConvergenceError(text, iterate.history)
     iterate.rigid = rigid
     solution = rigid.state
@@ -321,12 +322,22 @@ def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraint
     ConvergenceError
         If no contact stops the bodies.
     """
-    work = generalised(bodies.motions, step.load.force, step.state.largest_rigid_force)
+    work, size = _loads(step, bodies)
     rows, gap0 = resisting(constraints)
-    size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
     stop = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
     if stop is None:
-        more = needed_friction(constraints, bodies.motions.displacement, u, work, size)
-        text = no_contact_stops(bodies, work) if more is None else friction_exceeded(bodies, work, more)
+        more = _missing_friction(step, bodies, constraints, u)
+        text = no_contact_stops(bodies) if more is None else friction_exceeded(bodies, more, constraints.coefficients)
         raise ConvergenceError(text, smaller_steps_help=False)
     return stop
+
+
+def _missing_friction(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> float | None:
+    """Return the factor on the coefficients of friction that holds the bodies, None if they suffice or none does [-]."""
+    return needed_friction(constraints, bodies.motions.displacement, u, *_loads(step, bodies))
+
+
+def _loads(step: StepContext, bodies: FloatingBodies) -> tuple[Array, float]:
+    """Return the work of the loads on each free rigid-body motion (k,) [force], and the size of the model [length]."""
+    work = generalised(bodies.motions, step.load.force, step.state.largest_rigid_force)
+    return work, float(np.ptp(step.problem.model.mesh.points, axis=0).max())

@@ -12,6 +12,7 @@ from fastcontact.analysis.contact_resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
+from fastcontact.model.rigid_motions import grouped
 from fastcontact.results.step import CANCELLED, ContactResult, StepResult
 from fastcontact.results.units import units_of_results, valued, with_unit
 
@@ -298,7 +299,7 @@ def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) 
 
 def _regularised_line(report: Mapping[str, Any], unit: Mapping[str, str]) -> str:
     return (
-        f"  held by contact alone: {'; '.join(report['motions'])}. Regularised by springs of "
+        f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
         f"{valued(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} of the "
         "load at the end"
     )

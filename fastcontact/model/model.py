@@ -29,7 +29,7 @@ from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
 from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
-from fastcontact.model.rigid_motions import FreeMotions, free_motions, generalised, resisting, unstopped
+from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, resisting, unstopped
 
 # Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
 # Types of items that may act in some load steps only.
@@ -217,14 +217,19 @@ class Model(ModelSupports):
             return
         works = [generalised(motions, force.ravel()) for force in forces]
         driven_by = np.vstack([*works, np.empty((0, len(motions)))])
-        check_motions(self.mesh, motions.combined(unstopped(gaps_at_rest(self, motions), driven_by)))
+        # Whether friction suffices depends on the load step, which names the coefficient required.
+        gaps = gaps_at_rest(self, motions, MOST_FRICTION)
+        check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))
 
 
-def gaps_at_rest(model: Model, motions: FreeMotions) -> Array:
-    """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions."""
+def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
+    """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions.
+
+    `factor` multiplies all coefficients of friction.
+    """
     driven, at_rest, still = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
     fixing = [driven.constraints(pair.name, model.bind(pair).constraints(at_rest), still) for pair in model.contact]
-    rows = [resisting(constraints)[0] @ motions.displacement for constraints in fixing]
+    rows = [resisting(constraints, factor)[0] @ motions.displacement for constraints in fixing]
     return np.vstack([*rows, np.empty((0, len(motions)))])
 
 

@@ -6,6 +6,7 @@ loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and S
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -105,6 +106,14 @@ class FreeMotions:
         along = turn / turn[np.argmax(np.abs(turn))]
         line = f" along {_listed(np.where(np.abs(along) > 1e-6, along, 0.0))}"
         return f"rotation about {place}" if len(centre) == 2 else f"rotation about the line through {place}{line}"
+
+
+def grouped(names: Iterable[str]) -> str:
+    """Return the names of motions, as `FreeMotions.names` returns them, in one text that names each body once."""
+    by_body: dict[str, list[str]] = {}
+    for body, _, motion in (name.rpartition(": ") for name in names):
+        by_body.setdefault(body, []).append(motion)
+    return "; ".join(f"{body}: {', '.join(motions)}" for body, motions in by_body.items())
 
 
 def _reduced(A: Array) -> Array:
@@ -246,13 +255,14 @@ def _null_space(A: Array) -> Array:
     return np.asarray(right[values < ZERO * max(values.max(initial=0.0), 1.0)].T)
 
 
-def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
+def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
     """Return rows and gaps at u = 0 that must stay >= 0 without slip: gaps, and edges of the friction cone.
 
     A contact force lies in the cone of the rows: normal, with friction in the plane ``n + mu t`` and ``n - mu t``, in 3D
-    the pyramid with EDGES circumscribed to Coulomb's cone. Equations act in both directions.
+    the pyramid with EDGES circumscribed to Coulomb's cone. Equations act in both directions. `factor` multiplies the
+    coefficients of friction.
     """
-    rows, gap0 = _edges(constraints)
+    rows, gap0 = _edges(constraints, factor)
     if constraints.equality is None:
         return rows, gap0
     backwards = np.flatnonzero(np.tile(constraints.equality, len(gap0) // len(constraints.equality)))
@@ -260,7 +270,7 @@ def resisting(constraints: Constraints) -> tuple[csr_array, Array]:
     return both, np.concatenate([gap0, -gap0[backwards]])
 
 
-def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
+def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
     """Return the rows and gaps of contact that may open."""
     if not constraints.tangents or constraints.friction is None:
         return constraints.B, constraints.gap0
@@ -269,7 +279,7 @@ def _edges(constraints: Constraints) -> tuple[csr_array, Array]:
     else:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
         around = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
-    shear = [T.multiply(constraints.friction[:, None]) for T in constraints.tangents]
+    shear = [T.multiply(factor * constraints.friction[:, None]) for T in constraints.tangents]
     edges = [constraints.B + sum(weight * T for T, weight in zip(shear, parts)) for parts in around]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
@@ -330,29 +340,29 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
     return None if np.abs(stop).max() > 0.99 * FAR else stop * size
 
 
-def needed_friction(
-    constraints: Constraints, motions: Array, u: Array, work: Array, size: float
-) -> tuple[float, float] | None:
-    """Return the coefficient of friction that would stop rigid bodies, and the largest given one [-]; None if none would.
+def needed_friction(constraints: Constraints, motions: Array, u: Array, work: Array, size: float) -> float | None:
+    """Return the factor on the coefficients of friction that would stop rigid bodies [-].
+
+    None if the coefficients stop them in every direction of the pyramid inside Coulomb's cone, or if none would.
 
     `motions` (n_dofs, k) are the rigid-body motions, `u` (n_dofs,) displacements [length]; `work` and `size` are as in
     `stopped_at`.
     """
     if not constraints.coefficients.any():
         return None
-    low, high = 1.0, MOST_FRICTION
+    inside = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
+    low, high = inside, MOST_FRICTION
 
     def stops(factor: float) -> bool:
-        rows, gap0 = resisting(replace(constraints, friction=factor * constraints.coefficients))
+        rows, gap0 = resisting(constraints, factor)
         return stopped_at(rows @ motions, gap0 + rows @ u, work, size) is not None
 
-    if not stops(high):
+    if stops(low) or not stops(high):
         return None
     while high > 1.001 * low:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if stops(middle) else (middle, high)
-    largest = float(constraints.coefficients.max())
-    return high * largest * (1.0 if len(constraints.tangents) == 1 else 1.0 / np.cos(np.pi / EDGES)), largest
+    return high / inside
 
 
 def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
