@@ -97,6 +97,11 @@ def warn(text: str) -> None:
 
 # Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
+# Words of this package for words of its methods and of other programs.
+OTHER_WORDS = {
+    "slave": "secondary", "master": "primary", "mu": "friction", "h": "coefficient", "plane": "half_space",
+    "fix": "support", "prescribe": "support", "relate": "relation", "relate_groups": "group_relation",
+}  # fmt: skip
 
 
 def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:
@@ -132,7 +137,9 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold())
+    near = [candidate for candidate in names if candidate.rpartition(".")[2] == meant]
+    near = near or difflib.get_close_matches(name, names, n=3, cutoff=0.5)
     if not near:
         folded = {candidate.casefold(): candidate for candidate in names}
         near = [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]

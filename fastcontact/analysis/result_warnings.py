@@ -26,7 +26,7 @@ from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.round_off import LENGTH_ROUND_OFF
+from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 # Equivalent strain, and wear depth over the size of the model, beyond which linear kinematics give a warning.
 STRAIN = 0.1
@@ -71,7 +71,7 @@ def result_warnings(problem: Problem, state: State, last: StepResult) -> list[st
         lost = [] if name in clearances else _lost(pair, contact, name in state.touched, loaded)
         at = problem.configuration(name, state, load, problem.displacement(state.u), state.u)
         warnings += [*_deep(pair, contact, state.u), *lost, *_held(pair, contact, pair.undetermined(at))]
-        warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact)
+        warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact, state)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
     return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
 
@@ -309,9 +309,12 @@ def _lost(pair: Formulation, contact: ContactResult, touched: bool, loaded: bool
         yield f"contact '{name}' has opened again at the end: {gap}"
 
 
-def _unresolved(name: str, pair: Formulation, contact: ContactResult) -> Iterator[str]:
-    """Yield a warning where too few elements lie across the radius of a contact."""
-    if pair.options.always_closed or not contact.active.any():
+def _unresolved(name: str, pair: Formulation, contact: ContactResult, state: State) -> Iterator[str]:
+    """Yield a warning where too few elements lie across the radius of a contact that carries a force."""
+    if (
+        pair.options.always_closed
+        or np.abs(contact.force_vectors).max(initial=0.0) <= SINGLE_PRECISION * state.largest_force
+    ):
         return
     count = across(pair.secondary, contact.active, pair.options.excluded_nodes(pair.secondary))
     if count is not None and count < ACROSS:

@@ -205,7 +205,7 @@ def _unreadable(path: Path, error: Exception) -> str:
         return f"it does not exist{ready}"
     if isinstance(error, OSError):
         return error.strerror or type(error).__name__
-    return "it is not UTF-8 text; name a TOML file"
+    return "it is not UTF-8 text; name a TOML file, whose table [mesh] may name a mesh file"
 
 
 def build_case(
@@ -331,9 +331,10 @@ def _ramp(data: dict[str, Any]) -> Ramp:
 
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:
-    check_keys("probes", data, dict.fromkeys(data, str))
     points_of_probes = {}
     for name, group in data.items():
+        if not isinstance(group, str):
+            raise CaseError(f"'probes.{name}' must be the name of a group of one point, not {group!r}")
         with at(f"probes.{name}"):
             points_of_probes[name] = mesh.point(group)
     return points_of_probes

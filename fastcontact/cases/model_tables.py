@@ -18,7 +18,7 @@ from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material, check_conductivity, check_expansion
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
-from fastcontact.errors import CaseError, check_known, unknown
+from fastcontact.errors import OTHER_WORDS, CaseError, check_known, unknown
 from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
@@ -234,7 +234,8 @@ def _add_contacts(model: Model, data: dict[str, Any]) -> None:
             raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
         for key in ("secondary", "primary"):
             if not isinstance(entry.get(key), str):
-                raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets")
+                renamed = "".join(f"; rename '{other}' to it" for other in entry if OTHER_WORDS.get(other) == key)
+                raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{renamed}")
         with at(f"contact.{name}"):
             model.add_contact(name, **entry)
     if named == "auto" or "contacts" in data:

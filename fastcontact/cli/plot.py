@@ -32,7 +32,10 @@ ARGUMENTS: Arguments = {
     "--phases N": (int, "with --animate: one period of vibration with the shape of --step, in N pictures"),
     "--zoom LENGTH": (float, "half width of the part around the largest value to draw"),
     "--mirrored": "draw the mirror image about the axis as well",
-    "--scale SCALE": (float, "factor on the displacements (default 1; a tenth of the size of the mesh for mode shapes)"),
+    "--scale SCALE": (
+        float,
+        "factor on the displacements (default 1; a tenth of the size of the mesh for mode shapes)",
+    ),
 }
 
 

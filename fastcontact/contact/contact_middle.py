@@ -1,12 +1,13 @@
 """Centre of a contact zone, and distances from it on the secondary surface.
 
-In axisymmetry the middle is the axis where the radius increases or decreases along the surface. Otherwise it is the centre of pressure of the contact, completed by reflection at the
-planes of symmetry that it reaches: a half or quarter model has its middle on these planes. A plane of symmetry is one in
-which supports hold the nodes at an end of the surface normal to the plane.
+In axisymmetry the middle is the axis where no two points of the surface have the same radius. Otherwise it is the centre of
+pressure of the contact, completed by reflection at the planes of symmetry that it reaches: a half or quarter model has its
+middle on these planes. A plane of symmetry is one in which supports hold the nodes at an end of the surface normal to the
+plane.
 
 In the plane, coordinates are arc lengths along the surface: a ring is unrolled. The same holds in axisymmetry where the
-surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, as that of an O-ring. In 3D they are distances from the line
-through the middle along the mean normal.
+surface runs along the axis rather than across it, as in a press fit of cylinders, or closes on itself, as that of an O-ring.
+In 3D they are distances from the line through the middle along the mean normal.
 
 The half-width of a contact in the plane is that of its projection along the mean normal: half the chord of a pin in its hole,
 not half the arc.

@@ -32,6 +32,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     - REAC_NODA (DX, DY [, DZ]): reactions [force]. In axisymmetry they are integrated over the full circle, in code_aster
       over one radian.
     - PRES_CONT (PRES): contact pressure, zero at nodes outside the contact surfaces [pressure].
+    - TEMP (TEMP), with heat conduction: temperature [temperature].
 
     Parameters
     ----------
@@ -86,12 +87,16 @@ def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Ar
     stresses = tuple(STRESSES)[: 4 if mesh.dim == 2 else 6]
     stress = _checked(mesh, step, "stress", (len(stresses),))
     equivalent = [_checked(mesh, step, name, ()) for name in ("von_mises", "von_mises_signed")]
+    temperature = (
+        {} if step.temperature is None else {"TEMP": (("TEMP",), _checked(mesh, step, "temperature", ())[:, None])}
+    )
     return {
         "DEPL": (directions, _checked(mesh, step, "displacement", (mesh.dim,))),
         "SIEF_NOEU": (stresses, stress[:, [STRESSES[name] for name in stresses]]),
         "SIEQ_NOEU": (("VMIS", "VMIS_SG"), np.column_stack(equivalent)),
         "REAC_NODA": (directions, _checked(mesh, step, "reaction", (mesh.dim,))),
         "PRES_CONT": (("PRES",), contact_pressure(mesh, step)[:, None]),
+        **temperature,
     }
 
 

@@ -111,7 +111,9 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
     components refer to rotated axes: xx is normal to the axis, yy along it, and xy the shear stress.
     """
     if mesh.dim != 2:
-        raise FastcontactError("stresses along the axis need a two-dimensional mesh: in three dimensions probe points")
+        raise FastcontactError(
+            "stresses along the axis need a two-dimensional mesh: in three dimensions draw a section"
+        )
     pole, direction = _axis(step, pair)
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))

@@ -77,7 +77,13 @@ class Field:
 
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     """Return a field of a step by its name; FastcontactError if there is no field with this name."""
-    known = [*names(mesh), *step.cell_fields, *(["temperature"] if step.temperature is not None else [])]
+    fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
+    known = [
+        *names(mesh),
+        *step.cell_fields,
+        *["temperature"] * (step.temperature is not None),
+        *["heat_flux"] * bool(fluxes),
+    ]
     if name not in known:
         raise FastcontactError(unknown("field", name, known))
     if name in OF_STRESS and name not in step.cell_fields:
@@ -95,6 +101,8 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
         values = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
     elif name == "temperature" and step.temperature is not None:
         values = step.temperature
+    elif name == "heat_flux":
+        caption, values = "heat flux", _of_cells(mesh, np.linalg.norm(fluxes, axis=0))
     else:
         caption, values = CELLS.get(name, name), _of_cells(mesh, step.cell_fields[name])
     return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)

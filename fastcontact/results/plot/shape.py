@@ -19,7 +19,9 @@ from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view
 from fastcontact.results.step import StepResult
 
 LARGEST = 1e30  # largest coordinate that can be plotted without overflow in products of coordinates
-VIBRATION = 0.1  # largest displacement of vibration modes, over the size of the mesh, at which they are drawn by default
+VIBRATION = (
+    0.1  # largest displacement of vibration modes, over the size of the mesh, at which they are drawn by default
+)
 
 
 def scale_of(scale: float | None, mesh: Mesh, steps: Sequence[StepResult]) -> float:
