@@ -17,6 +17,16 @@ def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
     return model
 
 
+def united(**meshes):
+    """Return meshes as one, their groups after a keyword: ``united(L_=lower)`` has L_TOP, but keeps L, the body itself."""
+    return fc.generate.union(
+        *(
+            fc.generate.renamed(mesh, {g: g if start == f"{g}_" else start + g for g in mesh.group_names})
+            for start, mesh in meshes.items()
+        )
+    )
+
+
 def members(mesh):
     """Groups of cells as (element, row) pairs, which do not depend on the order of the elements."""
     return {

@@ -9,9 +9,10 @@ import calculix
 import numpy as np
 import pytest
 from calculix import deck_of, needs_calculix
+from models import united
 
 import fastcontact as fc
-from fastcontact.mesh.generate import box, renamed, union
+from fastcontact.mesh.generate import box
 
 pytestmark = needs_calculix
 # CalculiX prints seven digits, of numbers that iterations leave with about as many.
@@ -87,13 +88,8 @@ def test_a_heated_bar_between_walls(element, tmp_path):
 
 
 def stacked(element, lower, upper, top=4.0):
-    parts = []
-    for side, divisions, size, place in (
-        ("L", lower, (10.0, 10.0, 5.0), (0.0, 0.0, 0.0)), ("U", upper, (10.0, 10.0, top), (0.0, 0.0, 5.0)),
-    ):  # fmt: skip
-        part = box(size, divisions, element, place)
-        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
-    return union(*parts)
+    low = box((10.0, 10.0, 5.0), lower, element)
+    return united(L_=low, U_=box((10.0, 10.0, top), upper, element, (0.0, 0.0, 5.0)))
 
 
 def stack_deck(mesh, between):

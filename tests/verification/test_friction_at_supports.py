@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 
@@ -39,7 +39,7 @@ def blocks(element, dim):
     else:
         a = fc.generate.box((10, 6, 2), (8, 5, 2), element, name="A")
         b = fc.generate.box((6, 4, 2), (4, 3, 2), element, origin=(2, 1, 2), name="B")
-    return fc.generate.union(prefixed(a, "A"), prefixed(b, "B"))
+    return united(A_=a, B_=b)
 
 
 def sides(dim):

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
 from fastcontact.mesh import elements
-from fastcontact.mesh.generate import block, box, renamed, sphere_on_block, union
+from fastcontact.mesh.generate import block, box, sphere_on_block
 
 pytestmark = pytest.mark.pairwise
 
@@ -18,22 +18,14 @@ SOLID = [(e, e) for e in ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "
 SOLID += [("hex8", "tet4"), ("hex20", "tet10"), ("tet10", "hex8"), ("hex27", "tet10"), ("hex8", "hex20")]
 
 
-def prefixed(mesh, prefix):
-    return renamed(mesh, {name: f"{prefix}_{name}" for name in mesh.group_names})
-
-
 def two_squares(lower, upper):
-    return union(
-        prefixed(block((1.0, 0.5), (3, 2), lower, (0.0, -0.5), name="BODY"), "L"),
-        prefixed(block((1.0, 0.5), (4, 3), upper, (0.0, 0.0), name="BODY"), "U"),
-    )
+    low, up = block((1.0, 0.5), (3, 2), lower, (0.0, -0.5), name="BODY"), block((1.0, 0.5), (4, 3), upper, name="BODY")
+    return united(L_=low, U_=up)
 
 
 def two_boxes(lower, upper, divisions=((2, 3, 2), (3, 2, 2))):
-    return union(
-        prefixed(box((1.0, 1.0, 0.5), divisions[0], lower, (0.0, 0.0, -0.5)), "L"),
-        prefixed(box((1.0, 1.0, 0.5), divisions[1], upper, (0.0, 0.0, 0.0)), "U"),
-    )
+    low = box((1.0, 1.0, 0.5), divisions[0], lower, (0.0, 0.0, -0.5))
+    return united(L_=low, U_=box((1.0, 1.0, 0.5), divisions[1], upper))
 
 
 def pair_of(mesh, kinematics, swap, **options):

@@ -2,21 +2,18 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations._determined_field import DETERMINED, WholeFacets, determined
-from fastcontact.mesh.generate import block, renamed, union
+from fastcontact.mesh.generate import block
 
 pytestmark = pytest.mark.each_value
 
 
-def named(*meshes):
-    """Meshes as one, their groups after L_ and U_."""
-    return union(
-        *(renamed(mesh, {g: s + g for g in mesh.group_names}) for s, mesh in zip(("L_", "U_"), meshes, strict=True))
-    )
+def named(lower, upper):
+    return united(L_=lower, U_=upper)
 
 
 @pytest.mark.parametrize("element", ["quad4", "quad8"])

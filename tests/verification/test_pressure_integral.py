@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 from two_bodies import blocks, boxes, held, touching
 
@@ -96,8 +96,7 @@ def bulging_boxes(element):
     up = box((4.0, 4.0, 2.0), (4, 4, 2), element)
     points = up.points.copy()
     points[:, 2] += 0.02 * (points[:, :2] ** 2).sum(axis=1) * (1.0 - 0.5 * points[:, 2])
-    parts = zip("LU", (low, up.replace(points=points)), strict=True)
-    return union(*(renamed(part, {group: f"{s}_{group}" for group in part.group_names}) for s, part in parts))
+    return united(L_=low, U_=up.replace(points=points))
 
 
 @EVERY
@@ -200,9 +199,7 @@ def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carrie
     for offset in (0.0, 0.09, 0.0999):
         low = box((2.0, 1.0, 1.0), (10, 2, 3), element, (0.0, 0.0, -1.0))
         up = box((1.0, 1.0, 1.0), (7, 3, 3), element, (0.5 + offset, 0.0, 0.0))
-        parts = zip("LU", (low, up), strict=True)
-        mesh = union(*(renamed(part, {group: f"{s}_{group}" for group in part.group_names}) for s, part in parts))
-        model = elastic_model(mesh, "3d", nu=0.0)
+        model = elastic_model(united(L_=low, U_=up), "3d", nu=0.0)
         for group in ("L_YMIN", "L_YMAX", "U_YMIN", "U_YMAX"):
             model.fix(group, "y")
         model.fix("L_ZMIN", "xz")

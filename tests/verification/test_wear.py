@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.mesh.generate import block, block_on_block, box, renamed, union
+from fastcontact.mesh.generate import block, block_on_block, box
 
 pytestmark = pytest.mark.each_value
 
@@ -194,11 +194,8 @@ def test_bodies_in_space_that_slide_over_their_edges():
 
     Strains along the surfaces shorten the way by 1.1 %.
     """
-    parts = []
-    for side, divisions, z in (("L", (6, 6, 2), -1.0), ("U", (4, 4, 2), 0.0)):
-        part = box((2.0, 2.0, 1.0), divisions, "hex8", (-1.0, -1.0, z))
-        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
-    mesh = union(*parts)
+    low = box((2.0, 2.0, 1.0), (6, 6, 2), "hex8", (-1.0, -1.0, -1.0))
+    mesh = united(L_=low, U_=box((2.0, 2.0, 1.0), (4, 4, 2), "hex8", (-1.0, -1.0, 0.0)))
     points, upper = mesh.points.copy(), mesh.points_of("U_BOX")
     points[upper, 2] += 0.02 * (1.0 - points[upper, 2]) * (points[upper, 0] ** 2 + points[upper, 1] ** 2)
     model = elastic_model(mesh.replace(points=points), "3d", L_ZMIN="xyz")

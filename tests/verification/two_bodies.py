@@ -1,7 +1,7 @@
 """Pairs of small bodies for tests of contact options: blocks, boxes, rings."""
 
 import numpy as np
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, renamed, union
@@ -20,11 +20,8 @@ def blocks(element="quad4", lower=(3, 2), upper=(3, 2), apart=0.0):
 
 def boxes(element="hex8", lower=(2, 3, 2), upper=(2, 3, 2), apart=0.0, upper_element=None):
     """Two boxes of 10 by 10 by 5 on each other along z = 0, the upper one lifted; groups as of `box`, after L_ or U_."""
-    parts = []
-    for side, kind, divisions, z in (("L", element, lower, -5.0), ("U", upper_element or element, upper, apart)):
-        part = box((10.0, 10.0, 5.0), divisions, kind, (0.0, 0.0, z))
-        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
-    return union(*parts)
+    low = box((10.0, 10.0, 5.0), lower, element, (0.0, 0.0, -5.0))
+    return united(L_=low, U_=box((10.0, 10.0, 5.0), upper, upper_element or element, (0.0, 0.0, apart)))
 
 
 def held(mesh, kinematics="plane_strain", approach=0.02):

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from stepping import Stepping
 
 import fastcontact as fc
@@ -31,11 +31,7 @@ def stacked(ratio=1.0, friction=0.3, formulation="node_to_segment", dim=3, unit=
     else:
         low, up = block((1.2, 0.5), (elements + 1, 3), "quad4", (-0.1, -0.5)), block((1.0, 0.5), (elements, 3), "quad4")
         bottom, top = "BOTTOM", "TOP"
-    low, up = (
-        fc.generate.renamed(mesh, {name: letter + name for name in mesh.group_names})
-        for letter, mesh in (("L_", low), ("U_", up))
-    )
-    mesh = fc.generate.union(low, up)
+    mesh = united(L_=low, U_=up)
     mesh = fc.Mesh(mesh.points * size, mesh.cells, mesh.cell_groups, mesh.point_groups)
     model = fc.Model(mesh, "3d" if dim == 3 else "plane_strain")
     model.add_material(fc.LinearElastic(E, 0.3), groups=["L_BLOCK"])
@@ -118,11 +114,8 @@ def test_what_round_off_of_a_stiff_body_leaves_is_told_with_its_number(solver):
 @pytest.mark.parametrize(("solver", "kinematics"), [("direct", "axisymmetric"), ("amg", "plane_strain")])
 def test_a_stiff_body_that_moves_until_it_just_touches(solver, kinematics):
     """Round-off of its own stiffness is more than the criterion allows of a force that is small by itself."""
-    named = [
-        fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
-        for name, mesh in (("A", block((10, 4), (8, 4), "quad8")), ("B", block((6, 4), (5, 3), "quad8", (0, 4.05))))
-    ]
-    model = fc.Model(fc.generate.union(*named), kinematics)
+    mesh = united(A=block((10, 4), (8, 4), "quad8"), B=block((6, 4), (5, 3), "quad8", (0, 4.05)))
+    model = fc.Model(mesh, kinematics)
     model.add_material(fc.LinearElastic(1e3, 0.3), "ABLOCK")
     model.add_material(fc.LinearElastic(2e5, 0.3), "BBLOCK")
     model.fix("ABOTTOM", "xy")

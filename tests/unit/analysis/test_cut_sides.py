@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -28,12 +28,7 @@ def pressed(kinematics, element, pieces, options, curvature=0.0):
         bottom, primary, secondary, top = "LOWER_BOTTOM", "LOWER_TOP", "UPPER_BOTTOM", "UPPER_TOP"
     points = np.array(upper.points)
     points[:, -1] += curvature * (points[:, :-1] ** 2).sum(axis=1)
-    mesh = fc.generate.union(
-        *(
-            fc.generate.renamed(part, {group: f"{name}_{group}" for group in part.group_names if group != name})
-            for name, part in (("LOWER", lower), ("UPPER", upper.replace(points=points)))
-        )
-    )
+    mesh = united(LOWER_=lower, UPPER_=upper.replace(points=points))
     middle = np.concatenate([mesh.points[cells][:, :, 0].mean(axis=1) for cells in mesh.cells.values()])
     groups, side = dict(mesh.cell_groups), mesh.cell_groups[secondary]
     for i, (begin, end) in enumerate(zip(CUTS[pieces][:-1], CUTS[pieces][1:], strict=True)):

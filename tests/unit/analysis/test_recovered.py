@@ -2,20 +2,19 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
 from fastcontact.contact.configuration import Configuration
-from fastcontact.mesh.generate import block, box, renamed, union
+from fastcontact.mesh.generate import block, box
 
 FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 
 
 def two_blocks(wide=2.0):
     """A small block on a wide one, whose sides have the prefixes U_ and L_."""
-    parts = [block((wide, 0.5), (7, 2), origin=(0.0, -0.5)), block((1.0, 0.5), (4, 2))]
-    mesh = union(*(renamed(m, {name: p + name for name in m.group_names}) for m, p in zip(parts, ("L_", "U_"))))
+    mesh = united(L_=block((wide, 0.5), (7, 2), origin=(0.0, -0.5)), U_=block((1.0, 0.5), (4, 2)))
     return elastic_model(mesh, "plane_strain", L_BOTTOM="xy")
 
 

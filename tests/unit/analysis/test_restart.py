@@ -5,13 +5,13 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.state import State
-from fastcontact.mesh.generate import block, box, renamed, union
+from fastcontact.mesh.generate import block, box
 
 pytestmark = pytest.mark.each_value
 
@@ -103,11 +103,8 @@ def spheres(formulation="node_to_segment", **options):
 
 def boxes(formulation="node_to_segment", shift=0.02, **options):
     """Two boxes, the upper one lowered and pushed aside."""
-    parts = []
-    for side, divisions, z in (("L", (3, 3, 1), -5.0), ("U", (2, 2, 1), 0.0)):
-        part = box((10.0, 10.0, 5.0), divisions, "hex8", (0.0, 0.0, z))
-        parts.append(renamed(part, {name: f"{side}_{name}" for name in part.group_names}))
-    model = elastic_model(union(*parts), "3d", L_ZMIN="xyz")
+    low, up = box((10.0, 10.0, 5.0), (3, 3, 1), "hex8", (0.0, 0.0, -5.0)), box((10.0, 10.0, 5.0), (2, 2, 1))
+    model = elastic_model(united(L_=low, U_=up), "3d", L_ZMIN="xyz")
     model.prescribe("U_ZMAX", x=shift, y=0.0, z=-0.04)
     model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation=formulation, **options)
     return model

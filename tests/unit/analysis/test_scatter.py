@@ -4,7 +4,7 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.analysis.tolerances import WINDOW, Watch
@@ -73,13 +73,7 @@ def slender():
     """A bar of 400 by 1 that lies on a foundation under its weight of 0.4."""
     low = fc.generate.block((400.0, 2.0), (100, 2), "quad4", (0.0, -2.0))
     up = fc.generate.block((400.0, 1.0), (133, 2))
-    mesh = fc.generate.union(
-        *(
-            fc.generate.renamed(m, {name: letter + name for name in m.group_names})
-            for m, letter in ((low, "L_"), (up, "U_"))
-        )
-    )
-    model = elastic_model(mesh, "plane_strain", L_BOTTOM="xy", U_LEFT="x")
+    model = elastic_model(united(L_=low, U_=up), "plane_strain", L_BOTTOM="xy", U_LEFT="x")
     model.add_body_force(["U_BLOCK"], y=-1e-3)
     model.add_contact("c", secondary="U_BOTTOM", primary="L_TOP")
     return model

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -14,11 +14,10 @@ from fastcontact.analysis.problem import prepare
 def light_contact_beside_a_large_force(shift):
     """Return two blocks pressed together and pushed along each other, and a third one far away that is stretched hard."""
 
-    def part(z, k, name):
-        mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), "hex8", (0.0, 0.0, z))
-        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+    def part(z, k):
+        return fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), "hex8", (0.0, 0.0, z))
 
-    model = elastic_model(fc.generate.union(part(-0.5, 6, "L_"), part(0.0, 5, "U_"), part(5.0, 6, "FAR_")), "3d", E=1.0)
+    model = elastic_model(united(L_=part(-0.5, 6), U_=part(0.0, 5), FAR_=part(5.0, 6)), "3d", E=1.0)
     model.fix("L_ZMIN", "xyz")
     model.prescribe("U_ZMAX", x=shift, y=0.0, z=-0.001)
     model.fix("FAR_XMIN", "xyz")

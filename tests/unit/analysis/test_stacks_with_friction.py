@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -12,12 +12,12 @@ from fastcontact.analysis.problem import prepare
 
 def stack(element, divisions, friction=0.3, whole_sides=False):
     """Blocks that do not match, those in the middle smaller and held along x and y by a side each, or at half height."""
-    parts = []
+    parts = {}
     for level, n in enumerate(divisions):
         width = 1.0 if level % 2 == 0 else 0.9
         mesh = fc.generate.box((width, width, 0.5), (n, n, n // 2), element, (0.0, 0.03 * level, 0.5 * level))
-        parts.append(fc.generate.renamed(mesh, {group: f"B{level}_{group}" for group in mesh.group_names}))
-    mesh, top = fc.generate.union(*parts), len(divisions) - 1
+        parts[f"B{level}_"] = mesh
+    mesh, top = united(**parts), len(divisions) - 1
     for level in range(1, top):
         for side in ("XMIN", "YMIN"):
             nodes = mesh.points_of(f"B{level}_{side}")

@@ -2,23 +2,19 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.contact.pairing import pair
 from fastcontact.contact.projection import smooth_normals
 from fastcontact.contact.surface import surface
-from fastcontact.mesh.generate import block, box, renamed, union
+from fastcontact.mesh.generate import block, box, renamed
 
 WAYS = [
     {"formulation": "node_to_segment", "normals": "facet"}, {"formulation": "node_to_segment", "normals": "averaged"},
     {"formulation": "continuous"}, {"formulation": "mortar"}, {"formulation": "mortar", "multipliers": "dual"},
 ]  # fmt: skip
 NAMES = ["facet", "averaged", "continuous", "standard", "dual"]
-
-
-def named(mesh, prefix):
-    return renamed(mesh, {group: f"{prefix}_{group}" for group in mesh.group_names})
 
 
 def punch(dim=2, shift=0.55, nu=0.0, element=None, cells=(10, 7)):
@@ -31,7 +27,7 @@ def punch(dim=2, shift=0.55, nu=0.0, element=None, cells=(10, 7)):
         low = box((2.0, 2.0, 1.0), (n, n, 2), element or "hex8", (0.0, 0.0, -1.0))
         up = box((1.0, 1.0, 1.0), (m, m, 2), element or "hex8", (shift, shift, 0.0))
         low, up = (renamed(mesh, {"ZMIN": "BOTTOM", "ZMAX": "TOP"}) for mesh in (low, up))
-    mesh = union(named(low, "L"), named(up, "U"))
+    mesh = united(L_=low, U_=up)
     if dim == 2:
         whole = np.concatenate([mesh.cell_groups[name] for name in ("U_BOTTOM", "U_LEFT", "U_RIGHT")])
         mesh = mesh.with_groups(cells={"U_WHOLE": whole})

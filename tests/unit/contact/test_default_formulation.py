@@ -4,10 +4,10 @@ import logging
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
-from fastcontact.mesh.generate import renamed, union
+from fastcontact.mesh.generate import union
 
 E, NU = 210e3, 0.3
 
@@ -26,21 +26,17 @@ def bent(element, radii, cells, ends):
     return mesh.replace(points=radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
 
 
-def named(mesh, prefix):
-    return renamed(mesh, {group: f"{prefix}_{group}" for group in mesh.group_names})
-
-
 @pytest.mark.each_value
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("element", ["quad4", "tri6", "quad8", "quad9"])
 def test_rings_that_match_turn_by_nothing(element, swapped):
     """Node-to-segment takes the normal of either facet at a node opposite a node: it is wrong, or flips for ever."""
     whole = (0.0, -2.0 * np.pi)
-    parts = [
-        named(fc.generate.merge_points(bent(element, radii, (40, 6), whole), 1e-6), name)
-        for name, radii in (("IN", (20.0, 50.0)), ("OUT", (50.0, 100.0)))
-    ]
-    model = elastic_model(union(*parts), "plane_strain", E=E, nu=NU, OUT_TOP="xy")
+    parts = {
+        name: fc.generate.merge_points(bent(element, radii, (40, 6), whole), 1e-6)
+        for name, radii in (("IN_", (20.0, 50.0)), ("OUT_", (50.0, 100.0)))
+    }
+    model = elastic_model(united(**parts), "plane_strain", E=E, nu=NU, OUT_TOP="xy")
     model.prescribe(
         "IN_BOTTOM", x=lambda X: 0.02 * X[:, 0] / np.hypot(*X.T), y=lambda X: 0.02 * X[:, 1] / np.hypot(*X.T)
     )
@@ -66,7 +62,7 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
         cells = 16 * level
         shoe = bent(element, (48.0, 50.0), (cells, 2 * level), (-0.4 * np.pi, -0.6 * np.pi))
         hollow = bent(element, (50.0, 54.0), (2 * cells, 4 * level), (-0.3 * np.pi, -0.7 * np.pi))
-        model = elastic_model(union(named(shoe, "SHOE"), named(hollow, "HOLLOW")), "plane_strain", E=E, nu=NU)
+        model = elastic_model(united(SHOE_=shoe, HOLLOW_=hollow), "plane_strain", E=E, nu=NU)
         model.fix("HOLLOW_TOP", "xy")
 
         def moved(X, axis):
@@ -82,11 +78,11 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
 
 
 def test_sides_that_mix_linear_and_quadratic_facets():
-    parts = [
-        named(fc.generate.block((1.0, 1.0), (4, 4), element, (x, y)), "LOW" if y < 0 else "UP")
-        for element, x, y in (("quad4", 0.0, -1.0), ("quad8", 1.1, -1.0), ("quad8", 0.0, 0.0), ("tri3", 1.1, 0.0))
-    ]
-    model = elastic_model(union(*parts), "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy")
+    def row(y, *elements):
+        return union(*(fc.generate.block((1.0, 1.0), (4, 4), e, (1.1 * k, y)) for k, e in enumerate(elements)))
+
+    mesh = united(LOW_=row(-1.0, "quad4", "quad8"), UP_=row(0.0, "quad8", "tri3"))
+    model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy")
     model.prescribe("UP_TOP", x=0.0, y=-0.02)
     model.add_contact("pair", secondary="UP_BOTTOM", primary="LOW_TOP")
     np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)

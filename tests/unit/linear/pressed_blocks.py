@@ -1,6 +1,7 @@
 """A box and two non-matching blocks, for tests of linear solvers under contact."""
 
 import numpy as np
+from models import united
 
 import fastcontact as fc
 from fastcontact.elasticity.constrained_system import supports_apart
@@ -10,14 +11,13 @@ from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=0.01, **options):
     """Two blocks that do not match, pressed together, and with friction pushed along each other."""
 
-    def part(z, k, name):
-        mesh = fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), element, (0.0, 0.0, z))
-        return fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
+    def part(z, k):
+        return fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), element, (0.0, 0.0, z))
 
-    upper = part(0.0, n * 4 // 5, "U_")
+    upper = part(0.0, n * 4 // 5)
     points = np.array(upper.points)
     points[:, 2] += curvature * (points[:, 0] ** 2 + points[:, 1] ** 2)
-    model = fc.Model(fc.generate.union(part(-0.5, n, "L_"), upper.replace(points=points)), "3d")
+    model = fc.Model(united(L_=part(-0.5, n), U_=upper.replace(points=points)), "3d")
     model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
     model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
     model.fix("L_ZMIN", "xyz")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.elasticity.stiffness import stiffness
@@ -17,13 +17,7 @@ def joined(element, *origins, merged=True):
     """Bodies of unit size at origins, merged where nodes coincide."""
     make = {**PLANE, **SPACE}[element]
     dim = len(origins[0])
-    blocks = [
-        fc.generate.renamed(mesh, {group: f"{name}_{group}" for group in mesh.group_names})
-        for name, mesh in ((f"B{k}", make((1.0,) * dim, (1,) * dim, element, o)) for k, o in enumerate(origins))
-    ]
-    mesh = blocks[0]
-    for other in blocks[1:]:
-        mesh = fc.generate.union(mesh, other)
+    mesh = united(**{f"B{k}_": make((1.0,) * dim, (1,) * dim, element, o) for k, o in enumerate(origins)})
     return fc.generate.merge_points(mesh, 1e-9) if merged else mesh
 
 

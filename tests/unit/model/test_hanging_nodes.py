@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.mesh import generate
@@ -14,12 +14,8 @@ from fastcontact.model.hanging_nodes import hanging_nodes, hanging_nodes_warning
 pytestmark = pytest.mark.pairwise
 
 
-def joined(*meshes):
-    renamed = [
-        generate.renamed(mesh, {group: f"{name}_{group}" for group in mesh.group_names})
-        for name, mesh in zip("LU", meshes, strict=True)
-    ]
-    return generate.merge_points(generate.union(*renamed), 1e-9)
+def joined(lower, upper):
+    return generate.merge_points(united(L_=lower, U_=upper), 1e-9)
 
 
 def plates(element, coarse, fine):

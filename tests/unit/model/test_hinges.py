@@ -2,19 +2,14 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.model import rigid_motions
 
 
 def pair_of(first, second):
-    names = ("A_", "B_")
-    renamed = [
-        fc.generate.renamed(mesh, {group: name + group for group in mesh.group_names})
-        for name, mesh in zip(names, (first, second), strict=True)
-    ]
-    return fc.generate.merge_points(fc.generate.union(*renamed), 1e-9)
+    return fc.generate.merge_points(united(A_=first, B_=second), 1e-9)
 
 
 def squares(element="quad4", n=2):
