@@ -147,8 +147,8 @@ def _dilatation(F, finite, G):
 def _leave_out_initial_stress(omitted, G, J, P, pressure, turning, A):
     """If `omitted`, subtract the initial-stress term delta_ik S_JL from A.
 
-    S is the second Piola-Kirchhoff stress of P plus G = dJ/dF times `turning` minus `pressure`. In compression, where `turning`
-    is negative, the effect of the variation of the dilatation within a cell is subtracted as well.
+    S is the second Piola-Kirchhoff stress of P plus G = dJ/dF times `turning` minus `pressure`. In compression, where
+    `turning` is negative, the effect of the variation of the dilatation within a cell is subtracted as well.
     """
     for row in range(9 if omitted else 0):
         for column in range(9):
