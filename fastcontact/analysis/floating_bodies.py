@@ -193,6 +193,7 @@ class FloatingBodies:
         Its keys are ``motions``, the names of the free rigid-body modes; ``springs``, the components to which springs are
         attached; ``spring_stiffness`` [force / length]; ``force_left``, the remaining force of each spring [force];
         ``relative_to_load``, the largest of these forces divided by `load` [-]; and ``positions``, the number of positions.
+        The load step adds ``undetermined``, the result of the method of this name.
         """
         left = np.abs(rigid.spring_force)
         return {
@@ -204,11 +205,11 @@ class FloatingBodies:
             "positions": rigid.positions,
         }
 
-    def undetermined(self, constraints: Constraints, multiplier: Array, u: Array) -> dict[str, list[str]]:
-        """Return the motions that no contact force restrains at the end of a step, by body.
+    def undetermined(self, constraints: Constraints, multiplier: Array, u: Array, load: float) -> dict[str, list[str]]:
+        """Return the motions that neither contact forces nor bilateral contact restrain at the end of a step, by body.
 
-        Any position without contact forces is then a solution. Forces that a motion by round-off of the displacements u
-        (n_dofs,) [length] would change as much, such as those of sides that just touch, do not count.
+        Any position without contact forces is then a solution. Forces by round-off, of sides that just touch, do not count:
+        those that are negligible beside the loads, or without loads beside those of the springs in the displacements.
 
         Parameters
         ----------
@@ -217,8 +218,14 @@ class FloatingBodies:
         multiplier : ndarray (m,)
             Their normal forces [force].
         u : ndarray (n_dofs,)
+            Displacements [length].
+        load : float
+            Scale of the loads, as in `settle` [force].
         """
-        carries = np.abs(multiplier) > LENGTH_ROUND_OFF * self.stiffness * float(np.abs(u).max())
+        elastic = self.stiffness * float(np.abs(u).max())
+        carries = np.abs(multiplier) > LENGTH_ROUND_OFF * (min(load, elastic) if load else elastic)
+        if constraints.equality is not None:
+            carries = carries | constraints.equality
         rubs = carries & (constraints.coefficients > 0.0)
         along = [constraints.B[carries], *(tangent[rubs] for tangent in constraints.tangents)]
         _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in along]))

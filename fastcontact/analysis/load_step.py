@@ -119,7 +119,8 @@ def _ended(
     if problem.floating_bodies is not None and end.rigid is not None:
         iterations["regularised"] = problem.floating_bodies.report(end.rigid, end.largest_rigid_force)
         if settled is not None:
-            free = problem.floating_bodies.undetermined(settled.constraints, settled.solution.multiplier, u)
+            forces = settled.constraints, settled.solution.multiplier
+            free = problem.floating_bodies.undetermined(*forces, u, end.largest_rigid_force)
             iterations["regularised"]["undetermined"] = free
     end = replace(end, solver=problem.solver.snapshot())
     result = recover(problem, end, contact, balanced.reaction, iterations, instant, solution.bodies)

@@ -302,7 +302,8 @@ class StepResult:
 
         - ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``: numbers of iterations.
         - ``history``: list of dicts with the iterations.
-        - ``regularised``, with floating bodies: their soft springs and the forces in these springs.
+        - ``regularised``, with floating bodies: their soft springs, the forces in these springs, and motions of which nothing
+          determines the amount.
         - ``scatter``, if round-off prevents the contact geometry from meeting the criterion: relative variation of
           ``displacement`` and of the contact ``force`` [-].
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``: multipliers of the temperatures, of the

@@ -1,5 +1,7 @@
 """Loads in equilibrium: exact fields, thick cylinders, coupled faces, histories, floating bodies."""
 
+import warnings
+
 import numpy as np
 import pytest
 from models import elastic_model
@@ -292,7 +294,8 @@ def test_what_was_regularised_is_kept_in_result_files(tmp_path):
         last = one_step(model, on_step=out.write)
     kept = fc.open_results(tmp_path / "forced.vtkhdf")[-1].iterations["regularised"]
     assert kept == last.iterations["regularised"]
-    assert set(kept) == {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions"}
+    named = {"motions", "springs", "spring_stiffness", "force_left", "relative_to_load", "positions", "undetermined"}
+    assert set(kept) == named
 
 
 @pytest.mark.filterwarnings("ignore:the loads strain the model by about 3e-15")
@@ -311,6 +314,42 @@ def test_a_load_lost_in_round_off_is_told_in_numbers(request):
         one_step(driven_by_force(mesh, "node_to_segment", 1e-6, gap=30.0))
 
 
+@pytest.mark.parametrize("friction", [None, 0.3])
+def test_a_body_that_nothing_loads_has_no_determined_position(friction):
+    """It lies between two others without touching them; pushed by one of them, it has one."""
+    for push, free in ((0.0, True), (0.3, False)):
+        model = floating_block(push, friction)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            last = fc.solve(model, fc.linear_ramp(1))[-1]
+        texts = [str(one.message) for one in told if "nothing determines the position" in str(one.message)]
+        assert len(texts) == free
+        assert last.iterations["regularised"]["undetermined"] == (
+            {"body 'UPPER'": ["translation along y"]} if free else {}
+        )
+        assert not free or "body 'UPPER': translation along y" in texts[0]
+
+
+def floating_block(push, friction):
+    """A block that is free along y, between a block and an obstacle that goes down by `push`, each 0.1 from it."""
+    mesh = fc.generate.block_on_block()
+    points = mesh.points.copy()
+    points[mesh.points_of("UPPER"), 1] += 0.1
+    model = elastic_model(mesh.replace(points=points), "plane_strain")
+    model.fix("LOWER_BOTTOM", "xy")
+    model.fix("UPPER_LEFT", "x")
+    model.add_contact("below", secondary="CONT_UPPER", primary="CONT_LOWER", friction=friction)
+    top = float(points[:, 1].max()) + 0.1
+    model.add_obstacle(
+        "above",
+        secondary="UPPER_TOP",
+        obstacle=fc.obstacles.HalfSpace((0.0, top), (0.0, -1.0)),
+        motion={"y": -push},
+        friction=friction,
+    )
+    return model
+
+
 def test_a_body_pulled_away_is_told_clearly():
     mesh = fc.generate.half_spheres("tri3", size=8.0)
     done = []
@@ -322,6 +361,7 @@ def test_a_body_pulled_away_is_told_clearly():
     assert [step.load_factor for step in done] == [0.25, 0.5, 0.75]
 
 
+@pytest.mark.filterwarnings("ignore:nothing determines the position of bodies")
 @pytest.mark.filterwarnings("ignore:contact .* has opened again at the end")
 def test_a_force_goes_and_the_contact_force_with_it():
     mesh = fc.generate.half_spheres("tri3", size=5.0)

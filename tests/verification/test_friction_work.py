@@ -296,3 +296,22 @@ def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
 def test_fraction_while_touching_is_checked():
     with pytest.raises(fc.ModelError, match="friction_while_touching = 0 must be a fraction"):
         fc.Criteria(friction_while_touching=0)
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_nodes_that_face_nothing_do_not_disturb_the_increments_of_a_step():
+    """The longer block is secondary; with multigrid the increments contain its nodes, also those beside the other block."""
+    found = []
+    for solver in ("direct", "amg"):
+        mesh = blocks(2)
+        points = mesh.points.copy()
+        upper = mesh.points_of("UPPER")
+        points[upper, 1] += 0.01 * points[upper, 0]  # nodes close one after another
+        model = elastic_model(mesh.replace(points=points), "plane_strain", E=E)
+        model.fix("LOWER_BOTTOM", "xy")
+        model.prescribe("UPPER_TOP", x=0.02, y=-0.03)
+        model.add_contact("pair", secondary="CONT_LOWER", primary="CONT_UPPER", friction=FRICTION)
+        last = fc.solve(model, fc.linear_ramp(2), linear_solver=solver)[-1]
+        assert np.isfinite(last.contact["pair"].slip).all()
+        found.append(last.displacement)
+    assert np.abs(found[1] - found[0]).max() < 1e-6 * np.abs(found[0]).max()

@@ -155,9 +155,13 @@ def test_tangents_turn_with_their_normals_and_are_smooth():
 
 def test_tangents_of_a_closed_surface():
     around = np.vstack([np.eye(3), -np.eye(3), [[0.6, 0.0, -0.8], [-0.6, 0.0, 0.8]]])
-    first, second = tangents(around)
-    frames = np.stack([around, first, second], axis=1)
-    assert np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3)).max() < 1e-14
+    nearly = np.array([[2e-6, -1e-6, -1.0], [0.0, 3e-6, -1.0]])  # opposite to the mean but for deformations
+    for normals in (
+        around,
+        np.vstack([np.tile([0.0, 0.0, 1.0], (9, 1)), nearly / np.linalg.norm(nearly, axis=1)[:, None]]),
+    ):
+        frames = np.stack([normals, *tangents(normals)], axis=1)
+        assert np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3)).max() < 1e-14
 
 
 def test_increments_along_the_path_do_not_depend_on_the_numbers_of_nodes():

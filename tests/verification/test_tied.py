@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from models import elastic_model
+from scipy.spatial.transform import Rotation
 from two_bodies import SIDES, blocks, boxes, held, rings, touching
 
 import fastcontact as fc
@@ -138,6 +139,42 @@ def test_matching_meshes_are_tied_as_if_they_were_one(make, formulation):
     glued, whole = (fc.solve(model, ONCE)[-1] for model in models)
     nearest = [np.flatnonzero((np.abs(one.points - x) < 1e-9).all(axis=1))[0] for x in mesh.points]
     assert np.abs(glued.displacement - whole.displacement[nearest]).max() < 1e-9 * np.abs(whole.displacement).max()
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize(("formulation", "options"), [("continuous", {}), ("mortar", {"multipliers": "dual"})])
+@pytest.mark.parametrize("make", ["octagon", "trough"])
+def test_ties_do_not_depend_on_the_direction_of_the_axes(make, formulation, options):
+    """Nodes opposite corners and edges have several closest facets, and axes at supports any tangents: up to 1.7e-2 apart."""
+    flat = make == "octagon"
+    mesh = rings("quad4", divisions=((5, 2), (2, 2))) if flat else trough()
+    if flat:
+        fixed, pressed = {"XAXIS": "y", "YAXIS": "x"}, "SHAFT_INNER"
+        sides = {"secondary": "SHAFT_OUTER", "primary": "HUB_INNER"}
+    else:
+        fixed, pressed = {"L_ZMIN": "xyz", "L_XMIN": "x", "U_XMIN": "x", "L_YMIN": "y", "U_YMIN": "y"}, "U_ZMAX"
+        sides = {"secondary": "U_ZMIN", "primary": "L_ZMAX"}
+    found = []
+    for angle in (0.0, 30.0, 100.0):
+        about = np.array([0.0 if flat else 0.4, 0.0 if flat else 0.7, 1.0])
+        axes = Rotation.from_rotvec(angle * about, degrees=True).as_matrix()
+        Q = axes[: mesh.dim, : mesh.dim]
+        model = elastic_model(mesh.replace(points=mesh.points @ Q.T), "plane_strain" if flat else "3d")
+        for group, components in fixed.items():
+            model.fix(group, components, axes=axes.T.tolist())
+        model.add_pressure(pressed, 10.0)
+        model.add_contact("pair", formulation=formulation, kind="tied", **sides, **options)
+        found.append(fc.solve(model, ONCE)[-1].displacement @ Q)
+    for other in found[1:]:
+        assert np.abs(other - found[0]).max() < 1e-9 * np.abs(found[0]).max()
+
+
+def trough():
+    """Two boxes with a gap, whose faces are bent to a trough: nodes above its concave edges have two closest facets."""
+    mesh = boxes(lower=(4, 2, 1), upper=(2, 3, 1), apart=0.4)
+    points = mesh.points.copy()
+    points[:, 2] += 0.06 * (points[:, 0] - 5.0) ** 2 + 0.03 * (points[:, 1] - 3.0) ** 2
+    return mesh.replace(points=points)
 
 
 @pytest.mark.each_value

@@ -203,7 +203,7 @@ def descend(terms, f, s, t, sides, point):
         length = 1.0
         for k in range(sides.shape[0]):
             rate = sides[k, 0] * ps + sides[k, 1] * pt
-            if rate > 1e-14 * size:
+            if rate > ROUND_OFF * size:  # along a side, it is round-off
                 room = sides[k, 2] - sides[k, 0] * s - sides[k, 1] * t
                 length = min(length, max(room, 0.0) / rate)
         if length * size > 1e-6:  # in smaller steps round-off exceeds the decrease

@@ -152,6 +152,24 @@ def test_the_functions_that_a_whole_facet_keeps_stay_the_same_as_it_deforms(name
     assert len(chosen) == 1
 
 
+@pytest.mark.parametrize("edges", [0, 1, 2])
+@pytest.mark.parametrize("name", ["quad4", "quad8", "quad9"])
+def test_the_functions_do_not_depend_on_the_corner_from_which_a_facet_is_numbered(name, edges):
+    """Nodes of a corner, of an edge and of two are left out: what remains keeps the symmetry of the facet."""
+    element = elements.get(name)
+    out = {0, *(node for edge in element.edges[:edges] for node in edge)}
+    out |= set(range(element.n_corners, element.n_corners + edges)) if element.order == 2 else set()
+    middle = element.nodes[: element.n_corners].mean(axis=0)
+    axis = element.nodes[[*out]].mean(axis=0) - middle  # the facet and what is left out are symmetric about it
+    axis /= np.linalg.norm(axis)
+    mirrored = 2.0 * (element.nodes - middle) @ np.outer(axis, axis) - (element.nodes - middle) + middle
+    image = np.linalg.norm(element.nodes[:, None] - mirrored, axis=2).argmin(axis=0)
+    kept = ~np.isin(np.arange(element.n_nodes), [*out])[None]
+    assert np.array_equal(kept[0, image], kept[0])
+    dual, _ = dual_functions(mass_over(name, corners(name))[None], kept, np.ones(kept.shape))
+    assert dual[0][np.ix_(image, image)] == pytest.approx(dual[0], abs=1e-9)
+
+
 def test_a_facet_that_faces_nothing_has_no_functions():
     dual, D = dual_functions(np.zeros((1, 4, 4)), np.ones((1, 4), bool), np.zeros((1, 4)))
     assert not dual.any()
