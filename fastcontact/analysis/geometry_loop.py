@@ -153,9 +153,6 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
             )  # fmt: skip
             return replace(settled, scatter=scatter)
         mixed = mixing.next(settled, moved, displacement, tolerances)
-        if not tolerances.inexact and not touching.due:
-            expected = SAFETY * mixing.contraction * moved.change
-            touching.check(step, constraints, solution, expected, moved.size)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
         if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):

@@ -66,8 +66,7 @@ class Touching:
     ) -> None:
         """Set `due`, given the solution of a pairing.
 
-        `excess` is the change of the displacements beyond that which suffices, or the one that is expected of the next
-        solution, and `size` the largest displacement [length].
+        `excess` is the change of the displacements beyond that which suffices, and `size` the largest displacement [length].
         """
         near = solution.settled and excess <= self._near * size
         self.due = (
@@ -117,8 +116,7 @@ def _allowed(problem: Problem) -> float:
         return 1.0
     if criteria.friction_while_touching is not None:
         return criteria.friction_while_touching
-    multigrid = problem.model.mesh.dim == 3 and problem.solver.iterative
-    plain = multigrid or criteria.geometry_updates is not None or problem.floating_bodies is not None
+    plain = problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or problem.floating_bodies is not None
     pairs = [pair for pair in problem.pairs.values() if pair.friction and isinstance(pair.primary, Surface)]
     dual = FORMULATIONS["mortar"].variant(2, {"multipliers": "dual"}) if pairs and not plain else Formulation
     return NEGLIGIBLE if not plain and all(isinstance(pair, dual) for pair in pairs) else 1.0
