@@ -2,7 +2,8 @@
 
 If a load step is solved at once, the slip of a constraint is counted from the beginning of the step, although a constraint
 that closes within the step slides only after it has closed. Here the load increment is divided at the instants at which
-constraints close, and constraints carry no forces before. These instants are found by linear interpolation of gaps: with
+constraints close, and constraints carry no forces before. In 3D several constraints close in one increment; each slides from
+its own instant. These instants are found by linear interpolation of gaps: with
 the geometry and the Delassus operator F at the end of the step, gaps vary linearly with the load while no constraint closes
 or opens, and none changes between stick and slip. The result therefore hardly depends on whether a force or a motion grows
 linearly in the step.
