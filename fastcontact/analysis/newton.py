@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -145,7 +146,10 @@ class _Newton:
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
         self._by = Regularisation()  # of the last tangent
-        self._mixing = Anderson(DEPTH, np.arange(len(self._start.u)))
+
+    @cached_property
+    def _mixing(self) -> Anderson:
+        return Anderson(DEPTH, np.arange(len(self._start.u)))
 
     def iterated(self, origin: Array) -> StepEquilibrium:
         """Return the equilibrium by iterations from displacements `origin` (n_dofs,) [length]."""

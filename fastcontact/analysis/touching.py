@@ -17,7 +17,6 @@ from fastcontact.analysis.shared_nodes import SharedNodes
 from fastcontact.analysis.solution import FrictionalEquilibrium, Path, Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
-from fastcontact.contact.formulations import FORMULATIONS, Formulation
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -117,8 +116,7 @@ def _allowed(problem: Problem) -> float:
         return criteria.friction_while_touching
     plain = problem.model.mesh.dim == 3 or criteria.geometry_updates is not None or problem.floating_bodies is not None
     pairs = [pair for pair in problem.pairs.values() if pair.friction and isinstance(pair.primary, Surface)]
-    dual = FORMULATIONS["mortar"].variant(2, {"multipliers": "dual"}) if pairs and not plain else Formulation
-    return NEGLIGIBLE if not plain and all(isinstance(pair, dual) for pair in pairs) else 1.0
+    return NEGLIGIBLE if not plain and all(pair.weighs_gaps for pair in pairs) else 1.0
 
 
 def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> Array:

@@ -13,7 +13,8 @@ from fastcontact.arrays import AnyArray, Indices
 from fastcontact.linear import springs_kernels
 from fastcontact.linear.sparse_rows import scaled
 
-# Relative difference below which two sets of springs are equally good in a preconditioner.
+# Relative difference below which two sets of springs, or of weights of eliminated unknowns, are equally good in a
+# preconditioner.
 ALIKE = 0.3
 
 

@@ -21,9 +21,8 @@ from fastcontact.analysis.friction.coulomb_law import Law
 from fastcontact.arrays import Array, Mask
 from fastcontact.round_off import ROUND_OFF
 
-# Largest number of Newton iterations, smallest damping factor, and largest number of full steps that do not decrease the
-# residual.
-PATIENCE, SHORTEST, UPHILL = 40, 1e-3, 3
+# Largest number of Newton iterations, and smallest damping factor.
+PATIENCE, SHORTEST = 40, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +100,6 @@ def newton(
     law = problem.law
     residual = law.residual(y, gaps)
     size = float(np.linalg.norm(residual))
-    uphill = iteration = 0
     best = y, gaps, np.inf
     for iteration in range(patience + 1):
         largest = float(np.abs(y).max())
@@ -110,7 +108,7 @@ def newton(
         if relative < best[2]:
             best = y, gaps, relative
         settled = iteration >= least and off <= exact * largest + problem.round_off
-        if settled or uphill > UPHILL or iteration == patience:
+        if settled or iteration == patience:
             break
         trial, gaps_there = problem.step(y, gaps, *law.state(y, gaps))
         step, change = trial - y, gaps_there - gaps
@@ -121,7 +119,7 @@ def newton(
         ):
             damping *= 0.5
             if damping < SHORTEST:  # at a kink there may be no step that decreases the residual: take the full step
-                damping, uphill = 1.0, uphill + 1
+                damping = 1.0
                 break
         y, gaps = (trial, gaps_there) if damping == 1.0 else (y + damping * step, gaps + damping * change)
         residual = law.residual(y, gaps)

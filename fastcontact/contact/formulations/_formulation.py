@@ -110,9 +110,10 @@ class Formulation(ABC):
     held: HeldMotions | None = field(default=None, repr=False)
 
     name: ClassVar[str]
-    # Whether the surfaces are paired again after each active-set iteration, or only after the active set has converged.
     # Whether the primary side may be a rigid obstacle.
     against_obstacles: ClassVar[bool] = True
+    # Whether each node has one gap, weighted over the facets around it.
+    weighs_gaps: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         if self.normals is None:

@@ -87,6 +87,7 @@ class WeightedMortar(Formulation):
     multipliers: str = "standard"
 
     name: ClassVar[str] = "mortar"
+    weighs_gaps: ClassVar[bool] = True
     _whole: list[Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
