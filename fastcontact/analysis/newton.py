@@ -146,6 +146,7 @@ class _Newton:
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
         self._by = Regularisation()  # of the last tangent
+        self._replaces = bool(problem.force_driven.pairs)  # see `Regularisation.replaces`
 
     @cached_property
     def _mixing(self) -> Anderson:
@@ -226,7 +227,7 @@ class _Newton:
 
         Anderson acceleration is used where a regularised tangent makes the iterations converge linearly.
         """
-        if not self._by.linear or changes[-1] > changes[-2]:
+        if not self._by.linear or FALL * changes[-1] > changes[-2]:
             self._mixing.restart()
             return u
         return self._mixing.mixed(before, u)
@@ -259,6 +260,8 @@ class _Newton:
             first = self._load is begin.load and self._settled is None
             loaded = begin.loaded if first else with_loads(self._problem, self._load)
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
+        # Forces on a floating body that moves do not balance while springs along gaps do not resist its motion.
+        self._replaces |= self._by.held > 0.0 and changes[-1] > changes[-2] > min(changes[:-2], default=np.inf)
         failed: Exception | None = None
         for by in self._regularisations():
             try:
@@ -284,8 +287,7 @@ class _Newton:
         whole = [
             Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
         ]
-        # Forces on an obstacle do not balance if it moves and these springs do not follow it.
-        replaces = closed and (settled.constraints.tangents != () or bool(self._problem.force_driven.pairs))
+        replaces = self._replaces or (closed and settled.constraints.tangents != ())
         held = [Regularisation(held=k, stiff=floats, replaces=replaces) for k in HELD] if closed else []
         if self._by in held:
             held.remove(self._by)

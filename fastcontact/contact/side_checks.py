@@ -24,7 +24,8 @@ def check_sides(mesh: Mesh, name: str, secondary: Surface, primary: Surface, exc
     """
     if secondary.group == primary.group:
         raise ContactError(
-            f"contact '{name}' has '{primary.group}' on both sides: name the group of the other body as one of them"
+            f"contact '{name}' has '{primary.group}' on both sides: name the group of the other body as one of them; contact "
+            "of a surface with itself is not available"
         )
     shared = np.intersect1d(secondary.points, primary.points)
     if excluded is not None:

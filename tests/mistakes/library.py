@@ -396,7 +396,7 @@ CONTACT = [
     Mistake("contact inside a body", lambda: inner_contact(), fc.ContactError,
             r"1 of 1 facets of 'INNER' do not lie on the outside of a solid \(first near \[.*\]\): contact needs boundary facets that share their nodes with solid cells"),
     Mistake("one group on both sides", lambda: pair_of("CONT_UPPER", "CONT_UPPER"), fc.ContactError,
-            r"contact 'pair' has 'CONT_UPPER' on both sides: name the group of the other body as one of them"),
+            r"contact 'pair' has 'CONT_UPPER' on both sides: name the group of the other body as one of them; contact of a surface with itself is not available"),
     Mistake("sides that overlap", lambda: pair_of("UPPER_LEFT", "CONT_UPPER"), fc.ContactError,
             r"the two sides of contact 'pair' share 1 nodes \(first: point \d+\): duplicate the nodes of the interface, one set for each side"),
     Mistake("the same pair twice", lambda: blocks().add_contact("again", secondary="CONT_LOWER", primary="CONT_UPPER"),

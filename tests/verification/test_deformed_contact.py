@@ -144,7 +144,7 @@ def test_a_ring_held_by_contact_alone_is_that_of_symmetry() -> None:
     assert volume(ring(False).mesh, moved) == pytest.approx(volume(ring(False).mesh, points), rel=1e-3)
 
 
-def groove(friction: float) -> fc.Model:
+def groove(friction: float, ramp: list[tuple[float, float]] | None = None) -> fc.Model:
     """Return an O-ring that the four walls of a groove hold: the inner one stretches it, the lid squeezes it by a quarter."""
     part = fc.generate.quarter_disc("tri6", R=2.5, size=0.7, contact_size=0.7)
     part = fc.generate.renamed(part, {"CONT1": "UPPER", "D1B1": "UPPER"})
@@ -154,6 +154,7 @@ def groove(friction: float) -> fc.Model:
     mesh = fc.generate.merge_points(fc.generate.union(upper, lower), 1e-6)
     mesh = fc.generate.transformed(mesh, translate=(25.0, 0.0))
     mesh = mesh.with_facet_group("CORD", lambda x: np.hypot(x[:, 0] - 25.0, x[:, 1]) > 2.4)
+    mesh = mesh.with_facet_group("INSIDE", lambda x: np.hypot(x[:, 0] - 22.5, x[:, 1]) < 0.9)
     model = fc.Model(mesh, "axisymmetric", strain="finite")
     model.add_material(fc.NeoHookean(E=6.0, nu=0.4995))
     for name, side, point, normal, motion in (
@@ -163,7 +164,7 @@ def groove(friction: float) -> fc.Model:
         ("outer", "CORD", (28.3, 0.0), (-1.0, 0.0), None),
     ):
         wall = fc.obstacles.HalfSpace(point=point, normal=normal)
-        model.add_obstacle(name, secondary=side, obstacle=wall, motion=motion, friction=friction)
+        model.add_obstacle(name, secondary=side, obstacle=wall, motion=motion, ramp=ramp, friction=friction)
     return model
 
 
@@ -184,6 +185,42 @@ def test_a_ring_in_a_groove_rubs_on_four_walls(steps: int) -> None:
         assert np.linalg.norm(wall.shear, axis=1) == pytest.approx(0.1 * wall.pressure, rel=1e-6, abs=1e-9)
     moved = model.mesh.points + last.displacement
     assert volume(model.mesh, moved) == pytest.approx(volume(model.mesh, model.mesh.points), rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:contact .* elements across its radius")
+@pytest.mark.parametrize("steps", first_of(1, [5, 12, 1]))
+def test_a_ring_in_a_groove_without_friction(steps: int) -> None:
+    """The forces on lid and floor are equal for any number of steps; the walls of the groove push along x alone."""
+    contact = fc.solve(groove(0.0), steps)[-1].contact
+    assert contact["lid"].normal_force == pytest.approx(1151.585, rel=1e-5)
+    assert contact["floor"].force[1] == pytest.approx(contact["lid"].normal_force, rel=1e-6)
+    assert all(abs(contact[name].force[1]) < 1e-9 for name in ("inner", "outer"))
+    assert all(contact[name].normal_force > 50.0 for name in ("inner", "outer"))
+
+
+@pytest.mark.filterwarnings("ignore:contact .* elements across its radius")
+def test_fluid_pushes_a_ring_with_friction_across_its_groove() -> None:
+    """Squeezed, then pressurised; at the front of the fluid a node may be neither wet nor dry.
+
+    What the fluid adds to the push of the ring on the outer wall is its pressure over the height, less friction.
+    """
+    model, ramps = groove(0.1, ramp=[(0.0, 0.0), (1.0, 1.0), (2.0, 1.0)]), [(0.0, 0.0), (1.0, 0.0), (2.0, 1.0)]
+    for name in ("floor", "lid"):
+        model.add_fluid_pressure(name, 2.0, source="INSIDE", ramp=ramps)
+    steps = fc.solve(model, [0.5, 1.0, 2.0])
+    before, contact = (step.contact for step in steps[1:])
+    push = [
+        (c["outer"].normal_force / 28.3 - c["inner"].normal_force / 22.7) / (2.0 * np.pi) for c in (before, contact)
+    ]
+    rubs = 0.1 * (contact["lid"].normal_force + before["lid"].normal_force) / (np.pi * 25.0)  # both walls, turned round
+    assert 2.0 * 3.75 - rubs < push[1] - push[0] < 2.0 * 3.75
+    assert sum(c.force[1] for c in contact.values()) == pytest.approx(0.0, abs=1e-6 * contact["lid"].normal_force)
+    assert contact["lid"].fluid_pressure.max() == pytest.approx(2.0)
+    assert contact["lid"].pressure_max - before["lid"].pressure_max > 0.5 * 2.0  # the ring seals by itself
+    dry = contact["lid"].fluid_pressure == 0.0
+    shear = np.linalg.norm(contact["lid"].shear, axis=1)
+    assert (shear[dry] <= 0.1 * contact["lid"].pressure[dry] + 1e-6).all()
+    assert abs(steps[-1].work["imbalance"]) < 0.01 * steps[-1].work["external_work"]
 
 
 def volume(mesh: fc.Mesh, points: np.ndarray) -> float:
