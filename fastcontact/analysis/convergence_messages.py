@@ -66,7 +66,8 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
 
 def no_contact_stops(bodies: FloatingBodies) -> str:
     """Return the message for loads that separate bodies."""
-    return f"the loads pull bodies away, and no contact stops them ({grouped(bodies.names)}): reverse the loads or add supports"
+    motions = grouped(bodies.names)
+    return f"the loads pull bodies away, and no contact stops them ({motions}): reverse the loads or add supports"
 
 
 def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:

@@ -23,7 +23,7 @@ from fastcontact.mesh import generate
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
-from fastcontact.model.ramp import Ramp, linear_ramp
+from fastcontact.model.ramp import Ramp, linear_ramp, ramp_of
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import known_units
 
@@ -325,9 +325,8 @@ def _ramp(data: dict[str, Any]) -> Ramp:
     wrong = [t for t in data["instants"] if isinstance(t, bool) or not isinstance(t, NUMBER)]
     if wrong:
         raise CaseError(f"ramp.instants contains {wrong[0]!r}, which is not a number")
-    instants = tuple(float(t) for t in data["instants"])
-    table = points(data["table"]) if "table" in data else ((0.0, 0.0), (1.0, 1.0))
-    return Ramp(instants, table)
+    instants = [float(t) for t in data["instants"]]
+    return Ramp(tuple(instants), points(data["table"])) if "table" in data else ramp_of(instants)
 
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:

@@ -121,6 +121,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "force": float(np.linalg.norm(contact.force)),
         "force_vector": contact.force.tolist(),
         "radius": _plain(contact.radius),
+        "extent": contact.extent,
         "pressure_max": contact.pressure_max,
         "middle": contact.middle.tolist(),
         "closed_nodes": int(contact.active.sum()),
@@ -269,7 +270,7 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
         force += f", normal {valued(contact['normal_force'], unit, 'force', 6)} all round"
     yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
-        f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(inside, outside, unit)}"
+        f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(contact['extent'], inside, outside, unit)}"
     )
     if any(contact["obstacle_displacement"] or ()):
         moved = ", ".join(f"{value:.6g}" for value in contact["obstacle_displacement"])
@@ -288,13 +289,13 @@ def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str
         )
 
 
-def _edge(inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
-    """Return the radius of a contact as text; `outside` is None if the contact extends to the end of the surface."""
+def _edge(extent: str, inside: float | None, outside: float | None, unit: Mapping[str, str]) -> str:
+    """Return the radius or half-width of a contact, its `extent`, as text; `outside` is None at the end of the surface."""
     if inside is None:
         return "open"
     if outside is None:
-        return f"radius {valued(inside, unit, 'length')}, to the end of the surface"
-    return f"radius {inside:.4g} to {valued(outside, unit, 'length')}"
+        return f"{extent} {valued(inside, unit, 'length')}, to the end of the surface"
+    return f"{extent} {inside:.4g} to {valued(outside, unit, 'length')}"
 
 
 def _regularised_line(report: Mapping[str, Any], unit: Mapping[str, str]) -> str:

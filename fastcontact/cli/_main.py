@@ -30,6 +30,7 @@ from fastcontact.errors import ConvergenceError, FastcontactError, printable, un
 log = logging.getLogger("fastcontact")
 _FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
 # Message of argparse for an invalid choice, with the valid names.
+_SEVERAL = re.compile(r"expected \d+ arguments")
 _CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)")
 _NAME = re.compile(r"[\w-]+")
 
@@ -51,6 +52,7 @@ class Parser(argparse.ArgumentParser):
         wrong = _CHOICE.search(message)
         if wrong:
             message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
+        message = _SEVERAL.sub(r"\g<0>, separated by blanks", message)
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
     def print_help(self, file: Any = None) -> None:

@@ -42,6 +42,7 @@ def run(options: argparse.Namespace) -> int:
 def _lines(path: Path) -> list[str]:
     """Return the description of a case and of its checks."""
     from fastcontact.cases.case import read_case
+    from fastcontact.cases.summary import count
 
     case = read_case(path)
     solid = sum(map(len, case.mesh.solids.values()))
@@ -49,7 +50,7 @@ def _lines(path: Path) -> list[str]:
     kinds = ", ".join(case.mesh.solids)
     return [
         f"{case.name}: {case.title}",
-        f"    {kinematics}, {solid} {kinds}, {len(case.ramp)} load steps",
+        f"    {kinematics}, {solid} {kinds}, {count(len(case.ramp), 'load step')}",
         *(f"    checks {check.described()}" for check in case.checks),
     ]
 

@@ -39,7 +39,7 @@ class TooManyColumnsError(ConvergenceError):
     def __init__(self, count: int) -> None:
         super().__init__(
             f"the contact needs {count} columns of the inverse stiffness, a solution each, since its constraints cannot be "
-            f"eliminated: use {CHEAP} and pairs that share no nodes, or the direct solver"
+            f"eliminated or its friction does not settle then: use the direct solver, or {CHEAP} and pairs that share no node"
         )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from fastcontact.elasticity.inertia_loads import Centrifugal
 from fastcontact.elasticity.initial_states import ALWAYS, COMPONENTS
 from fastcontact.elasticity.loads import listed
 from fastcontact.elasticity.nonlinear_materials import NonlinearElastic
@@ -100,6 +101,8 @@ def _supports(model: Any) -> Iterator[str]:
 
 def _load(load: Any) -> str:
     components: Mapping[int, Any] | None = getattr(load, "components", None)
+    if isinstance(load, Centrifugal):
+        return f"speed {load.speed:g} about the axis through {load.origin} along {load.direction}"
     if components is None:
         return ", ".join(map(_value, load.values))
     return ", ".join(f"{'xyz'[axis]} = {_value(value)}" for axis, value in components.items())

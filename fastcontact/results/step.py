@@ -226,6 +226,11 @@ class ContactResult:
         return flat and bool(self.middle[0] == 0.0) and bool(np.array_equal(self.place, np.abs(self.coordinates[:, 0])))
 
     @property
+    def extent(self) -> str:
+        """What `radius` is: "radius", or "half-width" in 2D unless it is measured from the axis."""
+        return "radius" if self.coordinates.shape[1] == 3 or self.measured_from_axis else "half-width"
+
+    @property
     def per_thickness(self) -> bool:
         """Whether forces are per unit thickness, as in plane models."""
         if self.coordinates.shape[1] == 3 or self.measured_from_axis:

@@ -84,6 +84,8 @@ def _inside(entry: Any, key: str | int, path: str) -> Any:
         if not isinstance(entry, list) or key >= len(entry):
             count = len(entry) if isinstance(entry, list) else 0
             raise CaseError(f"'{path}' refers to entry [{key}], counted from [0], and the case has {count} there")
+    elif isinstance(entry, list):
+        raise CaseError(f"'{path}' needs the number of a table before '{key}', such as [0]")
     elif not isinstance(entry, dict) or key not in entry:
         raise CaseError(unknown(f"entry of the case in '{path}'", key, entry if isinstance(entry, dict) else ()))
     return entry[key]

@@ -135,6 +135,22 @@ def test_a_push_beyond_friction_is_told_as_such():
         fc.solve(model, [1.0, 2.0])
 
 
+@pytest.mark.parametrize("along", [0.31, 0.35])
+def test_a_stack_that_slides_in_its_weaker_joint_is_told_as_such(along):
+    """Coulomb's cone in 3D lies between pyramids that differ by 8 %: the first load is between them, the second beyond."""
+    boxes = [
+        prefixed(fc.generate.box((3.0, 3.0, 1.0), (2, 2, 1), "hex8", (0.0, 0.0, z), name=n), n)
+        for z, n in enumerate("AB")
+    ]
+    model = elastic_model(fc.generate.union(*boxes), "3d")
+    model.add_body_force(x=along, z=-1.0)
+    floor = fc.obstacles.HalfSpace(point=(0.0, 0.0, 0.0), normal=(0.0, 0.0, 1.0))
+    model.add_obstacle("floor", secondary="A_ZMIN", obstacle=floor, friction=0.5)
+    model.add_contact("joint", secondary="B_ZMIN", primary="A_ZMAX", friction=0.3)
+    with pytest.raises(fc.ConvergenceError, match=rf"would take about {along / 0.3:.3g} times the coefficients given"):
+        fc.solve(model, 1)
+
+
 def flange(name, bottom):
     """A quarter of a plate with a hole in the midst."""
     mesh = fc.generate.box((1.0, 1.0, 8.0), (4, 12, 2), "hex8", (0.0, 0.0, bottom), name=name)

@@ -321,7 +321,9 @@ class ModelBase:
         cells = np.concatenate([rows + offsets[name] for name, rows in without.items()])
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
         named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
-        raise ModelError(f"{total} solid cells have no material{named}: add_material for their groups")
+        raise ModelError(
+            f"{total} solid cells have no material{named}: give their groups one by add_material or [[material]]"
+        )
 
     def internal_forces(self, displacement: Array) -> Array:
         """Return the internal nodal forces (n_points, dim) [force] of the solid cells at a displacement.

@@ -106,7 +106,7 @@ def contact_map(
         ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, quantity), shrink=0.75 * high)
         _nodes(ax, flat, contact, both)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
-        ax.set_title(f"{caption}, largest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
+        ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
     if both:
         _arrows(panels[1], flat, vectors @ basis.T, size)
     if axes is None:

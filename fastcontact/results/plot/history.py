@@ -92,8 +92,7 @@ def history(
     upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
     along = labelled("approach", units, "length") if approach else "load factor"
-    round_contact = contacts[-1].measured_from_axis or contacts[-1].coordinates.shape[1] == 3
-    size = "contact radius" if round_contact else "half-width of the contact"
+    size = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
     lower.set(xlabel=along, ylabel=labelled(size, units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)

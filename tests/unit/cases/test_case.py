@@ -62,6 +62,12 @@ def test_a_table_alone_sets_the_end_of_the_ramp(write):
     assert case.ramp.value(2.0) == 1.0
 
 
+def test_instants_without_a_table_are_the_multipliers_as_in_python(write):
+    ramp = read_case(write(GOOD.replace("steps = 2", "instants = [1.0, 1.5, 2.0]"))).ramp
+    assert ramp.instants == (1.0, 1.5, 2.0)
+    assert [ramp.value(instant) for instant in ramp.instants] == [1.0, 1.5, 2.0]
+
+
 LOADED = (
     GOOD.split('[[support]]\ngroup = "A2B2"')[0]
     + """

@@ -66,6 +66,10 @@ def test_what_is_written_otherwise_is_told(tmp_path, capsys):
     path.write_text(CASE)
     assert main(["sweep", str(path), "--set", "friction=0.1,0.2", "--json", str(tmp_path / "a.json")]) == 1
     assert capsys.readouterr().err == "error: 'friction' belongs to a pair: write contact.hertz.friction\n"
+    assert main(["sweep", str(path), "--set", "material.E=1,2", "--json", str(tmp_path / "a.json")]) == 1
+    assert capsys.readouterr().err == "error: 'material.E' needs the number of a table before 'E', such as [0]\n"
+    assert main(["mesh", "block", "--size", "2,1", "-o", str(tmp_path / "a.med")]) == 1
+    assert "--size: expected 2 arguments, separated by blanks;" in capsys.readouterr().err
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
