@@ -227,7 +227,7 @@ class _Newton:
 
         Anderson acceleration is used where a regularised tangent makes the iterations converge linearly.
         """
-        if not self._by.linear or FALL * changes[-1] > changes[-2]:
+        if not self._by.linear or DECLINE * changes[-1] > changes[-2]:
             self._mixing.restart()
             return u
         return self._mixing.mixed(before, u)

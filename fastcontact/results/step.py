@@ -96,13 +96,13 @@ class ContactResult:
         Torque about the axis of a rotating rigid obstacle that is in equilibrium with the contact forces, that is their
         moment on the deformable body in the deformed configuration [force times length]; None unless the obstacle rotates.
     middle : ndarray (dim,)
-        Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis; otherwise it is the
-        centre of pressure, moved onto the planes of symmetry that the contact reaches. A plane of symmetry is assumed where
-        supports hold an end of the surface.
+        Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis, unless the surface is
+        parallel to it or closes on itself, as that of an O-ring; otherwise it is the centre of pressure, moved onto the
+        planes of symmetry that the contact reaches. A plane of symmetry is assumed where supports hold an end of the surface.
     place : ndarray (m,)
         Position of each node relative to the `middle` [length]: the radius in axisymmetry; the signed arc length in 2D, and
-        where an axisymmetric surface is parallel to the axis; in 3D the distance from the line through the middle along
-        the mean normal.
+        where an axisymmetric surface is parallel to the axis or closes on itself; in 3D the distance from the line through
+        the middle along the mean normal.
     tangent : ndarray (dim,), optional
         Direction along which half-widths are measured in 2D [-]. It is None in axisymmetry, in 3D, and on a ring in contact
         along its entire circumference, where `place` is used instead.

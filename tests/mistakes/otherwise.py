@@ -49,8 +49,10 @@ OTHERWISE = {
     "no message: the default is used, or nothing happens": (
         "E is missing", "kinematics missing", "pressure without value", "force without component",
         "support without component", "a support without a component", "check without tolerance", "primary side missing",
+        "primary side called master",
     ),
     "the word is ignored, and the default is used": (
+        "friction called mu", "support called fix", "probe by coordinates",
         "key misspelled", "key of a material misspelled", "key of a support misspelled", "contact option misspelled",
         "key of the convergence criteria misspelled", "unknown normals", "option misspelled",
     ),

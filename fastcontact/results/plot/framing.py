@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,6 +12,8 @@ from fastcontact.arrays import Array
 from fastcontact.results.plot._axes import Units
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.units import labelled
+
+LETTER = 0.09  # mean width of a letter of a label [inch]
 
 
 def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
@@ -35,6 +38,8 @@ def framed(
     has no other axes.
     """
     caption, flat = labelled(shown.caption, units, shown.quantity), points is not None
+    if points is not None:
+        caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER))
     axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if points is None else _bar_length(points))
     if flat:
         axes.set_aspect("equal")

@@ -1,9 +1,9 @@
-"""A step that fails where friction is nearly used up says so."""
+"""A step that fails where friction is nearly used up says so; one whose iterations diverge is halved."""
 
 import pytest
 
 import fastcontact as fc
-from fastcontact.analysis import step_halving
+from fastcontact.analysis import newton, step_halving
 
 
 @pytest.mark.parametrize(
@@ -29,3 +29,23 @@ def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
         fc.solve(model, [1.0, 2.0, 3.0])
     assert told in str(failed.value)
     assert bool(told) == ("friction that contact can bear" in str(failed.value))
+
+
+def test_a_verdict_about_a_diverged_iterate_does_not_end_the_analysis(monkeypatch):
+    """An iterate far from equilibrium may seem to lie beyond the friction cone; a smaller step is tried."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4)), kinematics="plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1e4, nu=0.45))
+    model.fix("BOTTOM", "xy")
+    model.add_pressure("TOP", 500.0)
+    solved, calls = newton._Newton._solve, []
+
+    def diverging(self, u, changes):
+        calls.append(len(changes))
+        if len(calls) == 2:
+            raise fc.ConvergenceError("friction cannot hold it", smaller_steps_help=False)
+        return solved(self, u, changes)
+
+    monkeypatch.setattr(newton._Newton, "_solve", diverging)
+    step = fc.solve(model, 1)[-1]
+    assert calls[:3] == [1, 2, 1]
+    assert step.iterations["substeps"][-1] == 1.0

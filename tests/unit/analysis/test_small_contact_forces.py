@@ -1,4 +1,4 @@
-"""Friction with forces that are small relative to the accuracy of linear solutions converges with multigrid."""
+"""Small contact forces: friction converges with multigrid, and contact without force gives no warning about its elements."""
 
 import numpy as np
 import pytest
@@ -39,3 +39,17 @@ def test_forces_that_cannot_be_more_accurate_settle_without_a_compliance(accepta
             assert bool(problem.solver.columns.asked) == (acceptable == 0.0)
     assert np.abs(found["amg"].force - found["direct"].force).max() < 1e-6 * np.abs(found["direct"].force).max()
     assert found["amg"].active.sum() > found["amg"].sticking.sum()
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1.0, True), (0.0, False)], ids=["pressed", "lifted"])
+def test_only_a_contact_that_carries_a_force_is_said_to_be_too_coarse(factor, told, recwarn):
+    """A ball without force still touches one node of the dent that it has left."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4), "quad8"), kinematics="axisymmetric")
+    model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (1.0, 2000.0)]))
+    model.fix("BOTTOM", "y")
+    ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, factor)]
+    ball = fc.obstacles.Sphere((0.0, 3.5), 2.5)
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -300.0}, ramp=ramp)
+    last = fc.solve(model, [1.0, 2.0])[-1]
+    assert last.contact["ball"].active.any()
+    assert any("element across" in w or "elements across" in w for w in last.warnings) == told

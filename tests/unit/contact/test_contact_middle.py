@@ -223,3 +223,21 @@ def test_the_command_writes_places_from_the_middle(tmp_path):
     np.testing.assert_allclose([float(row["place"]) for row in rows], contact.place)
     assert "middle of the contact" in files["agr"].read_text()
     assert files["png"].read_bytes()[:4] == b"\x89PNG"
+
+
+def test_the_contact_of_an_o_ring_is_measured_along_its_surface():
+    """Two points of its cross-section have the same radius, which places neither."""
+    half = fc.generate.renamed(fc.generate.quarter_disc("tri6", R=2.5, size=0.5), {"CONT1": "SKIN", "D1B1": "SKIN"})
+    half = fc.generate.transformed(half, translate=(0.0, 2.5))
+    whole_half = fc.generate.union(half, fc.generate.mirrored(half, "x"))
+    mesh = fc.generate.merge_points(fc.generate.union(whole_half, fc.generate.mirrored(whole_half, "y")), 1e-6)
+    mesh = fc.generate.transformed(mesh, translate=(25.0, 0.0))
+    model = elastic_model(mesh, "axisymmetric", E=1000.0, A1B1="y")
+    lid = fc.obstacles.HalfSpace((0.0, float(mesh.points[:, 1].max())), (0.0, -1.0))
+    model.add_obstacle("lid", secondary="SKIN", obstacle=lid, motion={"y": -0.1})
+    contact = fc.solve(model, 1)[-1].contact["lid"]
+    place, angle = contact.place, np.arctan2(*(contact.coordinates - mesh.points.mean(axis=0)).T)
+    assert not contact.measured_from_axis
+    assert contact.middle == pytest.approx([25.0, mesh.points[:, 1].max()], abs=0.05)
+    np.testing.assert_allclose(np.abs(place), 2.5 * np.abs(angle), atol=0.05)
+    assert np.abs(place[contact.active]).max() < contact.radius[1] < 1.0

@@ -102,3 +102,12 @@ def test_the_stress_along_normals_in_space_is_that_of_the_tensor():
     moved = np.zeros((9, 3))
     step = fc.StepResult(1, 1.0, moved, stress, np.zeros(9), np.zeros(9), moved)
     np.testing.assert_allclose(normal_stress(contact, step), -np.arange(6.0), atol=1e-14)
+
+
+@pytest.mark.parametrize(("iterations", "reach"), [({"parameter": "frequency"}, 1.1), ({}, 51.0)], ids=["mode", "load"])
+def test_a_mode_shape_is_drawn_at_a_tenth_of_the_size_of_the_mesh(iterations, reach):
+    mesh = block((1.0, 0.5), (4, 2))
+    step = step_of(mesh, mesh.points[:, 0], 50.0 * mesh.points)
+    step.iterations.update(iterations)
+    ax = fc.plot.deformed_shape(mesh, step)
+    assert max(path.vertices[:, 0].max() for path in ax.collections[0].get_paths()) == pytest.approx(reach, rel=1e-6)

@@ -1,5 +1,6 @@
 """MED files: compared with the MED library and medcoupling, files of code_aster, and round trips."""
 
+import dataclasses
 import json
 import shutil
 import subprocess
@@ -365,6 +366,13 @@ def test_contact_pressure_is_zero_off_the_contact(tmp_path):
     expected = np.zeros((3, mesh.n_points, 1))
     expected[:, [1, 4], 0] = np.outer([1, 2, 3], [2.5, 0.5])
     np.testing.assert_array_equal(read_med_field(path, "PRES_CONT")[1], expected)
+
+
+def test_temperatures_are_written_where_heat_is_conducted(tmp_path):
+    mesh, path = all_elements(), tmp_path / "hot.med"
+    hot = np.linspace(20.0, 80.0, mesh.n_points)
+    write_med_results(path, mesh, [dataclasses.replace(step, temperature=hot) for step in some_steps(mesh)])
+    np.testing.assert_array_equal(read_med_field(path, "TEMP")[1], np.tile(hot[:, None], (3, 1, 1)))
 
 
 # Layouts that we do not write ---------------------------------------------------------------------
