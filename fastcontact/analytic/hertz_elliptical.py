@@ -89,7 +89,7 @@ def _ratio_of_axes(ratio_of_radii: float) -> float:
         return 1.0
     if ratio_of_radii > _ratio_of_radii(_FLATTEST):
         raise ModelError(
-            f"the relative radii differ by a factor of {ratio_of_radii:g}, so this is a line contact: use hertz_line"
+            f"the relative radii differ by a factor of {ratio_of_radii:g}: use hertz_line for line contact"
         )
     goal = math.log(ratio_of_radii)
     return math.exp(

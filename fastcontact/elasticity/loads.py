@@ -285,9 +285,7 @@ def facets_of(mesh: Mesh, group: str) -> dict[str, Numbers]:
         raise ModelError(f"group '{group}' contains only points: this load needs a group of facets")
     blocks = mesh.cells_of(group, dim=mesh.dim - 1)
     if not blocks:
-        raise ModelError(
-            f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}) that a load can act on"
-        )
+        raise ModelError(f"group '{group}' contains no facets (cells of dimension {mesh.dim - 1}) for a load to act on")
     once = {name: np.unique(np.sort(block, axis=1), axis=0, return_index=True)[1] for name, block in blocks.items()}
     return {name: block[np.sort(once[name])] for name, block in blocks.items()}
 

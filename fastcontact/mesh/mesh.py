@@ -226,9 +226,7 @@ class Mesh:
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
         if not self.group_names:
-            return (
-                f"the mesh has no groups, and thus no '{group}': define groups in the mesher, or with Mesh.with_groups"
-            )
+            return f"the mesh has no groups, and thus no '{group}': add groups in the mesher, or with Mesh.with_groups"
         return unknown(kind, group, known)
 
     def point(self, group: str) -> int:

@@ -131,9 +131,7 @@ class Results(StepSequence):
             raise ValueError("its addresses are not ours")
         check_contents(self._file, self.path)
         if "fastcontact" not in self._file:
-            raise FileError(
-                f"'{self.path}' contains no fastcontact results: name a file that fastcontact wrote (.vtkhdf)"
-            )
+            raise FileError(f"'{self.path}' has no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
         self.schema = _integer(self._file["fastcontact"], "schema")
         if self.schema > layout.SCHEMA:
             raise FileError(

@@ -119,9 +119,7 @@ def fit_limit(h: ArrayLike, values: ArrayLike) -> Limit:
 def _checked(h: ArrayLike, values: ArrayLike) -> tuple[Array, Array]:
     size, value = np.asarray(h, np.float64), np.asarray(values, np.float64)
     if size.shape != value.shape or size.ndim != 1:
-        raise CaseError(
-            f"mesh sizes and values must be two lists of the same length, not {size.shape} and {value.shape}"
-        )
+        raise CaseError(f"mesh sizes and values must be lists of equal length, not {size.shape} and {value.shape}")
     finite = np.isfinite(value)
     size, value = size[finite], value[finite]
     if len(value) < 3:

@@ -179,7 +179,7 @@ MESH = [
     Mistake("a duplicate cell", lambda: of_square(cells=lambda c: np.vstack([c, c[1]])), fc.MeshError,
             r"cell 1 \(quad4 at \(0\.25, 0\.75\)\) occurs in the mesh 2 times, one of 1 such cells: remove the copies"),
     Mistake("a mesh without groups", lambda: blocks(changed(cell_groups={}, point_groups={})), fc.MeshError,
-            r"the mesh has no groups, and thus no 'LOWER_BOTTOM': define groups in the mesher, or with Mesh\.with_groups"),
+            r"the mesh has no groups, and thus no 'LOWER_BOTTOM': add groups in the mesher, or with Mesh\.with_groups"),
     Mistake("a mesh of facets only", lambda: fc.Model(fc.Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}), "plane_strain"),
             fc.ModelError, r"the mesh has no solid cells, only line2"),
     Mistake("3D faces without solids",

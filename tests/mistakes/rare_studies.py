@@ -146,7 +146,7 @@ CALLS = [
     ("formulations without contact", lambda: combinations(replace(settings(read_case("forma04a")), pair=None), None, ["mortar"]), fc.errors.CaseError, r"this case has no contact pair, so there are no formulations to compare"),
     ("a law beyond all numbers", lambda: by_law("value^400", 1e300, "study.parameters.a"), fc.errors.CaseError, r"study\.parameters\.a = 'value\^400' is too large a number for 1e\+300"),
     ("adaptive meshes in space", lambda: adaptive_study(solid_case(), tolerance=0.1), fc.errors.CaseError, r"adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D"),
-    ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be two lists of the same length, not \(2,\) and \(1,\)"),
+    ("sizes without values", lambda: fit.fit_limit([1.0, 0.5], [1.0]), fc.errors.CaseError, r"mesh sizes and values must be lists of equal length, not \(2,\) and \(1,\)"),
     ("a limit of two meshes", lambda: fit.fit_limit([1.0, 0.5], [1.0, 2.0]), fc.errors.CaseError, r"a limit needs the values of at least 3 meshes, not 2: compute more levels"),
     ("one size twice", lambda: fit.fit_limit([1.0, 0.5, 0.5], [1.0, 2.0, 3.0]), fc.errors.CaseError, r"the mesh sizes must be positive and all different, not \[1\.0, 0\.5, 0\.5\]"),
     ("refining nothing", lambda: make_mesh({"refinements": 1, "element": None, "curves": None}, None), fc.errors.FastcontactError, r"a mesh that is refined needs the mesh to start from"),

@@ -627,7 +627,7 @@ def test_files_that_are_no_results(tmp_path: Path, path: Path) -> None:
         open_results(path)
     with h5py.File(path, "w") as file:
         file.create_group("VTKHDF")
-    with pytest.raises(FileError, match="contains no fastcontact results"):
+    with pytest.raises(FileError, match="has no fastcontact results"):
         open_results(path)
 
 
