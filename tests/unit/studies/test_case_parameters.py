@@ -46,7 +46,7 @@ def test_a_name_sets_several_paths_by_their_laws():
         ("contact.pear.friction", "'pair'"),
         ("mesh.arc_sizes", "name a single value"),
         ("contact.pair", "name a single value"),
-        ("material.E", "unknown entry"),
+        ("material.E", r"the number of a table before 'E', such as \[0\]"),
         ("material[0].E.x", "unknown entry"),
         ("a..b", "not a path"),
         ("material[x].E", "not a path"),
