@@ -23,6 +23,8 @@ from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.errors import ConvergenceError
 
 log = logging.getLogger("fastcontact")
+# Smallest number of pairings after which nodes are assumed to alternate between facets: edges are then rounded.
+PATIENT_UPDATES = 25
 # Safety factor of the contraction that is expected of the next solution, relative to that of the last Newton step.
 SAFETY = 3.0
 
@@ -153,7 +155,7 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
         mixed = mixing.next(settled, moved, displacement, tolerances)
         iterate.u = iterate.u if mixed is None else step.dofs.put(iterate.u, mixed)
         tolerances.tighten(moved.relative, solution.residual)
-        if update == limit // 2 and any(pair.faceted for pair in problem.pairs.values()):
+        if update == max(limit // 2, PATIENT_UPDATES) and any(pair.faceted for pair in problem.pairs.values()):
             log.info("nodes flip between facets: from now on the edges of facets are rounded")
             iterate.rounded = True
             mixing.restart()
