@@ -261,7 +261,8 @@ class _Newton:
             loaded = begin.loaded if first else with_loads(self._problem, self._load)
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         # Forces on a floating body that moves do not balance while springs along gaps do not resist its motion.
-        self._replaces |= self._by.held > 0.0 and changes[-1] > changes[-2] > min(changes[:-2], default=np.inf)
+        if self._by.held and changes[-1] > changes[-2] > min(changes):
+            self._replaces = True
         failed: Exception | None = None
         for by in self._regularisations():
             try:
@@ -287,7 +288,7 @@ class _Newton:
         whole = [
             Regularisation(stiff=stiff) for stiff in (False, True)[: 1 + (floats and self._problem.solver.iterative)]
         ]
-        replaces = self._replaces or (closed and settled.constraints.tangents != ())
+        replaces = self._replaces or (settled is not None and settled.constraints.tangents != ())
         held = [Regularisation(held=k, stiff=floats, replaces=replaces) for k in HELD] if closed else []
         if self._by in held:
             held.remove(self._by)
