@@ -47,8 +47,11 @@ WATCH_CONTRAST_FROM = 6
 # new hierarchy, too.
 CHANGE = 15
 # A nonsymmetric solution whose initial guess is accurate already is iterated further: until the residual has fallen by the
-# factor WARM, or to WARM_LEAST times its tolerance, in at most MOST_WARM iterations.
+# factor WARM, or to WARM_LEAST times its tolerance, with at most MOST_WARM iterations after the tolerance is reached. If
+# equations stiffen nodes strongly, the latter number is doubled, up to LONGEST_WARM, each time that the residual at the
+# next start is larger than STOOD times the residual at the last start.
 WARM, WARM_LEAST, MOST_WARM = 0.05, 1e-3, 10
+STOOD, LONGEST_WARM = 0.2, 40
 # If the smoother amplifies a vector, the upper bounds of the eigenvalues are multiplied by RAISE, at most RAISES times.
 RAISE, RAISES = 1.3, 4
 
@@ -101,6 +104,11 @@ class Multigrid:
         self._renewed = False
         # Whether coarser levels of an earlier matrix serve for later ones, shared by all copies.
         self._lasting = [True]
+        self.begin()
+
+    def begin(self) -> None:
+        """Reset the statistics of warm starts for a new load step."""
+        self._most_warm, self._cut_short = MOST_WARM, np.inf
 
     @property
     def nbytes(self) -> int:
@@ -339,9 +347,14 @@ class Multigrid:
         therefore continues for some iterations, see WARM, or until the norm of the residual is `aim`, if that is smaller.
         """
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
+        begun = iteration.norm
+        if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
+            self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
+        self._cut_short = np.inf
         while iteration.norm > wanted:
             done = iteration.norm <= enough
-            if done and made >= MOST_WARM:
+            if done and made >= self._most_warm:
+                self._cut_short = begun
                 return
             if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
                 if done:

@@ -86,6 +86,7 @@ class Amg(Multigrid, LinearSolver):
 
     def load(self, f: Array) -> Loaded:
         """Return the prepared matrix with the right-hand side `f` (n,) [force], and reset the limit of work."""
+        self.begin()
         self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
 
