@@ -60,7 +60,7 @@ class Sweep(Report):
         return list(dict.fromkeys(name for point in self.points for name in point.values))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the sweep as numbers, texts, lists and dictionaries, as ``--json`` writes it; differences are relative."""
+        """Return the sweep as numbers, strings, lists and dictionaries, as ``--json`` writes it; differences are relative."""
         numbers = {
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},

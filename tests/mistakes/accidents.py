@@ -39,7 +39,7 @@ def pipe(patch, folder):
 # fmt: off
 ACCIDENTS = [
     ("the disk is full", full_disk, ["run", "case.toml"],
-     r"'.*case\.vtkhdf' cannot be written \(No space left on device\): see whether the disk is full"),
+     r"'.*case\.vtkhdf' cannot be written \(No space left on device\): check the disk space"),
     ("the folder is write-protected", protected_folder, ["run", "case.toml"],
      r"folder '.*' is write-protected: name a file in another folder"),
     ("the result file is write-protected", protected_file, ["run", "case.toml", "-o", "old.vtkhdf"],
