@@ -114,7 +114,7 @@ def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
 
 
 def _diameters(text: str | None) -> dict[str, Any]:
-    """Return the argument of `fastcontact.modes` for a text such as ``0,1,2`` or ``all``; CaseError for other texts."""
+    """Return the argument of `fastcontact.modes` for a string such as ``0,1,2`` or ``all``; CaseError for other strings."""
     if text is None:
         return {}
     try:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from fastcontact.errors import CaseError, FastcontactError, FileError
 
-# Largest size in bytes and largest number of files of a deck with all included files; a larger deck is taken for an error.
+# Largest size in bytes and largest number of files of a deck with all included files; a larger deck is treated as an error.
 LARGEST = 1 << 28
 MOST_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
