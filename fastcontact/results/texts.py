@@ -1,8 +1,8 @@
 """Strings of variable length in a result file, read without HDF5, which does not terminate for some damaged files.
 
-Such a string is stored in a global heap collection, which consists of a header of 16 bytes with the size of the collection and
-a sequence of objects. Each object has a header of 16 bytes with its number and its size (HDF5 File Format Specification 3.0,
-section III.E).
+Such a string is stored in a global heap collection, which consists of a header of 16 bytes with the size of the collection
+and a sequence of objects. Each object has a header of 16 bytes with its number and its size (HDF5 File Format Specification
+3.0, section III.E).
 """
 
 from __future__ import annotations

@@ -351,14 +351,14 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
-        there = inside and target.is_file()
+        exists = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
         raise block.refuse(f"'{shown}' is not a file name") from None
     if not inside:
         raise block.refuse(
             f"'{shown}' is outside the folder of the deck: copy the file into or below '{source.folder}'"
         )
-    if not there:
+    if not exists:
         raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"
