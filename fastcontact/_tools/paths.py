@@ -35,7 +35,7 @@ def existing_file(path: PathLike) -> Path:
     if not file.exists():
         raise FileError(f"there is no file '{path}': check its name and the folder you are in")
     if not file.is_file():
-        raise FileError(f"'{path}' is a device or a pipe: name a plain file")
+        raise FileError(f"'{path}' is a device or a pipe: name a regular file")
     return file
 
 
@@ -46,14 +46,14 @@ def checked_target(path: PathLike) -> Path:
     except ValueError as error:  # a null byte
         raise FileError(f"{os.fspath(path)!r} cannot be the name of a file ({error}): choose another name") from error
     if descriptor(path) is not None:
-        raise FileError(f"'{path}' is a stream: name a plain file")
+        raise FileError(f"'{path}' is a stream: name a regular file")
     try:
         if target.is_dir():
             raise FileError(f"'{target}' is a folder: name a file in it")
         if not target.parent.is_dir():
             raise FileError(f"folder '{target.parent}' does not exist: create it or name another file")
         if target.exists() and not target.is_file():
-            raise FileError(f"'{target}' is a device or a pipe: name a plain file")
+            raise FileError(f"'{target}' is a device or a pipe: name a regular file")
         if target.exists() and not _may_write(target):
             raise FileError(f"'{target}' is write-protected: remove the protection or name another file")
     except OSError as error:

@@ -49,6 +49,6 @@ ACCIDENTS = [
     ("the result file exists and is something else", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
      r"'.*text\.vtkhdf' exists and is not a result file: name another file or remove it first"),
     ("the result file is a pipe", pipe, ["run", "case.toml", "-o", "pipe.vtkhdf"],
-     r"'.*pipe\.vtkhdf' is a device or a pipe: name a plain file"),
+     r"'.*pipe\.vtkhdf' is a device or a pipe: name a regular file"),
 ]
 # fmt: on

@@ -182,7 +182,7 @@ def test_a_pipe_is_no_result_file(whole, path, capsys):
     os.mkfifo(path)
     for extra in ([], ["--resume"]):
         assert run(whole[0], path, *extra) == 1
-        assert only_line(capsys.readouterr().err) == f"error: '{path}' is a device or a pipe: name a plain file"
+        assert only_line(capsys.readouterr().err) == f"error: '{path}' is a device or a pipe: name a regular file"
     assert path.is_fifo()
 
 
