@@ -1,4 +1,4 @@
-"""Exceptions and warnings of fastcontact, and the texts of messages about unknown names."""
+"""Exceptions and warnings of fastcontact, and messages about unknown names."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LONGEST = 1500  # largest number of characters of a message
 
 
 def printable(text: str) -> str:
-    """Return a text in which escapes replace control and format characters, except line ends and tabs."""
+    """Return a string in which escapes replace control and format characters, except line ends and tabs."""
     if text.isprintable():
         return text
     return "".join(c if c.isprintable() or c in "\n\t" else c.encode("unicode_escape").decode() for c in text)
@@ -111,7 +111,7 @@ def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError
         return AttributeError(text)
     near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
     remedy = ": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
-    return AttributeError(text + remedy, name=name, obj=text)  # a text as `obj` prevents suggestions by Python
+    return AttributeError(text + remedy, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:

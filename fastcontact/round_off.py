@@ -1,4 +1,4 @@
-"""Relative tolerances for round-off, below which values are taken for zero."""
+"""Relative tolerances for round-off, below which values are treated as zero."""
 
 from __future__ import annotations
 

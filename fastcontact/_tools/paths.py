@@ -16,7 +16,7 @@ from pathlib import Path
 from fastcontact.errors import FileError
 
 PathLike = str | os.PathLike[str]
-# Paths of the open files of this process.
+# Paths that name an open file of this process by its descriptor.
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/(?:self|thread-self|\d+))/fd/(\d+)")
 
 
@@ -35,7 +35,7 @@ def existing_file(path: PathLike) -> Path:
     if not file.exists():
         raise FileError(f"there is no file '{path}': check its name and the folder you are in")
     if not file.is_file():
-        raise FileError(f"'{path}' is a device or a pipe: name a plain file")
+        raise FileError(f"'{path}' is a device or a pipe: name a regular file")
     return file
 
 
@@ -44,16 +44,16 @@ def checked_target(path: PathLike) -> Path:
     try:
         target = Path(os.path.realpath(os.fspath(path)))
     except ValueError as error:  # a null byte
-        raise FileError(f"{os.fspath(path)!r} cannot be the name of a file ({error}): name another one") from error
+        raise FileError(f"{os.fspath(path)!r} cannot be the name of a file ({error}): choose another name") from error
     if descriptor(path) is not None:
-        raise FileError(f"'{path}' is a stream: name a plain file")
+        raise FileError(f"'{path}' is a stream: name a regular file")
     try:
         if target.is_dir():
             raise FileError(f"'{target}' is a folder: name a file in it")
         if not target.parent.is_dir():
             raise FileError(f"folder '{target.parent}' does not exist: create it or name another file")
         if target.exists() and not target.is_file():
-            raise FileError(f"'{target}' is a device or a pipe: name a plain file")
+            raise FileError(f"'{target}' is a device or a pipe: name a regular file")
         if target.exists() and not _may_write(target):
             raise FileError(f"'{target}' is write-protected: remove the protection or name another file")
     except OSError as error:
@@ -92,9 +92,9 @@ def _may_write(path: Path) -> bool:
 def replacing(path: PathLike) -> Iterator[Path]:
     """Yield an empty temporary file beside `path`, which replaces it on success and is removed after a failure.
 
-    Its name is unpredictable and the file is new, so that no prepared link is followed. It is synchronised to disk before it
-    replaces `path`. Output to a stream such as ``/dev/stdout`` is appended to it. Errors of the operating system are raised
-    as FileError.
+    Its name is unpredictable and the file is new, so that no link placed there beforehand is followed. It is synchronised to
+    disk before it replaces `path`. If `path` is a stream such as ``/dev/stdout``, a new file in a temporary folder is yielded
+    instead, and then copied to the stream. Errors of the operating system, except a broken pipe, are raised as FileError.
     """
     if is_stream(path):
         with tempfile.TemporaryDirectory() as folder:
@@ -113,7 +113,7 @@ def replacing(path: PathLike) -> Iterator[Path]:
         _synchronise(target.parent)
     except OSError as error:
         raise FileError(
-            f"'{path}' cannot be written ({error.strerror or error}): see whether the disk is full or the folder protected"
+            f"'{path}' cannot be written ({error.strerror or error}): check the disk space and the permissions of the folder"
         ) from error
     finally:
         with contextlib.suppress(OSError):

@@ -14,7 +14,7 @@ LONG_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+
 
 
 def parsed(text: str) -> dict[str, Any]:
-    """Return the tables of a text.
+    """Return the tables of a string in TOML format.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def parsed(text: str) -> dict[str, Any]:
 
 
 def written(data: Any) -> str:
-    """Return data as a text from which `parsed` recovers the data; ValueError for data that TOML cannot express."""
+    """Return data as a string from which `parsed` recovers the data; ValueError for data that TOML cannot express."""
     return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in data.items())
 
 

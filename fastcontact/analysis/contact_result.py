@@ -136,26 +136,26 @@ def _forces(
     pair: Formulation, constraints: Constraints, multiplier: Array, tangential: Array | None
 ) -> tuple[Array, Array, Numbers, Array]:
     """Return forces on secondary nodes, their sum, and primary nodes with their forces if nodes carry them there [force]."""
-    everywhere = constraints.force(multiplier, tangential).reshape(-1, pair.points.shape[1])
+    nodal_forces = constraints.force(multiplier, tangential).reshape(-1, pair.points.shape[1])
     opposite = pair.primary.points if isinstance(pair.primary, Surface) else np.empty(0, np.int32)
-    forces = np.where(np.isin(pair.secondary.points, opposite)[:, None], 0.0, everywhere[pair.secondary.points])
+    forces = np.where(np.isin(pair.secondary.points, opposite)[:, None], 0.0, nodal_forces[pair.secondary.points])
     total = forces.sum(axis=0)
     if pair.axisymmetric:
         total[0] = 0.0  # radial forces cancel over the full circle
-    return forces, total, opposite, everywhere[opposite]
+    return forces, total, opposite, nodal_forces[opposite]
 
 
 def _along_the_surface(
     constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed_nodes: _Closed
 ) -> tuple[Array, Mask, Array | None]:
     """Return nodal tractions (n_nodes, dim) [pressure], nodes that stick, and forces (m, k) of friction [force]."""
-    multiplier, everywhere = solution.multiplier[rows], np.ones(len(normal), bool)
+    multiplier, all_nodes = solution.multiplier[rows], np.ones(len(normal), bool)
     if constraints.tied is not None and constraints.tied.directions:
         _, tangential = constraints.tied.forces(multiplier)
         shear = _nodal_shear(constraints, constraints.tied.directions, tangential, normal)
-        return np.where(closed_nodes.nodes[:, None], shear, 0.0), everywhere, None
+        return np.where(closed_nodes.nodes[:, None], shear, 0.0), all_nodes, None
     if not (isinstance(solution, FrictionalEquilibrium) and constraints.tangents):
-        return np.zeros_like(normal), everywhere, None
+        return np.zeros_like(normal), all_nodes, None
     tangential = solution.tangential[rows]
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
     sticking = _mostly_sticking(constraints, solution.sticking[rows], multiplier, constraints.pressure(multiplier))

@@ -91,8 +91,10 @@ def _beside_contact(
         depth[held | faced] = 0.0
         row = int(np.argmax(depth))
         if depth[row] > limit and depth[row] - _at_rest(problem, entries, int(points[row])) > limit:
-            what = " and ".join(body_name(mesh, body, number) for number in sorted(both))
-            texts.append(_lacking(problem, names[0], f"bodies {what} pass through each other", depth[row], points[row]))
+            label = " and ".join(body_name(mesh, body, number) for number in sorted(both))
+            texts.append(
+                _lacking(problem, names[0], f"bodies {label} pass through each other", depth[row], points[row])
+            )
     return texts
 
 

@@ -163,7 +163,7 @@ class _Newton:
             except ConvergenceError as error:
                 if not history or error.smaller_steps_help:
                     raise
-                log.info("an iterate is refused: %s", error)  # which says nothing about the equilibrium
+                log.info("an iterate is rejected: %s", error)  # which says nothing about the equilibrium
                 break
             u, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)

@@ -171,8 +171,8 @@ def _frame(constraints: StackedConstraints, interfaces: Sequence[PeriodicInterfa
     frame = np.stack(constraints.directions, axis=1) if constraints.directions else np.zeros((m, 0, dim))
     for interface in interfaces:
         if interface.turn is not None and constraints.nodes is not None:
-            there = np.isin(constraints.nodes, interface.second)
-            frame[there] = frame[there] @ interface.turn
+            at_second = np.isin(constraints.nodes, interface.second)
+            frame[at_second] = frame[at_second] @ interface.turn
     return frame
 
 

@@ -155,9 +155,9 @@ def _gaps(step: StepContext, constraints: StackedConstraints, iterate: Iterate) 
     """Return the gaps (m,) at the beginning of the step, in the configuration of that time [length]."""
     state = step.state
     begin = replace(step.load, obstacles=state.obstacles, angles=state.angles)
-    there = pair_surfaces(step.problem, state, begin, Iterate.of(state))
+    initial = pair_surfaces(step.problem, state, begin, Iterate.of(state))
     gaps = []
-    for name, part in there.parts.items():
+    for name, part in initial.parts.items():
         now = constraints.parts[name]
         then = part if np.array_equal(part.positions, now.positions) else now
         known = np.isfinite(then.gap0) & then.usable

@@ -64,7 +64,7 @@ def _half_tangent(angle: float) -> float:
 def _clearance_ratio(angle: float) -> float:
     """Return E dR/Q for a contact angle, with the clearance dR and the force per unit length Q (Persson 1964).
 
-    The integrand is periodic, so that the trapezoidal rule converges exponentially.
+    The integrand is periodic, so that the midpoint rule converges exponentially.
     """
     b = _half_tangent(angle)
     theta = (np.arange(256) + 0.5) * math.pi / 256 - 0.5 * math.pi
@@ -124,7 +124,7 @@ def persson_pin(
     Raises
     ------
     ModelError
-        If a number is out of range, or if `contact_angle` is given without clearance or exceeds `persson_limit_angle`.
+        If a number is out of range, or if `contact_angle` is given without clearance or is not below `persson_limit_angle`.
 
     Examples
     --------
@@ -145,12 +145,12 @@ def persson_pin(
         if gap == 0.0:
             raise ModelError("contact_angle cannot be given without clearance: any force gives the same angle")
         if value >= limit:
-            raise ModelError(f"contact_angle is {value:g}: with clearance it stays below {limit:.4f} degrees")
+            raise ModelError(f"contact_angle is {value:g}: with clearance it must be below {limit:.4f} degrees")
         return PerssonPin(R, gap, modulus * gap / _clearance_ratio(value), value)
     if gap == 0.0:
         return PerssonPin(R, gap, value, limit)
-    goal = modulus * gap / value
-    # The angle of the Hertzian line contact is a lower bound of the root up to a small factor.
-    start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * goal))))
-    angle = brentq(lambda e: math.log(max(_clearance_ratio(e), 1e-300) / goal), start, limit - 1e-12, xtol=1e-13)
+    ratio = modulus * gap / value
+    # The Hertzian line contact has a larger angle. Half of this angle, limited to half of `limit`, is below the root.
+    start = min(0.5 * limit, 0.5 * math.degrees(math.sqrt(8.0 / (math.pi * ratio))))
+    angle = brentq(lambda a: math.log(max(_clearance_ratio(a), 1e-300) / ratio), start, limit - 1e-12, xtol=1e-13)
     return PerssonPin(R, gap, value, float(angle))

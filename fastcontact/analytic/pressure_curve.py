@@ -55,7 +55,7 @@ class PressureCurve:
 
 
 def pressure_curve(theory: Any) -> PressureCurve | None:
-    """Return the contact pressure of a theory as a curve; None if it has no pressure or the pressure is not bounded.
+    """Return the contact pressure of a theory as a curve; None if it has no pressure or an unbounded one.
 
     Examples
     --------

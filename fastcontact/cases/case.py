@@ -279,7 +279,7 @@ def _checks(
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
-    asked_for, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
+    sensitivities, entries = [], list(tables("sensitivity", data.get("sensitivity", [])))
     if entries:
         from fastcontact.analysis.sensitivities import check_labels  # imports most of the solver
     for i, entry in enumerate(entries):
@@ -297,8 +297,8 @@ def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list
         quantity, *by = (tuple(row) for row in rows)
         with at(where):
             check_labels(model, quantity, by)
-        asked_for.append((quantity, by))
-    return asked_for
+        sensitivities.append((quantity, by))
+    return sensitivities
 
 
 def _mesh(folder: Path, data: dict[str, Any]) -> Mesh:

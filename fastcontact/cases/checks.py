@@ -93,7 +93,7 @@ class Check:
         Quantity of a probe: ``"PROBE.pressure"``, ``"PROBE.shear"``, ``"PROBE.von_mises"``, ``"PROBE.temperature"``,
         ``"PROBE.stress.yy"`` or ``"PROBE.displacement.x"``. Quantity of a contact pair: ``"PAIR.force"`` and its
         component ``"PAIR.force.x"``, on the secondary side; ``"PAIR.pressure_max"``; ``"PAIR.radius"`` or
-        ``"PAIR.stick_radius"``, the midpoint of the bracket; ``"PAIR.moment.z"``, about the centre of the contact;
+        ``"PAIR.stick_radius"``, the midpoint of the bracket; ``"PAIR.moment.z"``, about the middle of the contact;
         ``"PAIR.torque"``, of a rotating obstacle about its axis; ``"PAIR.wear_max"``, the largest depth of wear; or
         ``"PAIR.heat"``, the heat flow to the primary side.
     tolerance : float

@@ -61,7 +61,7 @@ def summarise(
             for pair, theories in case.theories.items()
             if pair in last.contact and all(hasattr(theories["theory"], name) for name in COMPARED)
         },
-        "sensitivities": [_sensitivity(case, last, *asked) for asked in case.sensitivities],
+        "sensitivities": [_sensitivity(case, last, *sensitivity) for sensitivity in case.sensitivities],
         "regularised": last.iterations.get("regularised"),
         **({} if modes is None else {"modes": _modes(modes)}),
         "checks": [evaluated(check, last, case.probes, case.theories) for check in case.checks],

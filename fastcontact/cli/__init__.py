@@ -30,8 +30,8 @@ def entry_point() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         code = main()
-    except SystemExit as asked:  # raised by --help and --version
-        code = int(asked.code or 0)
+    except SystemExit as exit_request:  # raised by --help and --version
+        code = int(exit_request.code or 0)
     from fastcontact.cli._terminal import flushed
 
     code = flushed(code)

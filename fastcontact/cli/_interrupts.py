@@ -21,7 +21,7 @@ from types import FrameType
 from typing import Any
 
 AGAIN = 0.05  # delay before a signal is repeated [s]
-# Time in which another signal is taken for a repetition of the last one [s].
+# Time in which another signal is treated as a repetition of the last one [s].
 REPEATED = 0.5
 HANDLERS: dict[int, Any] = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
 if hasattr(signal, "SIGHUP"):

@@ -71,7 +71,7 @@ def _check_formats(paths: list[str]) -> None:
 
 
 def write_text(path: str, content: str) -> None:
-    """Write a text to a stream, or to a file completely or not at all; FileError if it cannot be written."""
+    """Write a string to a stream, or to a file completely or not at all; FileError if it cannot be written."""
     from fastcontact._tools.paths import replacing
 
     with replacing(path) as target:

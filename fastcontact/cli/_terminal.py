@@ -31,7 +31,7 @@ def somebody_watches() -> bool:
 
 
 def say(text: object, *, error: bool = False) -> None:
-    """Print a text on standard output, or on standard error without reporting write errors.
+    """Print a string on standard output, or on standard error without reporting write errors.
 
     Raises FileError if standard output cannot be written, and BrokenPipeError if its reader has ended.
     """
@@ -67,6 +67,6 @@ def _unwritten(error: OSError) -> str:
 
 
 def encodable(text: str, stream: TextIO) -> str:
-    """Return a text in which escapes replace the characters that a stream cannot encode."""
+    """Return a string in which escapes replace the characters that a stream cannot encode."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)

@@ -115,8 +115,8 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     theories = case["theories"].get(name, {})
     if options.map:
         labels["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
-        beside = options.field.removeprefix("contact_") if options.field.startswith("contact_") else "shear"
-        return plot.contact_map(results.mesh, step.contact[name], beside=beside, **labels)[0]
+        field = options.field.removeprefix("contact_") if options.field.startswith("contact_") else "shear"
+        return plot.contact_map(results.mesh, step.contact[name], beside=field, **labels)[0]
     if options.zones:
         return plot.contact_zones(list(results), name, **labels)
     if options.history:

@@ -114,7 +114,7 @@ def _modes(options: argparse.Namespace, case: Case, last: StepResult) -> Any:
 
 
 def _diameters(text: str | None) -> dict[str, Any]:
-    """Return the argument of `fastcontact.modes` for a text such as ``0,1,2`` or ``all``; CaseError for other texts."""
+    """Return the argument of `fastcontact.modes` for a string such as ``0,1,2`` or ``all``; CaseError for other strings."""
     if text is None:
         return {}
     try:
@@ -207,8 +207,8 @@ def _kept_steps(output: Path, steps: int) -> str:
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:
     """Return a message on the files written and the number of earlier steps."""
     if done == total:
-        nothing = f"{output} was complete with {total} steps, no step remained to be solved"
-        return "; wrote ".join([nothing, ", ".join(others)] if others else [nothing])
+        message = f"{output} was complete with {total} steps, no step remained to be solved"
+        return "; wrote ".join([message, ", ".join(others)] if others else [message])
     after = f" (resumed after step {done})" if done else ""
     return f"wrote {', '.join([f'{output}{after}', *others])}"
 

@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def values(text: str) -> tuple[str, list[Any]]:
-    """Return the parameter and the values of a text ``NAME=VALUES``; CaseError for other texts."""
+    """Return the parameter and the values of a string ``NAME=VALUES``; CaseError for other strings."""
     name, equals, listed = text.partition("=")
     if not (name and equals and listed):
         raise CaseError(f"--set '{text}' must be NAME=VALUES, for example approach=0.04,0.4,4")

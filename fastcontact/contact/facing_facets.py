@@ -114,10 +114,10 @@ class OuterFacets:
         key, along, number = np.concatenate(keys), np.concatenate(normal), np.concatenate(facet)
         along /= np.linalg.norm(along, axis=1, keepdims=True)
         order = np.lexsort(key.T)
-        one, other = order[:-1], order[1:]
-        joined = (key[one] == key[other]).all(axis=1)
-        joined &= np.einsum("nd,nd->n", along[one], along[other]) > np.cos(np.radians(CORNER))
-        first_of, second_of = number[one[joined]], number[other[joined]]
+        row, next_row = order[:-1], order[1:]
+        joined = (key[row] == key[next_row]).all(axis=1)
+        joined &= np.einsum("nd,nd->n", along[row], along[next_row]) > np.cos(np.radians(CORNER))
+        first_of, second_of = number[row[joined]], number[next_row[joined]]
         graph = coo_array((np.ones(len(first_of)), (first_of, second_of)), shape=(len(self.body),) * 2)
         return np.asarray(connected_components(graph, directed=False)[1], np.intp)
 

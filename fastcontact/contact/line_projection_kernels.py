@@ -33,7 +33,7 @@ def _newton(x, y, corners, normals, f, count, s, values, slopes):
             mx += slopes[k] * normals[f, k, 0]
             my += slopes[k] * normals[f, k, 1]
         slope = (px * my - py * mx) - (tx * ny - ty * nx)
-        # Beyond a centre of curvature, or where facets fold too sharply, Newton's method has no descent direction.
+        # The slope vanishes at a centre of curvature, where the foot of the normal is not unique.
         if not abs(slope) > LENGTH_ROUND_OFF * abs(tx * ny - ty * nx):
             return s, False
         step = -(px * ny - py * nx) / slope
@@ -58,7 +58,7 @@ def along_normals(points, corners, normals, counts, neighbour, facet, xi, overha
     counts : ndarray of int (n_facets,)
         Nodes of each facet, 2 or 3.
     neighbour : ndarray of int (n_facets, 2)
-        The facet beyond each end, -1 for none; the shared end is its opposite one.
+        The facet beyond each end, -1 for none. It shares its opposite end, 1 beyond end 0 and 0 beyond end 1.
     facet, xi, overhang : ndarray (n,)
         Closest points, changed in place where the projection succeeds.
     values, slopes : ndarray (3,)

@@ -189,6 +189,6 @@ def spread(side: Surface, excluded: Mask, givers: Indices) -> csr_array:
     if not excluded.any():
         return csr_array(eye_array(m, format="csr"))
     is_giver = np.isin(np.arange(m), givers) & ~excluded
-    beside = diags_array(excluded.astype(float)) @ side.beside @ diags_array(is_giver.astype(float))
-    count = np.maximum(np.asarray(beside.sum(axis=1)).ravel(), 1.0)
-    return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ beside)
+    neighbours = diags_array(excluded.astype(float)) @ side.beside @ diags_array(is_giver.astype(float))
+    count = np.maximum(np.asarray(neighbours.sum(axis=1)).ravel(), 1.0)
+    return csr_array(diags_array((~excluded).astype(float)) + diags_array(1.0 / count) @ neighbours)

@@ -110,13 +110,13 @@ def at_common_edges(side: Surface, facet: Indices, xi: Array) -> tuple[Indices, 
     )
     whole = common.data == np.diff(around.indptr)[common.row]
     point, other = common.row[whole].astype(np.intp), common.col[whole].astype(np.intp)
-    found, first = np.empty((len(point), xi.shape[1])), 0
+    coordinates, first = np.empty((len(point), xi.shape[1])), 0
     for block in side.blocks:
         rows = np.flatnonzero((other >= first) & (other < first + len(block.local)))
         same = block.local[other[rows] - first][:, :, None] == at.local[point[rows]][:, None]
-        found[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
+        coordinates[rows] = np.einsum("pkj,pj->pk", same, at.shape[point[rows]]) @ elements.get(block.element).nodes
         first += len(block.local)
-    return point, other, found
+    return point, other, coordinates
 
 
 def nodal_normals(side: Surface, coordinates: Array) -> Array:
@@ -173,8 +173,8 @@ def smooth_normals(side: Surface, coordinates: Array) -> list[Array]:
     places_of, start = np.argsort(node, kind="stable"), np.concatenate([[0], np.cumsum(np.bincount(node))])
     for at in np.flatnonzero(corner):
         here = places_of[start[at] : start[at + 1]]
-        beside = normal[here] @ normal[here].T > np.cos(np.radians(CORNER))
-        total = (beside * weight[here]) @ normal[here]
+        similar = normal[here] @ normal[here].T > np.cos(np.radians(CORNER))
+        total = (similar * weight[here]) @ normal[here]
         joined[here] = total / np.linalg.norm(total, axis=1, keepdims=True)
     ends = np.cumsum([normals.shape[0] * normals.shape[1] for normals in facet_normals_of_blocks])[:-1]
     return [
@@ -213,9 +213,9 @@ def facet_angles(element: elements.Element, nodes: Array) -> Array:
 
     angle, n = np.empty(nodes.shape[:2]), element.n_corners
     around = np.arange(n)
-    beside = np.column_stack([(around + 1) % n, (around - 1) % n])
+    others = np.column_stack([(around + 1) % n, (around - 1) % n])
     shared(
-        lambda portion: projection_kernels.angles(nodes, beside, *portion, angle), portions(len(nodes), nodes.shape[1])
+        lambda portion: projection_kernels.angles(nodes, others, *portion, angle), portions(len(nodes), nodes.shape[1])
     )
     return angle
 

@@ -140,7 +140,7 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     takers, free = np.flatnonzero(taken), np.eye(dim) - held
     along = np.linalg.norm(np.einsum("qde,qke->qkd", held, frames), axis=2)
     left = np.argsort(np.argsort(-along, axis=1, kind="stable"), axis=1) >= taken[:, None]
-    own = np.where(left[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
+    freed = np.where(left[:, None], np.einsum("qde,qke->qdk", free, frames), 0.0)
     around = coo_array(csr_array(beside[nodes])[:, nodes][takers])
     gives = (areas[around.col] > 0.0) & (areas[takers[around.row]] > 0.0) & (takers[around.row] != around.col)
     taker, giver = around.row[gives], around.col[gives]
@@ -149,7 +149,7 @@ def reduction(frames: Array, held: Array, nodes: Indices, areas: Array, beside: 
     share = held[takers] @ np.linalg.pinv(whole, hermitian=True)
     rows, columns = np.append(np.arange(q), takers[taker]), np.append(np.arange(q), giver)
     size = np.where(areas > 0.0, areas, 1.0)
-    tractions = np.concatenate([own, share[taker] @ own[giver]]) * (size[rows] / size[columns])[:, None, None]
+    tractions = np.concatenate([freed, share[taker] @ freed[giver]]) * (size[rows] / size[columns])[:, None, None]
     blocks = frames[rows] @ tractions
     blocks[np.abs(blocks) < ROUND_OFF] = 0.0
     row, column = (np.arange(dim) * q + nodes_of[:, None] for nodes_of in (rows, columns))

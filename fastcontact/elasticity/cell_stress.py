@@ -121,13 +121,13 @@ class CellStress:
         name, xi, N, dN = at
         loops, shared = element_kernels.loops(self._mesh.dim), (self._axisymmetric, self._displacement)
         if xi is elements.get(name).quadrature[0]:
-            one = np.empty((len(cells), 1, out.shape[2]))
+            at_point = np.empty((len(cells), 1, out.shape[2]))
             for q in range(len(xi)):
                 moduli_at_point = np.ascontiguousarray(material[:, q])
                 loops.stress(
-                    self._mesh.points, cells, N[q : q + 1], dN[q : q + 1], moduli, moduli_at_point, *shared, one
+                    self._mesh.points, cells, N[q : q + 1], dN[q : q + 1], moduli, moduli_at_point, *shared, at_point
                 )
-                out[:, q] = one[:, 0]
+                out[:, q] = at_point[:, 0]
             return
         unit, first = np.eye(self._moduli.shape[1])[None], np.zeros(len(cells), np.int32)
         strain = np.empty_like(out)

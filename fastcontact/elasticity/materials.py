@@ -187,14 +187,14 @@ class Material:
         if not wrong.any():
             return
         row = int(wrong.argmax())
-        one = {
+        values = {
             name: mapped(getattr(constants, name), lambda v: float(np.broadcast_to(np.asarray(v), count)[row]))
             for name in names
         }
         mesh, cell = self._cells().mesh, int(rows[row // len(N)])
         where = f"in cell {cell} of {element} near {mesh.points[mesh.cells[element][cell]].mean(axis=0)}"
         try:
-            dataclasses.replace(self, **one)  # type: ignore[type-var]
+            dataclasses.replace(self, **values)  # type: ignore[type-var]
         except ModelError as error:
             raise ModelError(f"{where}: {error}") from None
 

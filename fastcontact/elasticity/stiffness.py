@@ -225,8 +225,8 @@ def owners(cells: Numbers, n_points: int) -> Owners:
         return Owners(np.zeros(n_points, np.uint8), portions)
     ends = np.array([0, *(end for _, end in portions)])
     work = _owners(cells, n_points, ends)[1]
-    beside = work - np.diff(ends)
-    ends[1:-1] = np.cumsum(np.maximum(work.mean() - beside, 0.0))[:-1]
+    extra = work - np.diff(ends)
+    ends[1:-1] = np.cumsum(np.maximum(work.mean() - extra, 0.0))[:-1]
     return _owners(cells, n_points, np.minimum(ends, len(cells)))[0]
 
 

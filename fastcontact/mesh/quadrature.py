@@ -1,6 +1,6 @@
 """Quadrature rules on reference lines, triangles, squares and solids.
 
-A `Rule` consists of points (n_q, dim) and weights (n_q,), both without dimension [-].
+A `Rule` consists of points (n_q, dim) and weights (n_q,), both dimensionless [-].
 """
 
 from __future__ import annotations

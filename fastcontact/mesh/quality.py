@@ -175,7 +175,7 @@ def _check_twice(mesh: Mesh, name: str) -> None:
 
 
 def _described(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
-    """Return a text with number, element type, position and, if `measure` is given, size of a cell, for messages."""
+    """Return a string with number, element type, position and, if `measure` is given, size of a cell, for messages."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
     return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"

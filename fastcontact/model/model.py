@@ -70,7 +70,7 @@ class Model(ModelSupports):
         Initial temperature of the bodies, at which the thermal strain is zero, unless `add_temperature` is given another
         one [temperature].
     units : str or mapping of str to str, optional
-        Names of the units of length, force and pressure, either in this order as a text such as ``"mm, N, MPa"``, or by
+        Names of the units of length, force and pressure, either in this order as a string such as ``"mm, N, MPa"``, or by
         the keys ``"length"``, ``"force"`` and ``"pressure"``. Tables, reports, plots and result files show them, and a
         warning is given if force / length^2 is not the unit of pressure. Computed numbers do not depend on them.
 

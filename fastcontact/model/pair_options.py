@@ -114,8 +114,8 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     chosen = [option for option in LAWS if option in options]
     if not chosen:
         return None
-    beside = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
-    excess = [option for option in beside if option in options and option != chosen[0]]
+    exclusive = ("adhesion", "friction", "penalty", "tangential_penalty", "wear")
+    excess = [option for option in exclusive if option in options and option != chosen[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
         raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of both")

@@ -109,7 +109,7 @@ class FreeMotions:
 
 
 def grouped(names: Iterable[str]) -> str:
-    """Return the names of motions, as `FreeMotions.names` returns them, in one text that names each body once."""
+    """Return the names of motions, as `FreeMotions.names` returns them, in one string that names each body once."""
     by_body: dict[str, list[str]] = {}
     for body, _, motion in (name.rpartition(": ") for name in names):
         by_body.setdefault(body, []).append(motion)

@@ -19,7 +19,7 @@ EXAMPLE = "units of length, force and pressure in this order, such as 'mm, N, MP
 
 
 def named_units(units: str | Mapping[str, str]) -> dict[str, str]:
-    """Return the names of units by quantity, from a text in the order of `KNOWN` or from a mapping.
+    """Return the names of units by quantity, from a string in the order of `KNOWN` or from a mapping.
 
     Raise ModelError for other arguments, and for a name that is known as the unit of another quantity.
 

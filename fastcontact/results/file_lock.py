@@ -52,7 +52,7 @@ class PathLock:
     Raises
     ------
     FileError
-        If another writer, in this or another process, holds the lock, or the lock file is not a plain file of the user.
+        If another writer, in this or another process, holds the lock, or the lock file is not a regular file of the user.
     """
 
     def __init__(self, target: Path) -> None:

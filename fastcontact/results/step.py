@@ -196,7 +196,7 @@ class ContactResult:
 
     @property
     def shown(self) -> dict[str, str]:
-        """Captions and texts of the force, the largest pressure, the closed nodes and the contact radius, for reprs."""
+        """Names and values of the force, the largest pressure, the closed nodes and the contact radius, for reprs."""
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
@@ -375,7 +375,7 @@ class StepResult:
 
     @property
     def shown(self) -> dict[str, str]:
-        """Captions and texts of the load factor, the largest displacement and stress, and the iterations, for reprs."""
+        """Names and values of the load factor, the largest displacement and stress, and the iterations, for reprs."""
         moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",

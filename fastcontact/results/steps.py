@@ -66,7 +66,7 @@ def _shown(steps: Steps) -> Iterable[StepResult]:
 
 
 def rows_of(step: StepResult) -> list[tuple[str, ...]]:
-    """Return a row of texts with the columns `HEAD` for each contact pair of a step, or one row if there are no pairs."""
+    """Return a row of strings with the columns `HEAD` for each contact pair of a step, or one row if there are no pairs."""
     begin = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
     pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]
     return [(*begin, *pair) for pair in pairs] or [(*begin, *[""] * (len(HEAD) - len(begin)))]

@@ -82,5 +82,5 @@ def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 
 
 
 def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return a text with one or several values, followed by their unit if it is known."""
+    """Return a string with one or several values, followed by their unit if it is known."""
     return f"{text} {units.get(quantity, '')}".removesuffix(" -").rstrip()

@@ -383,7 +383,7 @@ class ResultWriter:
                 if not isinstance(cause, Exception):
                     raise cause from None
                 reason = getattr(cause, "strerror", None) or next(iter(str(cause).splitlines()), type(cause).__name__)
-                remedy = "see whether the disk is full or the folder protected"
+                remedy = "check the disk space and the permissions of the folder"
                 if not isinstance(cause, (OSError, RuntimeError)):
                     remedy = "its tables are damaged: name another file, or start anew without resuming"
                 raise FileError(

@@ -102,13 +102,13 @@ def adaptive_study(
             started = time.perf_counter()
             linear, leaf = forest.mesh()
             solved = _case_on(linear, curves, case, chosen, combination)
-            last, error, this = _solved(solved, quantity, chosen.pair, rounds, started)
-            rounds.append(this)
+            last, error, round_ = _solved(solved, quantity, chosen.pair, rounds, started)
+            rounds.append(round_)
             if on_round is not None:
-                on_round(this)
-            line.draw(f"{this.n_dofs} degrees of freedom, estimated error {this.estimate:.1e}")
-            reached = this.estimate <= tolerance
-            if reached or len(rounds) == max_rounds or this.n_dofs > 0.6 * max_dofs:
+                on_round(round_)
+            line.draw(f"{round_.n_dofs} degrees of freedom, estimated error {round_.estimate:.1e}")
+            reached = round_.estimate <= tolerance
+            if reached or len(rounds) == max_rounds or round_.n_dofs > 0.6 * max_dofs:
                 break
             forest.refine(_marked(_indicator(solved, last, error, quantity, chosen.pair), leaf, forest.n_leaves))
     return AdaptiveStudy(
@@ -156,7 +156,7 @@ def _solved(
     exact = quantities.by_theory(case, pair, 0.0)
     n_cells = sum(map(len, case.mesh.solids.values()))
     estimate = _estimate([*(round_before.values[quantity] for round_before in before), values[quantity]])
-    this = Round(
+    round_ = Round(
         n_dofs=case.model.n_dofs,
         n_cells=n_cells,
         values=values,
@@ -166,7 +166,7 @@ def _solved(
         estimate=estimate,
         seconds=time.perf_counter() - started,
     )
-    return last, error, this
+    return last, error, round_
 
 
 def _estimate(values: Sequence[float]) -> float:

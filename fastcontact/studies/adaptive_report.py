@@ -66,7 +66,7 @@ class Round:
         Returns
         -------
         float
-            Magnitude of the relative difference [-]; NaN if the case has no mesh-converged solution.
+            Magnitude of the relative difference [-]; NaN if the case has no mesh-converged solution or if its value is zero.
         """
         exact = self.reference.get(quantity)
         return abs(self.values[quantity] / exact - 1.0) if exact else math.nan
@@ -119,14 +119,14 @@ class AdaptiveStudy(Report):
         Returns
         -------
         float
-            Effectivity index [-]; NaN if the true error is unknown or zero.
+            Effectivity index [-]; NaN if the true error is unknown or zero, or if there is no estimate.
         """
         round_ = self.rounds[number]
         true = round_.true_error(self.quantity)
         return round_.estimate / true if true > 0 else math.nan
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the study as numbers, texts, lists and dictionaries, as ``--json`` writes it; errors are relative [-]."""
+        """Return the study as numbers, strings, lists and dictionaries, as ``--json`` writes it; errors are relative [-]."""
         numbers = {
             "combination": self.combination,
             "quantity": self.quantity,
@@ -160,8 +160,8 @@ class AdaptiveStudy(Report):
         """Return a Matplotlib figure with the errors over degrees of freedom and the error of each cell of the last mesh."""
         heading = f"{self.title}: {self.combination}, refined for the {title(self.quantity)}"
         width, height = np.ptp(self.case.mesh.points, axis=0)
-        height_of_axes = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # with colour bar [inch]
-        errors, mesh = panels(1, 2, (6.2 + height_of_axes, 5.2), heading, widths=(6.2, height_of_axes))[0]
+        width_of_map = float(np.clip(4.2 * width / height, 2.0, 8.0)) + 1.3  # with colour bar [inch]
+        errors, mesh = panels(1, 2, (6.2 + width_of_map, 5.2), heading, widths=(6.2, width_of_map))[0]
         self._draw_errors(errors)
         self._draw_mesh(mesh)
         return mesh.figure
@@ -196,7 +196,7 @@ class AdaptiveStudy(Report):
         verdict = "within" if self.reached else "NOT within"
         text = f"{self.combination}: {value}, estimated error {last.estimate:.1e}, {verdict} the {self.tolerance:g} requested"
         if not self.reached:
-            text += ": the limit of meshes or degrees of freedom was reached; allow more (--max-dofs)"
+            text += ": the largest number of meshes or of degrees of freedom was reached; increase it (--max-dofs)"
         true = last.true_error(q)
         return [
             text + (f"; true error {true:.1e}, effectivity {self.effectivity():.2g}" if math.isfinite(true) else "")

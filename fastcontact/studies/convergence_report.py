@@ -61,7 +61,7 @@ class Study(Report):
         return max(candidates, key=lambda series: series.combination.rank)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the study as numbers, texts, lists and dictionaries, as ``--json`` writes it.
+        """Return the study as numbers, strings, lists and dictionaries, as ``--json`` writes it.
 
         The top level contains the results of the combination `best`, and ``combinations`` contains all combinations. Errors
         are relative to the theory, or to the limit if there is no theory [-]. ``mesh_error`` is the error of the finest mesh,

@@ -60,7 +60,7 @@ def comparison_rows(all_series: Sequence[Series], quantities: Sequence[str], uni
 
 
 def _cells(series: Series, quantity: str, columns: Sequence[str]) -> list[str]:
-    """Return the texts of some columns of limits for a quantity; dashes if it has no limit."""
+    """Return the entries of some columns of limits for a quantity; dashes if it has no limit."""
     limit, split = series.limits.get(quantity), series.split(quantity)
     if limit is None:
         return ["-"] * len(columns)

@@ -123,7 +123,7 @@ class Job(Run):
 
 @contextlib.contextmanager
 def recorded() -> Iterator[list[str]]:
-    """Yield a list that contains, after the block, the texts of the warnings of the package in the block."""
+    """Yield a list that contains, after the block, the messages of the warnings that the package issues in the block."""
     texts: list[str] = []
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", FastcontactWarning)

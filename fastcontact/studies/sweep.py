@@ -105,8 +105,8 @@ def parameter_sweep(
         raise CaseError("values without a name and functions as quantities are for Python models; a case takes names")
     case = case if isinstance(case, Case) else read_case(case)
     choices = _choices(parameters)
-    asked = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
-    check_names(case, asked)
+    names = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
+    check_names(case, names)
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
     # Building one case in advance finds unknown keys, with which every run would fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
@@ -116,7 +116,7 @@ def parameter_sweep(
         **_points(parameters, choices, results),
         combination=str(jobs[0].marks["combination"]),
         theories=_theory_curves(case, parameters, jobs[0].pair),
-        asked=asked,
+        asked=names,
         compared="at equal approach" if jobs[0].pair in case.approach else "",
     )
 

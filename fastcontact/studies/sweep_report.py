@@ -60,7 +60,7 @@ class Sweep(Report):
         return list(dict.fromkeys(name for point in self.points for name in point.values))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the sweep as numbers, texts, lists and dictionaries, as ``--json`` writes it; differences are relative."""
+        """Return the sweep as numbers, strings, lists and dictionaries, as ``--json`` writes it; differences are relative."""
         numbers = {
             "combination": self.combination,
             "parameters": {name: list(values) for name, values in self.parameters.items()},
@@ -116,8 +116,8 @@ class Sweep(Report):
         """
         names, drawing = self._main(), Drawing(self.parameters, self.points, self.theories, self.units, self.compared)
         known = any(name in point.theory for point in self.points for name in names)
-        beside = 1.7 * (1 + known) * (len(self.parameters) > 1)  # legends
-        size = ((8.8 if known else 5.2) + beside, 0.5 + 3.1 * len(names))
+        legend_width = 1.7 * (1 + known) * (len(self.parameters) > 1)  # legends
+        size = ((8.8 if known else 5.2) + legend_width, 0.5 + 3.1 * len(names))
         heading = "\n".join(dict.fromkeys((self.title, self.combination)))  # title and name are equal for a function
         axes = panels(len(names), 1 + known, size, heading, fontsize=11)
         for row, name in zip(axes, names, strict=True):

@@ -39,7 +39,7 @@ def pipe(patch, folder):
 # fmt: off
 ACCIDENTS = [
     ("the disk is full", full_disk, ["run", "case.toml"],
-     r"'.*case\.vtkhdf' cannot be written \(No space left on device\): see whether the disk is full"),
+     r"'.*case\.vtkhdf' cannot be written \(No space left on device\): check the disk space"),
     ("the folder is write-protected", protected_folder, ["run", "case.toml"],
      r"folder '.*' is write-protected: name a file in another folder"),
     ("the result file is write-protected", protected_file, ["run", "case.toml", "-o", "old.vtkhdf"],
@@ -49,6 +49,6 @@ ACCIDENTS = [
     ("the result file exists and is something else", other_results, ["run", "case.toml", "-o", "text.vtkhdf"],
      r"'.*text\.vtkhdf' exists and is not a result file: name another file or remove it first"),
     ("the result file is a pipe", pipe, ["run", "case.toml", "-o", "pipe.vtkhdf"],
-     r"'.*pipe\.vtkhdf' is a device or a pipe: name a plain file"),
+     r"'.*pipe\.vtkhdf' is a device or a pipe: name a regular file"),
 ]
 # fmt: on

@@ -147,6 +147,6 @@ def test_the_number_of_steps_does_not_matter_and_a_run_goes_on_from_any(solver, 
     assert steps[-1].displacement == pytest.approx(once[-1].displacement, rel=1e-9, abs=1e-14)
     for path in paths.values():
         whole = fc.solve(model, [0.5, 1.0, 1.5, 1.75, 2.0], resume=fc.open_results(path), **options)
-        # The bolt keeps the length that it was locked at: read from displacements, that would be off by their round-off.
+        # The bolt keeps the shortening at which it was locked: read from displacements, that would be off by their round-off.
         np.testing.assert_array_equal(whole[-1].displacement, steps[-1].displacement)
         assert whole[-1].pretension == steps[-1].pretension

@@ -30,10 +30,10 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 EDGES, LARGEST = (8, 32), 2500
 # If slips are linearly dependent, tangential forces are not unique; examples are nodes that belong to several surfaces, and
 # nodes that supports hold on one side. F counts as dependent if a squared pivot of its scaled Cholesky factor is round-off
-# of lengths. All slips then get the first compliance YIELDING, relative to the compliance of the gaps, and the second one if
-# the first does not suffice. If the elastic slip due to this compliance exceeds SINGLE_PRECISION, relative to the scale of
+# of lengths. The first compliance REGULARISATION, relative to the compliance of the gaps, is then added to all slips, and the
+# second one if the first does not suffice. If the elastic slip due to it exceeds SINGLE_PRECISION, relative to the scale of
 # gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
-YIELDING = 10 * ROUND_OFF, LENGTH_ROUND_OFF
+REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
 
 
 def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
@@ -49,38 +49,39 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     mu : ndarray (m,)
         Coefficients of friction [-].
     closed : ndarray of bool (m,)
-        Constraints that are assumed closed and sticking in an initial guess of Newton's method.
+        Constraints that are assumed closed and sticking in an initial guess of Newton's method. If there are none, those
+        with a negative gap without forces.
     guess : ndarray (1 + k, m), optional
         Another initial guess of the forces, which is tried first [force].
     """
-    parts, m = free.shape
+    n_components, m = free.shape
     if not m:
         return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
     unit = _units(F, m)
     length = float(np.abs(free * unit).max()) or 1.0
-    everywhere = np.tile(unit, parts)
-    F, best, iterations, yielded = everywhere[:, None] * F * everywhere, None, 0, 0.0
+    units = np.tile(unit, n_components)
+    F, best, iterations, elastic_slip = units[:, None] * F * units, None, 0, 0.0
     if guess is not None:
         guess = guess / (length * unit)
-    for yielding in YIELDING if _dependent(F) else (0.0,):
+    for compliance in REGULARISATION if _dependent(F) else (0.0,):
         slips = np.arange(m, len(F))
-        F[slips, slips] += yielding
+        F[slips, slips] += compliance
         problem = _Problem(F, free * unit / length, mu)
         for start, line_search in _starts(problem, closed, guess):
-            # At least one iteration, because the initial forces may be those of an earlier pairing: the residual may be below
-            # the round-off of all constraints although the gaps of soft ones are not closed.
+            # At least one iteration: the residual of forces of an earlier pairing may be below the round-off common to
+            # all constraints, although gaps of constraints with a large compliance are not closed.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
-                best, yielded = forces, yielding * float(np.abs(forces.y[1:]).max(initial=0.0))
+                best, elastic_slip = forces, compliance * float(np.abs(forces.y[1:]).max(initial=0.0))
             if forces.settled:
                 break
-        if best is not None and best.settled and yielded <= SINGLE_PRECISION:
+        if best is not None and best.settled and elastic_slip <= SINGLE_PRECISION:
             break
     assert best is not None
-    jammed = yielded > SINGLE_PRECISION
+    jammed = elastic_slip > SINGLE_PRECISION
     settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
-    residual = max(best.residual, yielded) if jammed else best.residual
+    residual = max(best.residual, elastic_slip) if jammed else best.residual
     gaps = best.gaps * length / unit
     return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, residual, iterations)
 
@@ -109,12 +110,12 @@ class _Problem:
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
-        there = _step(self, y, gaps, closed, sticking)
-        return there, self.gaps(there)
+        new = _step(self, y, gaps, closed, sticking)
+        return new, self.gaps(new)
 
 
 def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
-    """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in the order of increasing cost.
+    """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in order of increasing cost.
 
     The same initial forces are tried with and without a line search: at a kink of the residual, Newton's method may converge
     with full steps although no shortened step decreases the residual.
@@ -148,12 +149,12 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
 
     A ((1 + k) q, (1 + k) q) is ``E + D F`` with E and D (1 + k, 1 + k, q) of `Law.linearised`.
     """
-    parts, among = np.arange(len(y)), np.arange(len(rows))
+    components, positions = np.arange(len(y)), np.arange(len(rows))
     E, D = law.linearised(y, gaps, rows, sticking)
-    unknown = (parts[:, None] * y.shape[1] + rows).ravel()
+    unknown = (components[:, None] * y.shape[1] + rows).ravel()
     A = np.einsum("abq,bqn->aqn", D, F[np.ix_(unknown, unknown)].reshape(len(y), len(rows), -1))
-    for b in parts:
-        A[:, among, b * len(rows) + among] += E[:, b]
+    for b in components:
+        A[:, positions, b * len(rows) + positions] += E[:, b]
     return A.reshape(unknown.size, -1), D
 
 
@@ -167,10 +168,8 @@ def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
     if not len(rows):
         return np.zeros_like
     unit = _units(F, len(mu))
-    everywhere = np.tile(unit, len(forces.y))
-    A, D = _equations(
-        Law(mu), everywhere[:, None] * F * everywhere, forces.y / unit, forces.gaps * unit, rows, forces.sticking
-    )
+    units = np.tile(unit, len(forces.y))
+    A, D = _equations(Law(mu), units[:, None] * F * units, forces.y / unit, forces.gaps * unit, rows, forces.sticking)
     factors = lu_factors(A)
 
     def varied(gaps: Array) -> Array:
@@ -191,7 +190,7 @@ def _units(F: Array, m: int) -> Array:
 
 
 def _solved(A: Array, right: Array) -> Array:
-    """Return the solution of ``A x = right``; if A is singular, return the least-squares solution of minimum norm."""
+    """Return the solution of ``A x = right``, or the least-squares solution of minimum norm if A is nearly singular."""
     try:
         solution = np.linalg.solve(A, right)
         if np.abs(A @ solution - right).max() <= 1e-8 * np.abs(right).max(initial=0.0):
@@ -202,7 +201,7 @@ def _solved(A: Array, right: Array) -> Array:
 
 
 def _on_edges(problem: _Problem, edges: int) -> Array | None:
-    """Return the forces (1 + k, m) for a friction cone with a number of `edges`; None if Lemke's method fails.
+    """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if it is too large or Lemke's method fails.
 
     The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, and the
     largest slip along an edge (Stewart and Trinkle, 1996).
@@ -219,10 +218,9 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     M[last:, :m] = np.diag(problem.mu)
     M[last:, m:last] = -np.tile(np.eye(m), edges)
     M[m:last, last:] = np.tile(np.eye(m), edges).T
-    # The problem of a polyhedral cone is degenerate: its right-hand side is perturbed.
-    q = SINGLE_PRECISION * (
-        0.5 + np.arange(size) * 0.6180339887498949 % 1.0
-    )  # multiples of the golden ratio: all are different
+    # The problem of a polyhedral cone is degenerate. Its right-hand side is therefore perturbed by the fractional parts of
+    # multiples of the golden ratio, which are distinct.
+    q = SINGLE_PRECISION * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)
     q[:last] += X.T @ problem.free.ravel()
     z, _ = lemke.solved(M, q, 5 * size)
     return None if z is None else (X @ z[:last]).reshape(1 + k, m)

@@ -71,9 +71,9 @@ def along(
     lag = lag + np.vstack([np.zeros_like(gap), added])
 
     def increment(end: float) -> Forces:
-        beside = (1.0 - end) * lag
-        beside[1:] -= slip
-        return solve(beside, ~waiting, closed, y if y.any() else None)
+        remaining = (1.0 - end) * lag
+        remaining[1:] -= slip
+        return solve(remaining, ~waiting, closed, y if y.any() else None)
 
     def slid(since: Array, gaps: Array) -> Array:
         """Return the slips (k, m) of slips `since` (k, m) and the closing motion of gaps (m,), which is removed."""

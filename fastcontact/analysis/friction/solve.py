@@ -3,8 +3,9 @@
 The unknowns are the normal forces n >= 0 and the tangential forces t of all constraints. The gaps g and the slips s of the
 load step are ``(g, s) = free + F (n, t)``, where `free` are their values without contact forces. The Delassus operator is
 ``F = R K^-1 R.T + C``, where K is the stiffness matrix, R contains the derivatives of gaps and slips with respect to the
-displacements, and C is the compliance of the constraints themselves. `dense` solves this problem without regularisation:
-the slip of a sticking constraint is zero, and the force of a sliding one lies on the friction cone. If the linear solver
+displacements, and C is the compliance of the constraints themselves. `dense` solves this problem without regularisation,
+unless slips are linearly dependent: the slip of a sticking constraint is zero, and the force of a sliding constraint lies on
+the friction cone. If the linear solver
 can eliminate constraints, `eliminated` is tried first. It solves the same problem without forming F.
 """
 

@@ -219,8 +219,8 @@ def pairs_of(vectors: Array, K: bsr_array, M: bsr_array, n: int) -> tuple[Array,
     Z = _complex(vectors)
     stiff, heavy = (Z.conj().T @ _complex(matrix @ vectors) for matrix in (K, M))
     weight, basis = np.linalg.eigh(heavy)
-    there = weight > 1e-8 * weight.max()
-    basis = basis[:, there] / np.sqrt(weight[there])
+    positive = weight > 1e-8 * weight.max()
+    basis = basis[:, positive] / np.sqrt(weight[positive])
     values, eigenvectors = np.linalg.eigh(basis.conj().T @ stiff @ basis)
     shapes = Z @ (basis @ eigenvectors[:, :n])
     largest = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]

@@ -258,9 +258,9 @@ def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
 
 def _of_constant(contact: MovingContact, parameter: Label) -> Change:
     """Return the change with a constant of a material."""
-    nothing = _nothing(contact)
+    unchanged = _nothing(contact)
     out, sample = by_constant(contact, parameter)
-    return replace(nothing, out=out, sample=nothing.sample if sample is None else sample)
+    return replace(unchanged, out=out, sample=unchanged.sample if sample is None else sample)
 
 
 # For each kind of parameter, a check that raises ModelError if it does not exist, and the change of the residual.

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from fastcontact.errors import CaseError, FastcontactError, FileError
 
-# Largest size in bytes and largest number of files of a deck with all included files; a larger deck is taken for an error.
+# Largest size in bytes and largest number of files of a deck with all included files; a larger deck is treated as an error.
 LARGEST = 1 << 28
 MOST_FILES = 200
 # Largest number of characters of a line, or of a keyword with its continuation lines. Abaqus and CalculiX allow far fewer.
@@ -351,14 +351,14 @@ def _included(block: Block, name: str, source: Source) -> Iterator[Block]:
     try:
         target = path.resolve()
         inside = target.is_relative_to(source.folder)
-        there = inside and target.is_file()
+        exists = inside and target.is_file()
     except (OSError, ValueError, RuntimeError):
         raise block.refuse(f"'{shown}' is not a file name") from None
     if not inside:
         raise block.refuse(
             f"'{shown}' is outside the folder of the deck: copy the file into or below '{source.folder}'"
         )
-    if not there:
+    if not exists:
         raise block.refuse(f"file '{shown}' not found beside the deck, in '{source.folder}'")
     if target in source.open:
         target_name = "the deck" if target == source.open[0] else f"'{shown}'"

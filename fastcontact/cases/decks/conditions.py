@@ -115,7 +115,7 @@ class Conditions:
         return [*self.over, *((name, acting) for name, acting in self.acting.items() if acting.begins > 0.0)]
 
     def named(self, component: Component) -> str:
-        """Return a text that names a displacement component in the deck, for messages."""
+        """Return a string that names a displacement component in the deck, for messages."""
         point, axis, _ = component
         if point >= sum(map(len, self.assembly.index.values())):
             return f"rotation {axis + 1} of a reference node"

@@ -10,7 +10,7 @@ from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.model.model import Model
 
-# Largest number of sectors. A larger one is taken for an error.
+# Largest number of sectors. A larger number is treated as an error.
 MOST_SECTORS = 100_000
 
 

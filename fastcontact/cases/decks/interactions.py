@@ -31,7 +31,7 @@ def interaction(content: Content, block: Block) -> Interaction:
     properties = registered("surface interaction", name, content.interactions, Interaction(name, block.location), block)
     if block.rows:
         block.rows[0].number(0, 1.0)
-        content.note(block.rows[0], "the thickness of the interaction has no effect: that of the sections is used")
+        content.note(block.rows[0], "the thickness of the interaction has no effect; sections define the thickness")
     return properties
 
 
@@ -45,7 +45,7 @@ def changed_interaction(content: Content, block: Block) -> Interaction:
 
 
 def behaviour(content: Content, current: Interaction, block: Block) -> None:
-    """Read *SURFACE BEHAVIOR: hard or tied contact, or a linear, tabular or exponential law of pressure."""
+    """Read *SURFACE BEHAVIOR: hard or tied contact, a linear, tabular or exponential penalty law, and separation."""
     law = block.choice("PRESSURE-OVERCLOSURE", ("HARD", "LINEAR", "EXPONENTIAL", "TABULAR", "TIED"))
     if law == "LINEAR":
         current.penalty = block.only().positive(0, "slope")
@@ -80,7 +80,7 @@ def friction(content: Content, current: Interaction, block: Block) -> None:
         raise row.refuse(f"the coefficient of friction {current.friction:g} is negative")
     if row.text(1) and row.number(1):
         current.stick = row.positive(1, "stick slope")
-        content.note(row, f"{current.stick:g} is taken for the stick slope, as in CalculiX (shear by slip)")
+        content.note(row, f"{current.stick:g} is the stick slope, shear traction divided by slip, as in CalculiX")
     if len(row.entries) > 2 and any(row.entries[2:]):
         raise row.refuse("friction that depends on pressure or temperature is not supported: give one coefficient")
 
@@ -95,9 +95,9 @@ def gap_heat_generation(content: Content, current: Interaction, block: Block) ->
     row = block.rows[0] if block.rows else Row(block.location, ())
     share, secondary = row.number(0, 1.0), row.number(1, 0.5)
     if not 0.0 <= share <= 1.0:
-        raise row.refuse(f"the share {share:g} of the frictional work that becomes heat must lie between 0 and 1")
+        raise row.refuse(f"the fraction {share:g} of the frictional work that becomes heat must lie between 0 and 1")
     if secondary != 0.5:
-        raise row.refuse(f"{secondary:g} of the heat to the secondary side is not supported, only half of it, 0.5")
+        raise row.refuse(f"the fraction of the heat on the secondary side must be 0.5, not {secondary:g}")
     if row.number(2, 0.0) > 0.0:
         raise row.refuse("a prescribed sliding velocity is not supported")
     current.friction_heat = block.location, share
@@ -120,14 +120,14 @@ def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
     for before, changed in law.changes:
         if changed.friction < 0.0 or changed.penalty is not None or changed.kind != law.kind:
-            raise changed.refuse("one *FRICTION must follow, and no other change of the interaction")
+            raise changed.refuse("must be followed by *FRICTION and by no other change of the interaction")
         table += [(float(before), table[-1][1]), (before + JUMP, changed.friction)]
         sticks |= {changed.stick} if changed.friction else set()
     largest = max(value for _, value in table)
     if not largest:
         return {}
     if len(sticks) > 1:
-        raise law.changes[0][1].refuse("a stick slope that changes is not supported: give the same one")
+        raise law.changes[0][1].refuse("a change of the stick slope is not supported: repeat the earlier slope")
     options: dict[str, Any] = {"friction": largest, "tangential_penalty": sticks.pop()}
     if law.changes:
         points = {**dict(table), float(n_steps): table[-1][1]}
@@ -150,10 +150,10 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
         first = next(iter(blocks.values()))
         raise first.refuse(f"surface interaction '{law.name}' has no *COHESIVE BEHAVIOR")
     if law.friction or law.changes or law.penalty is not None or law.kind != "unilateral":
-        raise behaviour.refuse("*FRICTION, NO SEPARATION and soft contact beside a cohesive layer are not supported")
+        raise behaviour.refuse("a cohesive layer excludes *FRICTION, NO SEPARATION, and tied or soft contact")
     stiffness = _stiffness(behaviour)
     if initiation is None and evolution is None and stiffness is None:
-        content.note(behaviour, "neither stiffness nor damage: the sides are tied")
+        content.note(behaviour, "the layer has neither stiffness nor damage, so the sides are tied")
         return {"kind": "tied"}
     if initiation is None or evolution is None:
         raise behaviour.refuse("*DAMAGE INITIATION and *DAMAGE EVOLUTION are both needed")
@@ -164,7 +164,7 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     if stiffness is None:
         content.note(
             behaviour,
-            f"no stiffness: damage begins at {ELASTIC:g} of the opening at which the layer fails",
+            f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which the layer fails",
         )
     else:
         given["stiffness"] = stiffness
@@ -205,7 +205,9 @@ def _evolution(block: Block, given: dict[str, Any], stiffness: float | None) -> 
         return {"energy": value, "shear_energy": value}
     strength = given["strength"]
     if given["initiation"] != "quadratic" or given["shear_strength"] != strength:
-        raise block.refuse("TYPE=DISPLACEMENT is supported with CRITERION=QUADS of one strength only: give energies")
+        raise block.refuse(
+            "TYPE=DISPLACEMENT is supported only with CRITERION=QUADS and equal strengths: give energies"
+        )
     end = value / (1.0 - ELASTIC) if stiffness is None else strength / stiffness + value
     return {"energy": 0.5 * strength * end}
 
@@ -253,7 +255,7 @@ def conductance_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
-    """Return the option for frictional heating of both sides; the duration of a step is its time."""
+    """Return the option for frictional heating of both sides, divided by the duration of a step, whose load factor is 1."""
     if law.friction_heat is None:
         if law.conductance:
             content.note(law, "friction generates no heat without *GAP HEAT GENERATION, as in CalculiX")
@@ -266,8 +268,10 @@ def friction_heat_of(content: Content, law: Interaction) -> dict[str, Any]:
 
 
 def perfect_conductance(content: Content, model: Model, location: Location) -> Any:
-    """Return the conductance of a tie [power / (area temperature)], which does not depend on pressure and gap."""
+    """Return the conductance of a tie [power / (area temperature)], independent of pressure and gap."""
     largest = max(np.max(material.conductivity) for material, _ in model.materials)
     h = PERFECT * float(largest) / float(np.ptp(model.mesh.points, axis=0).max())
-    content.note(location, f"the conductance is {h:.3g}, with which the temperatures of the sides differ by about 1e-8")
+    content.note(
+        location, f"the conductance is {h:.3g}; the temperatures of the sides differ by about 1e-8 of their variation"
+    )
     return (lambda pressure, gap: np.full(gap.shape, h)) if content.heat == "alone" else h

@@ -49,7 +49,7 @@ class Locks:
     points : dict of int to PretensionSection
         Sections by the point of their node.
     begins : dict of int to float
-        Load factor from which a section keeps its length, by the point of its node [-].
+        Load factor from which the shortening of a section is constant, by the point of its node [-].
     number : int
         Number of the current step, counted from 1.
     """

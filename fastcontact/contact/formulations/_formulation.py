@@ -555,8 +555,8 @@ class Formulation(ABC):
             mean = np.einsum("nk,nkd->nd", facing.shape, motion)
             # If an inclined normal meets the primary side slightly beside a held node, the motion of the other nodes of that
             # facet is ignored.
-            beside = np.einsum("nk,nkde,nkd->ne", facing.shape, theirs, motion - mean[:, None])
-            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), beside)
+            excess = np.einsum("nk,nkde,nkd->ne", facing.shape, theirs, motion - mean[:, None])
+            moved[rows] -= mean + np.einsum("nde,ne->nd", np.linalg.pinv(held_opposite[rows], hermitian=True), excess)
             both = spanned(both @ held_opposite @ both, 0.5)
         along = np.einsum("nde,ne->nd", both, pairing.normal)
         both = without(both, pairing.normal, np.sqrt(0.5))

@@ -159,14 +159,14 @@ class WeightedMortar(Formulation):
         for along, where in held:
             projectors[where] += along[where, :, None] * along[where, None, :]
         directions, rubbing = self.options.rubbing(tangents(normal, projectors), candidates)
-        slips, beside = self._slips(rubbing, held, coverage, mean, rows, weight)
+        slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
         length, between = self._closing(constraints, normal, at)
         closing = length[:, None] * between
         slip0 = self._slip0(mean, closing, rubbing, at)
-        for along, still, more in beside:
+        for along, still, more in additional:
             remaining = closing - np.where(still, np.einsum("md,md->m", closing, along), 0.0)[:, None] * along
-            falsely = np.einsum("md,md->m", more @ remaining, along)
-            slip0 += np.stack([np.einsum("md,md->m", t, along) * falsely for t in rubbing])
+            apparent_slip = np.einsum("md,md->m", more @ remaining, along)
+            slip0 += np.stack([np.einsum("md,md->m", t, along) * apparent_slip for t in rubbing])
         return replace(
             constraints,
             tangents=slips,
@@ -207,9 +207,9 @@ class WeightedMortar(Formulation):
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, closest=True)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
-        own = self._own_normals(pairing, deformed, at.pose)
+        own_normals = self._own_normals(pairing, deformed, at.pose)
         slips = None if slipping is None else self._varied_slips(*slipping, normal, tangential, at)
-        return WeightedForces(self.secondary, points, weighted, mean, normal, multiplier, own, slips)
+        return WeightedForces(self.secondary, points, weighted, mean, normal, multiplier, own_normals, slips)
 
     def _varied_slips(
         self, directions: Array, mean: csr_array, length: Array, normal: Array, tangential: Array, at: Configuration
@@ -302,7 +302,7 @@ class WeightedMortar(Formulation):
         (m, m) of the additional motion of secondary nodes in these functions is also returned, because on curved sides these
         nodes close their gaps along other normals.
         """
-        rows, beside = [rows_of(mean, direction) for direction in directions], []
+        rows, additional = [rows_of(mean, direction) for direction in directions], []
         held = np.zeros((len(weight), *2 * self.points.shape[1:]))
         for along, nodes in without_slip:
             if not (nodes & coverage.kept).any():
@@ -313,12 +313,12 @@ class WeightedMortar(Formulation):
             for k, direction in enumerate(directions):
                 slip = np.einsum("md,md->m", direction, along)
                 rows[k] = csr_array(rows[k] + rows_of(other, slip[:, None] * along))
-            beside.append(
+            additional.append(
                 (along, nodes, csr_array(scaled(csr_array(on_secondary - own), 1.0 / weight)[:, self.secondary.points]))
             )
             held[nodes] += np.einsum("md,me->mde", along[nodes], along[nodes])
         free = [1.0 - np.einsum("md,mde,me->m", t, held, t) >= FREE for t in directions]
-        return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), beside
+        return tuple(scaled(row, np.where(slips, 1.0, 0.0)) for row, slips in zip(rows, free, strict=True)), additional
 
     def _weighted(self, coverage: Coverage) -> tuple[csr_array, csr_array, Array]:
         """Return the integrals of psi with secondary and with primary shape functions, both (m, n_points) [area].

@@ -41,12 +41,12 @@ class Continuous(PressureFieldFormulation):
         - ``"gauss"``: Gauss points.
         - ``"simpson"``: Simpson's rule, on each half or quarter of a quadratic facet; a seven-point rule on triangles.
         - ``"node"``: the nodes, so that no node penetrates the other side, including nodes on the axis, whose area is zero.
-          This rule is refused for six-node triangles and eight-node quadrangles, whose corners have no positive areas.
+          This rule is rejected for six-node triangles and eight-node quadrangles, whose corners have no positive areas.
 
     n_gauss : int, optional
         Number of Gauss points in each direction of a facet; by default 3 on linear and 4 on quadratic facets. On triangles
         the numbers 2 to 5 select rules with 3, 6, 12 and 16 points in total. Too few points to determine the pressure field
-        are refused.
+        are rejected.
     normals : str or sequence of float
         See `Formulation`. The default is ``"averaged"``, because with discontinuous normals the pairing of a point opposite a
         node may not converge.

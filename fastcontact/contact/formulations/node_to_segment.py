@@ -6,7 +6,7 @@ DISCRETE with ALGO_CONT='CONTRAINTE').
 
 The formulation does not pass the patch test on non-matching meshes, and its pressures oscillate on quadratic facets. Under
 a uniform pressure, the forces at the corners of six-node triangles vanish, and those at the corners of eight-node
-quadrangles are tensile. Secondary sides with such facets are refused.
+quadrangles are tensile. Secondary sides with such facets are rejected.
 """
 
 from __future__ import annotations

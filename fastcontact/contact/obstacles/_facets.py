@@ -149,11 +149,11 @@ def _neighbours(blocks: list[Block], group: str) -> Indices:
             f"{_described(blocks, at)} of the rigid surface '{group}' shares an edge with more than one other facet: a "
             "surface must not branch, so split it into several groups"
         )
-    one = first[count == 2]
+    shared = first[count == 2]
     beyond = np.full((sum(len(block.nodes) for block in blocks), ridge.max() + 1), -1, np.intp)
-    beyond[facet[one], ridge[one]] = facet[one + 1]
-    beyond[facet[one + 1], ridge[one + 1]] = facet[one]
-    _check_orientation(blocks, group, facet[one], facet[one + 1], sign[one] != sign[one + 1])
+    beyond[facet[shared], ridge[shared]] = facet[shared + 1]
+    beyond[facet[shared + 1], ridge[shared + 1]] = facet[shared]
+    _check_orientation(blocks, group, facet[shared], facet[shared + 1], sign[shared] != sign[shared + 1])
     return beyond
 
 

@@ -14,9 +14,10 @@ from fastcontact.errors import ContactError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
-# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE and by more than this fraction
-# of its height, so that borders on a plane of symmetry, to which facets are never exactly normal, remain in contact.
-LEAN = 0.27
+# A point counts as beyond the border of an open surface if it overhangs by more than BESIDE times the size of the facet and
+# by more than this fraction of its height, so that borders on a plane of symmetry, to which facets are never exactly normal,
+# remain in contact.
+LARGEST_INCLINATION = 0.27
 
 
 @typed(ContactError)
@@ -46,8 +47,8 @@ class MeshedSurface:
     MeshError
         If there is no such group.
     ContactError
-        If the group contains no facets, a facet has no area, or an edge is shared by facets of opposite orientation or by
-        more than two facets.
+        If the group contains no facets, a facet has no area, an edge is shared by facets of opposite orientation or by more
+        than two facets, or `crease` is out of range.
 
     Examples
     --------
@@ -66,7 +67,7 @@ class MeshedSurface:
     def __post_init__(self) -> None:
         if not 0.0 <= self.crease <= 180.0:
             raise ContactError(
-                f"crease = {self.crease} of the rigid surface '{self.group}' must lie in 0 to 180 degrees"
+                f"crease = {self.crease} of the rigid surface '{self.group}' must lie between 0 and 180 degrees"
             )
         object.__setattr__(self, "_facets", surface_facets(self.mesh, self.group, self.flip, self.crease))
 
@@ -85,7 +86,7 @@ class MeshedSurface:
         if len(shared):
             raise ContactError(
                 f"{len(shared)} points of the rigid surface '{self.group}' belong to solid cells of the model (first: "
-                f"point {shared[0]}): a rigid surface must be separate, so give it its own points or its own mesh"
+                f"point {shared[0]}): a rigid surface must be separate, so give it separate points or a separate mesh"
             )
 
     def distance(self, points: Array) -> tuple[Array, Array]:
@@ -96,49 +97,49 @@ class MeshedSurface:
                 f"the rigid surface '{self.group}' has {dim} dimensions, but the model has {points.shape[1]}"
             )
         closest = closest_of_kinds(points, [block.corners for block in self._facets.blocks])
-        sense, smooth, on_ridge, on_border = self._frames(closest)
+        pseudonormal, smooth, on_edge, on_border = self._frames(closest)
         offset = points - closest.position
         extents = [np.linalg.norm(np.ptp(block.corners, axis=1), axis=1) for block in self._facets.blocks]
         size = np.concatenate(extents)[closest.facet]
-        # At touching points the direction to the closest point is dominated by round-off; the facet's normal replaces it.
+        # At touching points the direction between both points is dominated by round-off; the facet's normal replaces it.
         touching = closest.distance <= SINGLE_PRECISION * size
-        outside = np.einsum("nd,nd->n", offset, sense) >= 0
+        outside = np.einsum("nd,nd->n", offset, pseudonormal) >= 0
         distance = np.where(outside, closest.distance, -closest.distance)
-        normal = smooth if self.crease else np.where(on_ridge[:, None], smooth, closest.normal)
-        sense /= np.linalg.norm(sense, axis=1, keepdims=True)
-        # Next to a sharp edge the normal is the direction to the closest point, not the normal of either facet.
-        sharp = np.einsum("nd,nd->n", sense, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
-        turned = on_ridge & sharp & ~touching
-        normal[turned] = offset[turned] / distance[turned, None]
-        height = np.abs(np.einsum("nd,nd->n", offset, sense))
-        aside = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
-        nothing = on_border & (aside > BESIDE * size) & (aside > LEAN * height)
-        return np.where(nothing, np.inf, distance), normal
+        normal = smooth if self.crease else np.where(on_edge[:, None], smooth, closest.normal)
+        pseudonormal /= np.linalg.norm(pseudonormal, axis=1, keepdims=True)
+        # Next to a sharp edge the normal lies between the point and its closest point, not along the normal of either facet.
+        sharp = np.einsum("nd,nd->n", pseudonormal, smooth) < np.cos(np.radians(0.5 * self.crease)) - LENGTH_ROUND_OFF
+        corrected = on_edge & sharp & ~touching
+        normal[corrected] = offset[corrected] / distance[corrected, None]
+        height = np.abs(np.einsum("nd,nd->n", offset, pseudonormal))
+        overhang = np.sqrt(np.maximum(closest.distance**2 - height**2, 0.0))
+        beyond_border = on_border & (overhang > BESIDE * size) & (overhang > LARGEST_INCLINATION * height)
+        return np.where(beyond_border, np.inf, distance), normal
 
     def _frames(self, closest: Closest) -> tuple[Array, Array, Mask, Mask]:
-        """Return pseudonormals (n, dim) at projections, smooth normals, and whether projections lie on a ridge or border.
+        """Return pseudonormals (n, dim), smooth normals (n, dim), and which projections lie on edges and on the border.
 
         The pseudonormal always gives the correct sign of the distance. It is the normal inside a facet, the mean of the
         adjacent facets on an edge, and the angle-weighted mean of all facets at a corner (Baerentzen and Aanaes, 2005).
         """
-        sense, smooth = closest.normal.copy(), np.empty_like(closest.normal)
-        on_ridge, on_border = np.zeros(len(sense), bool), np.zeros(len(sense), bool)
+        pseudonormal, smooth = closest.normal.copy(), np.empty_like(closest.normal)
+        on_edge, on_border = np.zeros(len(pseudonormal), bool), np.zeros(len(pseudonormal), bool)
         facets, first = self._facets, 0
         for block, normals in zip(facets.blocks, facets.smooth, strict=True):
             in_block = np.flatnonzero((closest.facet >= first) & (closest.facet < first + len(block.nodes)))
             rows, xi = closest.facet[in_block] - first, closest.xi[in_block]
             mean = np.einsum("nk,nkd->nd", block.element.shape(xi), normals[rows])
             smooth[in_block] = mean / np.linalg.norm(mean, axis=1, keepdims=True)
-            corner, edge = _place(block, xi)
+            corner, edge = _corners_and_edges(block, xi)
             at = np.flatnonzero(corner >= 0)
             node = block.nodes[rows[at], corner[at]]
-            sense[in_block[at]], on_border[in_block[at]] = facets.at_points[node], facets.on_border[node]
+            pseudonormal[in_block[at]], on_border[in_block[at]] = facets.at_points[node], facets.on_border[node]
             at = np.flatnonzero(edge >= 0)
-            sense[in_block[at]] += self._across(block, first, rows[at], edge[at], xi[at])
+            pseudonormal[in_block[at]] += self._across(block, first, rows[at], edge[at], xi[at])
             on_border[in_block[at]] = facets.beyond[first + rows[at], edge[at]] < 0
-            on_ridge[in_block] = (corner >= 0) | (edge >= 0)
+            on_edge[in_block] = (corner >= 0) | (edge >= 0)
             first += len(block.nodes)
-        return sense, smooth, on_ridge, on_border
+        return pseudonormal, smooth, on_edge, on_border
 
     def _across(self, block: Block, first: int, rows: Indices, edge: Indices, xi: Array) -> Array:
         """Return the normals (n, 3) of the facets beyond edges, at the same points; zero where there is none."""
@@ -159,7 +160,7 @@ class MeshedSurface:
         return directions
 
 
-def _place(block: Block, xi: Array) -> tuple[Indices, Indices]:
+def _corners_and_edges(block: Block, xi: Array) -> tuple[Indices, Indices]:
     """Return the corners (n,) and edges (n,) of facets on which reference coordinates lie, -1 for none."""
     element = block.element
     none = np.full(len(xi), -1, np.intp)

@@ -311,5 +311,5 @@ class FlatPunch:
         normal = np.zeros_like(points)
         normal[:, -1] = sign
         gap = sign * (points[:, -1] - self.height)
-        beside = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + ROUND_OFF)
-        return np.where(beside, np.inf, gap), normal
+        beyond_edge = np.linalg.norm(points[:, :-1], axis=1) > self.radius * (1 + ROUND_OFF)
+        return np.where(beyond_edge, np.inf, gap), normal

@@ -3,7 +3,7 @@
 Weighted gaps with standard multipliers are coupled by a mass matrix of the secondary surface, whose inverse is a full
 matrix. Its factors, however, are sparse, so that a solution costs little compared with a product with the stiffness matrix.
 Preconditioners need sparse weights. They use a sparse approximation of the inverse, with one block per node, that is exact
-for translations.
+for translations in the directions of the pivots of the node.
 
 Near singularity of a factorised matrix is detected by an estimate of its condition number, which takes a few solutions
 (`condition`). The diagonal of the triangular factors is not sufficient: if two rows of many are equal, all its entries may be
@@ -64,7 +64,7 @@ class SparseInverse:
 
     @property
     def sparse(self) -> SparseInverse:
-        """The inverse itself, as for `CoupledPivots`."""
+        """The inverse itself; that of `CoupledPivots` is an approximation."""
         return self
 
     def solve(self, b: Array) -> Array:
@@ -97,6 +97,8 @@ class CoupledPivots:
     ------
     CoupledError
         If P is singular or nearly singular, or if lumping cancels most of a row.
+    RepeatedError
+        If the lumped matrix is singular.
     """
 
     def __init__(self, P: csr_array, pivots: Indices, size: int) -> None:
@@ -127,8 +129,9 @@ Inverse = SparseInverse | CoupledPivots
 def lumped(P: csr_array, pivots: Indices, size: int) -> csr_array:
     """Return P (m, m) with the entries of each row added up in the diagonal block of its node, separately by direction.
 
-    The product with a translation of all pivots is unchanged. Entries in directions in which the node of the row has no pivot
-    are left out. `pivots` (m,) are the unknowns of the columns, and `size` is the number of unknowns of a node.
+    Entries in directions in which the node of the row has no pivot are left out. In the other directions, the product with a
+    translation of all pivots is unchanged. `pivots` (m,) are the unknowns of the columns, and `size` is the number of
+    unknowns of a node.
     """
     node, direction = pivots // size, pivots % size
     column = np.full((node.max() + 1) * size, -1, np.intp)

@@ -135,9 +135,9 @@ class Level:
             self.P.combine(1.0, coarse, 1.0, self.x, self.x)
         else:
             pivots, W = self.followers.pivots, self.followers.weights
-            beside = self.x[pivots] - W @ self.x
+            deviation = self.x[pivots] - W @ self.x
             self.P.combine(1.0, coarse, 1.0, self.x, self.x)
-            self.x[pivots] = W @ self.x + beside
+            self.x[pivots] = W @ self.x + deviation
         if self.eliminated is not None:
             self.eliminated.complete(self.x)
 

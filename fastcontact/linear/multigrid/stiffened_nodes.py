@@ -96,9 +96,9 @@ def followers(elimination: Elimination, nodes: Indices, size: int) -> Eliminatio
     unknowns, share, moved = unknowns[enough], csr_array(share[enough]), moved[enough]
     weights_of_followers = csr_array((-W.data[~other], (W.row[~other], W.col[~other])), shape=(m, n))
     weights_of_followers = weights_of_followers + csr_array((np.ones(m), pivots, np.arange(m + 1)), shape=(m, n))
-    beside = unknowns[:, None] // size * size + np.arange(size)
-    at, direction = np.nonzero(~np.isin(beside, unknowns))
-    across = csr_array((moved[at, direction], (at, beside[at, direction])), shape=(len(unknowns), n))
+    of_nodes = unknowns[:, None] // size * size + np.arange(size)
+    at, direction = np.nonzero(~np.isin(of_nodes, unknowns))
+    across = csr_array((moved[at, direction], (at, of_nodes[at, direction])), shape=(len(unknowns), n))
     by = moved[np.arange(len(unknowns)), unknowns % size]
     weights = csr_array(diags_array(1.0 / by, format="csr") @ (share @ weights_of_followers - across))
     return Elimination(unknowns, weights, np.zeros(len(unknowns)), weights)

@@ -1,6 +1,6 @@
 """Reference elements with shape functions and default quadrature, and shape functions of families of elements.
 
-Reference coordinates have no dimension.
+Reference coordinates are dimensionless.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Reading of mesh files with meshio in a child process, with limits of memory and computing time.
 
 meshio allocates whatever a file announces, and several of its readers do not terminate on a truncated file. In these cases
-only the child process ends, and the file is refused with the reason. On Windows only the elapsed time is limited. Frozen
+only the child process ends, and the file is rejected with the reason. On Windows only the elapsed time is limited. Frozen
 applications and programs with embedded Python, which cannot start an interpreter, read without limits.
 """
 

@@ -65,7 +65,7 @@ class Field:
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
     def described(self, value: float, units: Mapping[str, str], where: str = "") -> str:
-        """Return a text for an extreme value of the field."""
+        """Return a label for an extreme value of the field."""
         kind = "maximum" if value >= 0.0 else "minimum"
         return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"
 

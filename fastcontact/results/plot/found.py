@@ -54,8 +54,8 @@ def contacts(
     axes.set(**{f"{axis}label": axis for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
     if len(found_contacts):
-        beside = (1.02, 1.0) if mesh.dim == 2 else (0.0, 1.0)
-        axes.legend(loc="upper left", bbox_to_anchor=beside, fontsize="small")
+        anchor = (1.02, 1.0) if mesh.dim == 2 else (0.0, 1.0)
+        axes.legend(loc="upper left", bbox_to_anchor=anchor, fontsize="small")
     return axes if mesh.dim == 2 or ax is not None else settled(axes)
 
 

@@ -105,7 +105,7 @@ def pressure_profile(
 
 
 def _largest(curve: PressureCurve, units: Units) -> str:
-    """Return a text with the largest pressure of a theory, or with its pressure if it is uniform."""
+    """Return a label with the largest pressure of a theory, or with its pressure if it is uniform."""
     name = "$p_0$" if np.isfinite(curve.radius) else "$p$"
     return f"{name} = {valued(curve.pressure_max, units, 'pressure')}"
 

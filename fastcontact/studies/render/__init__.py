@@ -1,1 +1,1 @@
-"""Rendering of all studies: tables, figures and pages from plain rows, curves and texts."""
+"""Rendering of all studies: tables, figures and pages from plain rows, curves and strings."""

@@ -34,7 +34,7 @@ def panels(
 
 
 def message(ax: Any, text: str) -> None:
-    """Replace axes without data by a text."""
+    """Replace axes without data by a message."""
     ax.set_axis_off()
     ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
 

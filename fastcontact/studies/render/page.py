@@ -48,7 +48,7 @@ def section(heading: str) -> str:
 
 
 def paragraph(text: str) -> str:
-    """Return a text as an HTML paragraph."""
+    """Return a string as an HTML paragraph."""
     return f"<p class='say'>{_signs(html.escape(text))}</p>"
 
 
@@ -58,7 +58,7 @@ def failure(text: str) -> str:
 
 
 def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
-    """Return rows of texts as an HTML table; the first row is the header."""
+    """Return rows of strings as an HTML table; the first row is the header."""
     return f"<div class='wide'>{_signs(html_table(rows[1:], rows[0], caption, style=''))}</div>"
 
 

@@ -29,11 +29,11 @@ def percent(value: float | None, uncertainty: float | None = None) -> str:
 
 
 def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
-    """Return the rows of a table whose columns are given as headers and texts; the first row contains the headers."""
+    """Return the rows of a table whose columns are given as headers and strings; the first row contains the headers."""
     return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return rows of texts as lines with right-aligned columns."""
+    """Return rows of strings as lines with right-aligned columns."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]

@@ -103,7 +103,7 @@ BAD_INPUT = [
     ("hertz_point", {"force": None}, "got none"),
     ("hertz_point", {"radius": 1.0}, "got force and radius"),
     ("paraboloid_punch", {"R": -5.0}, "R is -5:"),
-    ("persson_pin", {"force": None, "contact_angle": 89.0}, r"stays below 8\d\.\d+ degrees"),
+    ("persson_pin", {"force": None, "contact_angle": 89.0}, r"must be below 8\d\.\d+ degrees"),
     ("persson_pin", {"force": None, "contact_angle": 30.0, "clearance": 0.0}, "without clearance"),
     ("persson_pin", {"clearance": -1.0}, "clearance is -1"),
     ("persson_pin", {"force": None}, "exactly one of force, contact_angle"),

@@ -182,7 +182,7 @@ def test_a_pipe_is_no_result_file(whole, path, capsys):
     os.mkfifo(path)
     for extra in ([], ["--resume"]):
         assert run(whole[0], path, *extra) == 1
-        assert only_line(capsys.readouterr().err) == f"error: '{path}' is a device or a pipe: name a plain file"
+        assert only_line(capsys.readouterr().err) == f"error: '{path}' is a device or a pipe: name a regular file"
     assert path.is_fifo()
 
 
@@ -205,8 +205,8 @@ def test_a_disk_that_is_full_stops_the_run(extra, whole, path, capsys, monkeypat
     n_steps = len(fc.open_results(path))
     assert 1 <= n_steps < STEPS
     assert only_line(capsys.readouterr().err) == (
-        f"error: '{path}' cannot be written at step {n_steps + 1} (File too large), {n_steps} steps are complete: see "
-        "whether the disk is full or the folder protected"
+        f"error: '{path}' cannot be written at step {n_steps + 1} (File too large), {n_steps} steps are complete: check "
+        "the disk space and the permissions of the folder"
     )
     assert_same(path, steps[:n_steps])
     assert run(case, path, "--resume") == 0
@@ -222,7 +222,7 @@ def test_a_full_disk_stops_the_run_before_anything_is_replaced(whole, small_disk
         other.write(bytes(shutil.disk_usage(small_disk).free))
     assert run(case, path) == 1
     assert only_line(capsys.readouterr().err) == (
-        f"error: '{path}' cannot be written (No space left on device): see whether the disk is full or the folder protected"
+        f"error: '{path}' cannot be written (No space left on device): check the disk space and the permissions of the folder"
     )
     assert path.read_bytes() == before
     assert_same(path, steps)

@@ -94,7 +94,7 @@ def test_any_write_may_fail(
             assert not results.complete
         assert_holds(path, len(results))
         if isinstance(error, OSError):
-            assert f"(Input/output error), {len(results)} steps are complete: see whether" in str(caught.value)
+            assert f"(Input/output error), {len(results)} steps are complete: check the disk" in str(caught.value)
         assert os.listdir(path.parent) == [path.name]
         del caught, refused
     assert lengths == {1, 2, 3}

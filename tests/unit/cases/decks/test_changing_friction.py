@@ -28,9 +28,9 @@ def test_more_friction_from_the_third_step_on(text, before, tmp_path):
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ("*Change Friction, interaction=si\n", r"\*CHANGE FRICTION: one \*FRICTION must follow"),
+        ("*Change Friction, interaction=si\n", r"\*CHANGE FRICTION: must be followed by \*FRICTION"),
         (CHANGE.replace("=si", "=no"), "surface interaction 'no' is not defined; interactions: si"),
-        (CHANGE.replace("0.3", "0.3, 1e5"), "a stick slope that changes"),
+        (CHANGE.replace("0.3", "0.3, 1e5"), "a change of the stick slope"),
     ],
 )
 def test_what_is_refused(lines, message, tmp_path):
