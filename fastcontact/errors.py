@@ -97,6 +97,7 @@ def warn(text: str) -> None:
 
 # Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
+SHOWN = 20  # largest number of known names in the message about an unknown one
 # Words of this package for words of its methods and of other programs.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "h": "coefficient", "plane": "half_space",
@@ -145,5 +146,5 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
         near = [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
     if near:
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
-    shown = ", ".join(names[:12]) + (f", ... ({len(names)} in all)" if len(names) > 12 else "")
+    shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
     return f"unknown {kind} '{name}': known are {shown}"

@@ -255,7 +255,7 @@ def _mode_lines(table: Mapping[str, Any]) -> Iterator[str]:
         shown = ", ".join(f"{frequencies[k]:.6g}" for k in modes)
         pairs = ", each of two modes" if any(twins[k] > k for k in modes) else ""
         where = "" if d is None else f", {count(d, 'nodal diameter')}{pairs}"
-        yield f"  natural frequencies at the last step{where}: {shown}"
+        yield f"  natural frequencies [cycles per unit of time] at the last step{where}: {shown}"
 
 
 def count(number: int, noun: str) -> str:

@@ -35,7 +35,9 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
     if array.dtype.kind not in "iuf" or (array.dtype.kind == "f" and not np.array_equal(array, np.floor(array))):
         raise MeshError(f"{name} must be whole numbers, counted from 0, not {array.dtype} values")
     if array.min() < -(2**31) or array.max() >= 2**31:
-        raise MeshError(f"{name} contain the number {array.max()}: the largest that a mesh can hold is 2147483647")
+        raise MeshError(
+            f"{name} contain the number {max(array.flat, key=abs)}: the largest that a mesh can hold is 2147483647"
+        )
     return array
 
 

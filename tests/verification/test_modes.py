@@ -301,7 +301,7 @@ def test_a_case_file_asks_for_modes(tmp_path, capsys):
         '[[support]]\ngroup = "BOTTOM"\ny = 0.0\n[[support]]\ngroup = "BLOCK"\nx = 0.0\n[ramp]\nsteps = 1\n[modes]\nn = 2\n'
     )
     assert main(["run", str(path), "-o", str(out), "--modes", str(tmp_path / "modes.vtkhdf")]) == 0
-    assert "natural frequencies at the last step: 0.25" in capsys.readouterr().out
+    assert "natural frequencies [cycles per unit of time] at the last step: 0.25" in capsys.readouterr().out
     with fc.open_results(tmp_path / "modes.vtkhdf") as results:
         assert len(results) == 2
     path.write_text(path.read_text().replace("n = 2", "m = 2"))

@@ -408,7 +408,9 @@ def test_frequencies_about_the_last_step(tmp_path, capsys):
     exact = np.sqrt(6 * 2e5 / 8e-9 * (1 - k) / (2 + k)) / (2 * np.pi)
     assert fc.modes(deck.model, deck.solve()[-1], n=1).frequencies[0] == pytest.approx(exact, rel=1e-3)  # 100 of 2e5
     assert main(["run", str(tmp_path / "deck.inp"), "-o", str(tmp_path / "r.vtkhdf")]) == 0
-    assert f"natural frequencies at the last step: {exact / 1e5:.0f}" in capsys.readouterr().out
+    assert (
+        f"natural frequencies [cycles per unit of time] at the last step: {exact / 1e5:.0f}" in capsys.readouterr().out
+    )
     for wrong, said in (
         (text.replace(STEP, FREQUENCY), r"\*FREQUENCY needs a step with \*STATIC before"),
         (text + FREQUENCY + STEP, r"\*STEP: follows a step with \*FREQUENCY"),
