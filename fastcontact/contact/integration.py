@@ -11,7 +11,7 @@ from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
 
-# Smallest radius of a node, relative to that of the other end of its facet, at which it does not count as on the axis.
+# Radius of a node, relative to that of the other end of its facet, up to which it counts as on the axis.
 AT_AXIS = 1e-3
 
 

@@ -119,8 +119,8 @@ class NodalForces(NodalField):
     independent : ndarray of int (k,), optional
         Nodes of these values.
     mass : SuperLU, optional
-        Factors of the mass matrix (k, k) of these values [area]. They are used for quadratic facets, whose nodal areas are not
-        all positive, for example zero on the axis, so that forces cannot be divided by them.
+        Factors of the mass matrix (k, k) of these values [area]. They are used for quadratic facets, for which
+        forces divided by nodal areas are not nodal values of a field.
     """
 
     nodal_areas: Array
