@@ -23,6 +23,7 @@ from fastcontact.contact.pairing import normals
 from fastcontact.contact.surface import Surface
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.results.step import ContactResult, half_width
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 def contact_results(
@@ -88,6 +89,8 @@ def contact_result(
     if pair.options.tied:  # in the undeformed configuration
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
     shear, sticking, tangential = _along_the_surface(constraints, solution, rows, normal, closed_nodes)
+    if pair.axisymmetric:  # The radial traction is an odd function of the radius.
+        shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _forces(pair, constraints, multiplier, tangential)
     faced = np.where(np.isfinite(normal), normal, 0.0)
     middle = contact_middle(pair, faced, np.einsum("nd,nd->n", forces, faced), closed, gap)

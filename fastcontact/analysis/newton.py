@@ -293,6 +293,8 @@ class _Newton:
         if self._by in held:
             held.remove(self._by)
             whole, held = [], [self._by, *held]  # the whole tangent failed in an earlier iteration
+        if self._by.geometric < WHOLE:  # so did springs
+            return [*whole, *(Regularisation(less, stiff=floats) for less in range(self._by.geometric + 1)[::-1])]
         return whole + held + [Regularisation(less, stiff=floats) for less in range(WHOLE)[::-1]]
 
     def _linearised_contact(self, u: Array, changes: list[float], by: Regularisation) -> tuple[Array, Array]:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, eye_array
 
 from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
+
+# Radius of a node, relative to that of the other end of its facet, up to which it counts as on the axis.
+AT_AXIS = 1e-3
 
 
 def facet_measure(facets: Numbers, element: str, points: Array, xi: Array, axisymmetric: bool) -> Array:
@@ -76,6 +79,27 @@ def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_arra
 def nodal_areas(surface: Surface, points: Array, axisymmetric: bool) -> Array:
     """Return the integrals (m,) of the shape functions of the nodes over a surface [area]; parameters as in `mass_matrix`."""
     return np.asarray(mass_matrix(surface, points, axisymmetric).sum(axis=1)).ravel()
+
+
+def even_at_axis(surface: Surface, points: Array) -> csr_array:
+    """Return the map (m, m) from the values of a field at other nodes to those at all nodes, including ends on the axis.
+
+    The integral of the shape function of the end of a quadratic line on the axis vanishes, and the force of the node, divided
+    by the area of the facet, hardly depends on its value: a 60th of its difference to the value at the other end. Errors of
+    forces would be amplified accordingly. Since a smooth field is an even function of the radius r, its value follows from
+    those at radii r1 and r2 of the two other nodes, (r2^2 p1 - r1^2 p2) / (r2^2 - r1^2). `points` (n_points, dim) are the
+    coordinates of all points [length]; the column of an end is empty, and all other nodes keep their values.
+    """
+    values = eye_array(len(surface.points), format="lil")
+    for block in surface.blocks:
+        radii = np.abs(points[block.facets, 0])
+        on_axis = radii <= AT_AXIS * radii.max(axis=1, keepdims=True)
+        for facet, end in zip(*np.nonzero(on_axis[:, :2]), strict=True) if block.element == "line3" else ():
+            nodes = block.local[facet]
+            r1, r2 = radii[facet, [2, 1 - end]] ** 2
+            values[nodes[end], nodes[end]] = 0.0
+            values[nodes[end], nodes[[2, 1 - end]]] = np.array([r2, -r1]) / (r2 - r1)
+    return csr_array(values)
 
 
 def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:

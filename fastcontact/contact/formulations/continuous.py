@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
-from fastcontact.contact.integration import all_nodes_carry, facet_measure, fine_rule, gauss_rule
+from fastcontact.contact.integration import all_nodes_carry, even_at_axis, facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, filled_up
 from fastcontact.contact.prescribed_normals import Normals
@@ -124,24 +124,16 @@ class Continuous(PressureFieldFormulation):
     def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
         """Return the matrix (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
-        All nodal values are independent, with one exception: if the integration points are the nodes, the end of a quadratic
-        line on the axis has no area, and no equation determines its value. Since the field is an even function of the radius,
-        its value follows from those at the two other nodes of the line.
+        All nodal values are independent, except at nodes without area, at ends of quadratic lines on the axis, see
+        `integration.even_at_axis`, and at excluded nodes.
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
         excluded = self.options.excluded_nodes(self.secondary)
-        blind = np.flatnonzero((seen == 0.0) | excluded)
-        values = eye_array(size, format="lil")
-        lines = [block.local for block in self.secondary.blocks if block.element == "line3"]
-        for facet in np.concatenate(lines) if len(blind) and lines else ():
-            for end, other in ((0, 1), (1, 0)):
-                if facet[end] in blind and not excluded[facet[end]]:
-                    values[facet[end], facet[end]] = 0.0
-                    values[facet[end], facet[2]] = 4.0 / 3.0
-                    values[facet[end], facet[other]] = -1.0 / 3.0
-        kept = np.setdiff1d(np.arange(size), blind)
-        return csr_array((values.tocsr() @ spread(self.secondary, excluded, kept))[:, kept]), kept
+        even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(size))
+        values = csr_array(diags_array((~excluded).astype(float)) @ even + diags_array(excluded.astype(float)))
+        kept = np.flatnonzero((seen != 0.0) & ~excluded & (even.diagonal() != 0.0))
+        return csr_array((values @ spread(self.secondary, excluded, kept))[:, kept]), kept
 
     def unilateral(self, at: Configuration) -> Constraints:
         """Pair the integration points on the deformed configuration, and return one constraint per point."""

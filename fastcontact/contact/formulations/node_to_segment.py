@@ -16,14 +16,15 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
+from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints, NodalField
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.integration import all_nodes_carry, mass_matrix, nodal_areas
+from fastcontact.contact.integration import all_nodes_carry, even_at_axis, mass_matrix, nodal_areas
 from fastcontact.contact.pairing import Candidates, Pairing
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
@@ -98,7 +99,11 @@ class NodeToSegment(Formulation):
         areas = nodal_areas(self.secondary, self.points, self.axisymmetric)
         if self.secondary.order == 1:
             return NodalForces(areas)
-        return NodalForces(areas, splu(mass_matrix(self.secondary, self.points, self.axisymmetric).tocsc()))
+        even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(len(areas)))
+        nodes = np.flatnonzero(even.diagonal())
+        values = csr_array(even[:, nodes])
+        mass = mass_matrix(self.secondary, self.points, self.axisymmetric)
+        return NodalForces(areas, values, nodes, splu((values.T @ mass @ values).tocsc()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +114,18 @@ class NodalForces(NodalField):
     ----------
     nodal_areas : ndarray (n_nodes,)
         Integrals of the shape functions of the nodes [area].
+    values : csr_array (n_nodes, k), optional
+        Map from the values at the nodes of quadratic facets to those at all nodes; see `integration.even_at_axis`.
+    independent : ndarray of int (k,), optional
+        Nodes of these values.
     mass : SuperLU, optional
-        Factors of the mass matrix of the surface [area]. They are used for quadratic facets, whose nodal areas are not all
-        positive, for example zero on the axis, so that forces cannot be divided by them.
+        Factors of the mass matrix (k, k) of these values [area]. They are used for quadratic facets, for which
+        forces divided by nodal areas are not nodal values of a field.
     """
 
     nodal_areas: Array
+    values: csr_array | None = None
+    independent: Indices | None = None
     mass: SuperLU | None = None
 
     def pressure(self, force: Array) -> Array:
@@ -122,7 +133,20 @@ class NodalForces(NodalField):
 
         They are the forces divided by the nodal areas or, for quadratic facets, the solution with the mass matrix.
         """
-        return force / self.nodal_areas if self.mass is None else self.mass.solve(force)
+        if self.values is None or self.mass is None:
+            return force / self.nodal_areas
+        return np.asarray(self.values @ self.mass.solve(self.values.T @ force))
+
+    def closed_nodes(self, active: Mask, gap: Array, pressure: Array) -> Mask:
+        """Return the active nodes, and ends of quadratic lines on the axis if the other nodes of their facets are active.
+
+        The force of such an end vanishes, and in equilibrium its gap may be slightly open.
+        """
+        if self.values is None:
+            return active
+        others = self.values.indptr[1:] - self.values.indptr[:-1] > 1
+        apart = abs(self.values) @ (~active[self.independent]).astype(float)
+        return active | (others & (apart == 0.0))
 
 
 FORMULATION = NodeToSegment

@@ -1,5 +1,6 @@
 """Surface smoothing: exact on circles, cylinders and spheres, no effect on flat sides; messages."""
 
+import re
 import warnings
 
 import numpy as np
@@ -140,6 +141,41 @@ def test_chords_that_push_sides_apart_are_told(options, told):
     assert bool(texts) == told
     if told:
         assert "surface_smoothing=True" in texts[0]
+
+
+@pytest.mark.parametrize(("divisions", "secondary", "formulation"), [
+    ((80, 64), "CONT_INNER", "mortar"), ((80, 64), "CONT_OUTER", "mortar"), ((128, 192), "CONT_OUTER", "continuous"),
+    ((128, 192), "CONT_INNER", "mortar"), ((80, 64), "CONT_OUTER", "node_to_segment"),
+    ((47, 48), "CONT_INNER", "node_to_segment"),
+])  # fmt: skip
+def test_the_error_told_of_a_press_fit_is_right_within_a_factor_of_three(divisions, secondary, formulation):
+    """Mean gaps hardly show the sags of facets of nearly equal lengths: they cancel over each facet."""
+    inner, outer = divisions
+    mesh = fc.generate.rings(
+        "quad4", inner_radius=20.0, outer_radius=100.0, divisions_inner=(8, inner), divisions_outer=(8, outer)
+    )
+    model = fc.Model(mesh, kinematics="plane_strain")
+    model.add_material(STEEL, groups=["INNER"])
+    model.add_material(fc.LinearElastic(E=70e3, nu=0.33), groups=["OUTER"])
+    model.fix("SYMMETRY_X", "x")
+    model.fix("SYMMETRY_Y", "y")
+    primary = "CONT_OUTER" if secondary == "CONT_INNER" else "CONT_INNER"
+    options = {} if formulation == "node_to_segment" else {"surface_smoothing": False}
+    model.add_contact("fit", secondary=secondary, primary=primary, clearance=-0.05, formulation=formulation, **options)
+    with pytest.warns(fc.FastcontactWarning, match="deviate from their arcs") as found:
+        contact = fc.solve(model, 1)[-1].contact["fit"]
+    error = np.abs(contact.pressure - 31.6319).max()  # Lame
+    told = float(re.search(r"pressures by about ([\d.]+),", " ".join(str(w.message) for w in found))[1])
+    assert 1.0 / 3.0 < told / error < 3.0
+
+
+def test_facets_of_nearly_equal_lengths_under_a_small_pressure_error_are_not_told():
+    """A pin in a hole of nearly its radius: phases of facets drift slowly, which mean gaps hardly show."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        contact = fc.solve(fit(divisions=(96, 97), clearance=-0.2, surface_smoothing=False), 1)[-1].contact["fit"]
+    assert np.ptp(contact.pressure) < 0.05 * contact.pressure.mean()
+    assert not [warning for warning in found if "deviate from their arcs" in str(warning.message)]
 
 
 @pytest.mark.parametrize(("n", "told"), [(12, True), (48, False)])

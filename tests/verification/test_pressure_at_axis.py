@@ -1,0 +1,57 @@
+"""Pressure at the node on the axis of symmetry, whose area vanishes: it continues the pressures of its neighbours."""
+
+from itertools import product
+
+import pytest
+
+import fastcontact as fc
+
+FORMULATIONS = ["node_to_segment", "continuous", "mortar"]
+
+
+def pressed_ball(element, size, material, force, n_steps, strain="small", **options):
+    """Return the contact and the recovered normal stress in a block under a rigid ball of radius 5 mm."""
+    block = fc.generate.graded_block(element, width=30.0, contact_radius=10.0 * size, contact_size=size)
+    model = fc.Model(block, kinematics="axisymmetric", strain=strain)
+    model.add_material(material)
+    model.fix("BOTTOM", "xy")
+    model.fix("SYMMETRY_X", "x")
+    ball = fc.obstacles.Sphere((0.0, 5.0), 5.0)
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, force={"y": -force}, **options)
+    step = fc.solve(model, n_steps)[-1]
+    contact = step.contact["ball"]
+    return contact, -fc.normal_stress(contact, step)
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+@pytest.mark.parametrize(
+    ("formulation", "element", "strain", "friction"),
+    [*product(FORMULATIONS, ["quad8", "tri6"], ["small", "finite"], [0.0, 0.2])],
+)
+def test_ball_on_an_elastic_block(formulation, element, strain, friction):
+    """Neighbours lie within 0.16 of the contact radius, where pressures are up to 1.3 % smaller than on the axis.
+
+    The recovered stress is within 1 % of the pressure.
+    """
+    contact, stress = pressed_ball(
+        element, 0.15, fc.LinearElastic(E=2.1e5, nu=0.3), 5e4, 2, strain, formulation=formulation, friction=friction
+    )
+    near = (4.0 * contact.pressure[1] - contact.pressure[2]) / 3.0
+    assert contact.pressure[0] == pytest.approx(near, rel=0.003)
+    assert contact.pressure[0] == pytest.approx(stress[0], rel=0.01)
+    assert not contact.shear[0].any()
+    assert contact.active[0]
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.FastcontactWarning")
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_indentation_with_friction(formulation):
+    """The pressure of a Brinell test at the axis was half of its surroundings, and zero with node-to-segment contact.
+
+    In four steps, the pressure field of the plastic contact varies by 15 % from node to node.
+    """
+    steel = fc.ElasticPlastic(E=2.1e5, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (0.1, 550.0), (1.0, 700.0)])
+    contact, stress = pressed_ball("quad8", 0.35, steel, 29420.0, 4, "finite", formulation=formulation, friction=0.2)
+    assert contact.active[0]
+    assert contact.pressure[0] == pytest.approx(contact.pressure[1], rel=0.15)
+    assert contact.pressure[0] == pytest.approx(stress[0], rel=0.18)
