@@ -134,7 +134,7 @@ class FactorSolver(LinearSolver):
         last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
         self._factors = self._factorised(K, last)
         self.counters.setups += 1
-        self.columns, self.known_loads = InverseColumns(self.n, self._factors.solve), KnownLoads()
+        self.columns, self.known_loads = InverseColumns(self.n, self._factors.inverse_entries), KnownLoads()
         self.last = last if len(last) else None
         if self.last is not None:
             self.inverse = self._factors.last_inverse()

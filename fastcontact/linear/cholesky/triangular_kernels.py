@@ -11,10 +11,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import interpretable_kernel, summing_kernel
+from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel, summing_kernel
 from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
+
+# Number of columns of L that are multiplied together in `solve_together`.
+PANEL = 48
 
 
 @interpretable_kernel
@@ -99,3 +102,70 @@ def backward(
             if not single:
                 x[j - 1] -= second_sum + values[other - 1] * x[j]
             j -= 2
+
+
+@kernel
+def solve_together(
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, d: Array, loaded: Mask, wanted: Mask,
+    X: Array,
+) -> None:  # fmt: skip
+    """Replace the rows `wanted` of X (n, k) by those of ``(L D L.T)^-1 X``, by products of panels of L with all k columns.
+
+    Only the rows `loaded` (n,) of X have nonzero entries. The substitutions pass over supernodes that are not `_reached` from
+    them, or from the rows `wanted` (n,). Both masks are overwritten, and other rows of X have no meaning afterwards.
+    """
+    widest = 0
+    for s in range(len(first) - 1):
+        widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
+    room, beside, product = np.empty(PANEL * widest), np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
+    reached = _reached(first, begin, rows, loaded)
+    for s in range(len(first) - 1):
+        for low in range(first[s], first[s + 1] if reached[s] else first[s], PANEL):
+            high = min(low + PANEL, first[s + 1])
+            for j in range(low, high):
+                for i in range(j + 1, high):
+                    X[i] -= values[start[j] + i - j] * X[j]
+            panel = _panel(start, values, low, high, room)
+            moved = beside[: panel.shape[1]]
+            np.dot(panel.T, X[low:high], moved)
+            rest = first[s + 1] - high
+            X[high : first[s + 1]] -= moved[:rest]
+            for k in range(rest, len(moved)):
+                X[rows[begin[s] + k - rest]] -= moved[k]
+    reached = _reached(first, begin, rows, wanted)
+    for s in range(len(first) - 2, -1, -1):
+        last = first[s] + (first[s + 1] - first[s] - 1) // PANEL * PANEL
+        for low in range(last, first[s] - 1 if reached[s] else last, -PANEL):
+            high = min(low + PANEL, first[s + 1])
+            panel = _panel(start, values, low, high, room)
+            gathered, rest = beside[: panel.shape[1]], first[s + 1] - high
+            gathered[:rest] = X[high : first[s + 1]]
+            for k in range(rest, len(gathered)):
+                gathered[k] = X[rows[begin[s] + k - rest]]
+            np.dot(panel, gathered, product[: high - low])
+            for j in range(high - 1, low - 1, -1):
+                X[j] = X[j] / d[j] - product[j - low]
+                for i in range(j + 1, high):
+                    X[j] -= values[start[j] + i - j] * X[i]
+
+
+@kernel
+def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mask:
+    """Return which supernodes (n_supernodes,) have `marked` columns (n,), or descendants in the elimination tree that do."""
+    reached = np.zeros(len(first) - 1, np.bool_)
+    for s in range(len(reached)):
+        reached[s] = marked[first[s] : first[s + 1]].any()
+        if reached[s]:
+            for k in range(begin[s], begin[s + 1]):
+                marked[rows[k]] = True
+    return reached
+
+
+@inlined_kernel
+def _panel(start: Offsets, values: Array, low: int, high: int, room: Array) -> Array:
+    """Return the columns `low` to ``high - 1`` of L below row ``high - 1``, as the rows of a matrix in `room`."""
+    size = start[high] - start[high - 1] - 1
+    panel = room[: (high - low) * size].reshape(high - low, size)
+    for j in range(low, high):
+        panel[j - low] = values[start[j] + high - j : start[j + 1]]
+    return panel
