@@ -221,10 +221,10 @@ class LoadedFactor:
         """See `Loaded`."""
         if self._solver.refines:
             return self._solver.refined(self._f + force)
+        if not force.any():
+            return self._free.copy()
         moved = self._moved(force)
-        if moved is None:
-            return self._solver.back_substitute(self._f + force)
-        return self._free + self._solver.extend(moved) if force.any() else self._free.copy()
+        return self._solver.back_substitute(self._f + force) if moved is None else self._free + self._solver.extend(moved)
 
     def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""

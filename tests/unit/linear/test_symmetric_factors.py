@@ -183,6 +183,17 @@ def test_forces_elsewhere_cost_a_solution():
     np.testing.assert_allclose(K @ u, force, atol=1e-12)
 
 
+@pytest.mark.parametrize("last", [True, False])
+def test_no_further_forces_cost_no_solution(last):
+    K, _, solver = prepared(last=last)
+    f, none = np.random.default_rng(4).normal(size=K.shape[0]), np.zeros(K.shape[0])
+    loaded, before = solver.load(f), solver.counters.iterations
+    for u in (loaded.involved_solution(none, None), loaded.full_solution(none)):
+        np.testing.assert_allclose(K @ u, f, atol=1e-12)
+        u[:] = np.nan  # a copy
+    assert solver.counters.iterations == before
+
+
 def test_loads_that_others_combine_to_cost_nothing():
     A = np.diag(np.arange(1.0, 9.0))
     solved = []
