@@ -224,7 +224,9 @@ class LoadedFactor:
         if not force.any():
             return self._free.copy()
         moved = self._moved(force)
-        return self._solver.back_substitute(self._f + force) if moved is None else self._free + self._solver.extend(moved)
+        return (
+            self._solver.back_substitute(self._f + force) if moved is None else self._free + self._solver.extend(moved)
+        )
 
     def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""
