@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import inlined_kernel, interpretable_kernel, kernel, summing_kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel, summing_kernel
 from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
@@ -117,31 +117,28 @@ def solve_together(
     widest = 0
     for s in range(len(first) - 1):
         widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
-    room, beside, product = np.empty(PANEL * widest), np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
+    room, below = np.empty(PANEL * widest), np.empty(widest, np.int64)
+    beside, product = np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
     reached = _reached(first, begin, rows, loaded)
-    for s in range(len(first) - 1):
+    for s in range(len(reached)):
         for low in range(first[s], first[s + 1] if reached[s] else first[s], PANEL):
             high = min(low + PANEL, first[s + 1])
             for j in range(low, high):
                 for i in range(j + 1, high):
                     X[i] -= values[start[j] + i - j] * X[j]
-            panel = _panel(start, values, low, high, room)
-            moved = beside[: panel.shape[1]]
+            panel, at = _panel(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            moved = beside[: len(at)]
             np.dot(panel.T, X[low:high], moved)
-            rest = first[s + 1] - high
-            X[high : first[s + 1]] -= moved[:rest]
-            for k in range(rest, len(moved)):
-                X[rows[begin[s] + k - rest]] -= moved[k]
+            for k in range(len(at)):
+                X[at[k]] -= moved[k]
     reached = _reached(first, begin, rows, wanted)
-    for s in range(len(first) - 2, -1, -1):
-        last = first[s] + (first[s + 1] - first[s] - 1) // PANEL * PANEL
-        for low in range(last, first[s] - 1 if reached[s] else last, -PANEL):
-            high = min(low + PANEL, first[s + 1])
-            panel = _panel(start, values, low, high, room)
-            gathered, rest = beside[: panel.shape[1]], first[s + 1] - high
-            gathered[:rest] = X[high : first[s + 1]]
-            for k in range(rest, len(gathered)):
-                gathered[k] = X[rows[begin[s] + k - rest]]
+    for s in range(len(reached) - 1, -1, -1):
+        for high in range(first[s + 1], first[s] if reached[s] else first[s + 1], -PANEL):
+            low = max(high - PANEL, first[s])
+            panel, at = _panel(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            gathered = beside[: len(at)]
+            for k in range(len(at)):
+                gathered[k] = X[at[k]]
             np.dot(panel, gathered, product[: high - low])
             for j in range(high - 1, low - 1, -1):
                 X[j] = X[j] / d[j] - product[j - low]
@@ -161,11 +158,18 @@ def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mas
     return reached
 
 
-@inlined_kernel
-def _panel(start: Offsets, values: Array, low: int, high: int, room: Array) -> Array:
-    """Return the columns `low` to ``high - 1`` of L below row ``high - 1``, as the rows of a matrix in `room`."""
-    size = start[high] - start[high - 1] - 1
+@kernel
+def _panel(
+    start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, room: Array, below: Offsets
+) -> tuple[Array, Offsets]:
+    """Return the columns `low` to ``high - 1`` of L from row `high` on, as rows of a matrix, and the numbers of L's rows.
+
+    They are `high` to ``end - 1``, in the same supernode, and `rest`. The results are parts of `room` and `below`.
+    """
+    size = end - high + len(rest)
     panel = room[: (high - low) * size].reshape(high - low, size)
     for j in range(low, high):
         panel[j - low] = values[start[j] + high - j : start[j + 1]]
-    return panel
+    for k in range(size):
+        below[k] = high + k if high + k < end else rest[high + k - end]
+    return panel, below[:size]
