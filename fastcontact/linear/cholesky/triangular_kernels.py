@@ -126,20 +126,18 @@ def solve_together(
             for j in range(low, high):
                 for i in range(j + 1, high):
                     X[i] -= values[start[j] + i - j] * X[j]
-            panel, at = _panel(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
-            moved = beside[: len(at)]
-            np.dot(panel.T, X[low:high], moved)
-            for k in range(len(at)):
-                X[at[k]] -= moved[k]
+            size = _copied(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            np.dot(room[: (high - low) * size].reshape(high - low, size).T, X[low:high], beside[:size])
+            for k in range(size):
+                X[below[k]] -= beside[k]
     reached = _reached(first, begin, rows, wanted)
     for s in range(len(reached) - 1, -1, -1):
         for high in range(first[s + 1], first[s] if reached[s] else first[s + 1], -PANEL):
             low = max(high - PANEL, first[s])
-            panel, at = _panel(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
-            gathered = beside[: len(at)]
-            for k in range(len(at)):
-                gathered[k] = X[at[k]]
-            np.dot(panel, gathered, product[: high - low])
+            size = _copied(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            for k in range(size):
+                beside[k] = X[below[k]]
+            np.dot(room[: (high - low) * size].reshape(high - low, size), beside[:size], product[: high - low])
             for j in range(high - 1, low - 1, -1):
                 X[j] = X[j] / d[j] - product[j - low]
                 for i in range(j + 1, high):
@@ -159,17 +157,17 @@ def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mas
 
 
 @kernel
-def _panel(
-    start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, room: Array, below: Offsets
-) -> tuple[Array, Offsets]:
-    """Return the columns `low` to ``high - 1`` of L from row `high` on, as rows of a matrix, and the numbers of L's rows.
+def _copied(
+    start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, panel: Array, below: Offsets
+) -> int:
+    """Fill `panel` with the columns `low` to ``high - 1`` of L from row `high` on, one after another; return their length.
 
-    They are `high` to ``end - 1``, in the same supernode, and `rest`. The results are parts of `room` and `below`.
+    `below` is filled with the numbers of these rows: `high` to ``end - 1``, in the same supernode, and `rest`.
     """
     size = end - high + len(rest)
-    panel = room[: (high - low) * size].reshape(high - low, size)
     for j in range(low, high):
-        panel[j - low] = values[start[j] + high - j : start[j + 1]]
+        for k in range(size):
+            panel[(j - low) * size + k] = values[start[j] + high - j + k]
     for k in range(size):
         below[k] = high + k if high + k < end else rest[high + k - end]
-    return panel, below[:size]
+    return size
