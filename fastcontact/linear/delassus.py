@@ -22,9 +22,6 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ContactError, ConvergenceError
 from fastcontact.linear.field_compliance import FieldCompliance
 
-# Number of right-hand sides that are solved for at a time. It bounds the memory of complete columns of K^-1, of which only
-# the entries at a few degrees of freedom are stored.
-CHUNK = 32
 # Largest number of constraints whose Delassus operator is formed and factorised. A matrix of 20 000 rows takes 3.2 GB, and
 # its factorisation minutes. With friction, Newton's method factorises a nonsymmetric matrix several times for each pairing;
 # with 6 000 rows, one factorisation takes ten seconds.
@@ -67,9 +64,9 @@ class InverseColumns:
     ----------
     n : int
         Size of K.
-    solve_many : method
-        Method of the solver to which this object belongs. It maps right-hand sides (n, k) [force] to solutions (n, k)
-        [length].
+    entries : method
+        Method of the solver or factors to which this object belongs. It maps rows (m,) and columns (k,) to the entries of
+        ``K^-1`` in them, shape (m, k) [length / force].
     most : int, optional
         Largest number of columns; unlimited by default.
 
@@ -80,10 +77,10 @@ class InverseColumns:
         depend on it.
     """
 
-    def __init__(self, n: int, solve_many: Callable[[Array], Array], most: int | None = None) -> None:
+    def __init__(self, n: int, entries: Callable[[Indices, Indices], Array], most: int | None = None) -> None:
         self._most = n if most is None else most
         # The reference is weak, because a reference cycle would keep the factors of the solver, which are large, in memory.
-        self._solve_many = weakref.WeakMethod(solve_many)
+        self._entries = weakref.WeakMethod(entries)
         self._place = np.full(n, -1, np.intp)
         self._dofs = np.empty(0, np.intp)
         self._values = np.empty((0, 0))
@@ -135,17 +132,23 @@ class InverseColumns:
         self.asked.append(new)
         self._dofs = np.concatenate([self._dofs, new])
         self._place[new] = np.arange(old, len(self._dofs))
-        solve_many = self._solve_many()
-        assert solve_many is not None, "the columns outlived their solver"
+        entries = self._entries()
+        assert entries is not None, "the columns outlived their solver"
         grown = np.empty((len(self._dofs), len(self._dofs)))
         grown[:old, :old] = self._values
-        for first in range(0, len(new), CHUNK):
-            chunk = new[first : first + CHUNK]
-            unit = np.zeros((len(self._place), len(chunk)))
-            unit[chunk, np.arange(len(chunk))] = 1.0
-            grown[:, old + first : old + first + len(chunk)] = solve_many(unit)[self._dofs]
+        grown[:, old:] = entries(self._dofs, new)
         grown[old:, :old] = grown[:old, old:].T
         self._values = grown
+
+
+def inverse_entries(n: int, solve: Callable[[Array], Array], rows: Indices, columns: Indices) -> Array:
+    """Return the entries of ``K^-1`` (n, n) in some `rows` (m,) and `columns` (k,), by a solution for each column."""
+    entries = np.empty((len(rows), len(columns)))
+    for k, column in enumerate(columns):
+        unit = np.zeros(n)
+        unit[column] = 1.0
+        entries[:, k] = solve(unit)[rows]
+    return entries
 
 
 def lu_factors(A: Array) -> tuple[Array, Array]:

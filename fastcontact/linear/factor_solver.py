@@ -134,7 +134,7 @@ class FactorSolver(LinearSolver):
         last = np.empty(0, np.intp) if involved is None or len(involved) > LAST_UP_TO else involved
         self._factors = self._factorised(K, last)
         self.counters.setups += 1
-        self.columns, self.known_loads = InverseColumns(self.n, self._factors.solve), KnownLoads()
+        self.columns, self.known_loads = InverseColumns(self.n, self._factors.inverse_entries), KnownLoads()
         self.last = last if len(last) else None
         if self.last is not None:
             self.inverse = self._factors.last_inverse()
@@ -221,10 +221,12 @@ class LoadedFactor:
         """See `Loaded`."""
         if self._solver.refines:
             return self._solver.refined(self._f + force)
+        if not force.any():
+            return self._free.copy()
         moved = self._moved(force)
-        if moved is None:
-            return self._solver.back_substitute(self._f + force)
-        return self._free + self._solver.extend(moved) if force.any() else self._free.copy()
+        return (
+            self._solver.back_substitute(self._f + force) if moved is None else self._free + self._solver.extend(moved)
+        )
 
     def condensed(self) -> CondensedProblem | None:
         """See `Loaded`."""

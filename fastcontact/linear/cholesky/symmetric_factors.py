@@ -12,6 +12,9 @@ from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.linear.cholesky import triangular_kernels
 
+# Largest number of right-hand sides that are solved for together.
+TOGETHER = 128
+
 
 class LowerTriangle(NamedTuple):
     """L (n, n), stored by columns, with common row indices for the columns of a supernode; see `triangular_kernels`."""
@@ -50,17 +53,28 @@ class SymmetricFactors:
         """Memory of the factors [bytes]."""
         return sum(array.nbytes for array in (*self._L, self._d, self._place, self._given))
 
-    def solve(self, F: Array) -> Array:
-        """Return ``K^-1 F`` for right-hand sides (n,) or (n, k) [force]."""
-        none_given = np.zeros(self.n, bool)
-        X = np.empty((self.n, *F.shape[1:]))
-        X[self._place] = F
-        columns = np.ascontiguousarray(X.reshape(self.n, -1).T)
-        for x in columns:
-            triangular_kernels.forward(*self._L, x)
-            x /= self._d
-            triangular_kernels.backward(*self._L, none_given, x)
-        return np.ascontiguousarray(columns.T).reshape(X.shape)[self._place]
+    def solve(self, f: Array) -> Array:
+        """Return ``K^-1 f`` (n,) for a right-hand side (n,) [force]."""
+        x = np.empty(self.n)
+        x[self._place] = f
+        triangular_kernels.forward(*self._L, x)
+        x /= self._d
+        triangular_kernels.backward(*self._L, np.zeros(self.n, bool), x)
+        return x[self._place]
+
+    @on_one_blas_thread
+    def inverse_entries(self, rows: Indices, columns: Indices) -> Array:
+        """Return the entries of ``K^-1`` in some `rows` (m,) and `columns` (k,), shape (m, k) [length / force]."""
+        at, place = self._place[rows], self._place[columns]
+        entries, order = np.empty((len(rows), len(columns))), np.argsort(place)  # neighbours have common ancestors
+        size = min(TOGETHER, max(1, self.nnz // self.n))  # for no more memory than that of the factors
+        for part in (order[begin : begin + size] for begin in range(0, len(order), size)):
+            X, loaded, wanted = np.zeros((self.n, len(part))), np.zeros(self.n, bool), np.zeros(self.n, bool)
+            X[place[part], np.arange(len(part))] = 1.0
+            loaded[place[part]], wanted[at] = True, True
+            triangular_kernels.solve_together(*self._L, self._d, loaded, wanted, X)
+            entries[:, part] = X[at]
+        return entries
 
     @on_one_blas_thread
     def last_inverse(self) -> Array:

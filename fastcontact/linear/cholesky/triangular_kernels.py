@@ -11,10 +11,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fastcontact._jit.decorators import interpretable_kernel, summing_kernel
+from fastcontact._jit.decorators import interpretable_kernel, kernel, summing_kernel
 from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
+
+# Number of columns of L that are multiplied together in `solve_together`.
+PANEL = 48
 
 
 @interpretable_kernel
@@ -99,3 +102,72 @@ def backward(
             if not single:
                 x[j - 1] -= second_sum + values[other - 1] * x[j]
             j -= 2
+
+
+@kernel
+def solve_together(
+    start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, d: Array, loaded: Mask, wanted: Mask,
+    X: Array,
+) -> None:  # fmt: skip
+    """Replace the rows `wanted` of X (n, k) by those of ``(L D L.T)^-1 X``, by products of panels of L with all k columns.
+
+    Only the rows `loaded` (n,) of X have nonzero entries. The substitutions pass over supernodes that are not `_reached` from
+    them, or from the rows `wanted` (n,). Both masks are overwritten, and other rows of X have no meaning afterwards.
+    """
+    widest = 0
+    for s in range(len(first) - 1):
+        widest = max(widest, first[s + 1] - first[s] + begin[s + 1] - begin[s])
+    room, below = np.empty(PANEL * widest), np.empty(widest, np.int64)
+    beside, product = np.empty((widest, X.shape[1])), np.empty((PANEL, X.shape[1]))
+    reached = _reached(first, begin, rows, loaded)
+    for s in range(len(reached)):
+        for low in range(first[s], first[s + 1] if reached[s] else first[s], PANEL):
+            high = min(low + PANEL, first[s + 1])
+            for j in range(low, high):
+                for i in range(j + 1, high):
+                    X[i] -= values[start[j] + i - j] * X[j]
+            size = _copied(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            np.dot(room[: (high - low) * size].reshape(high - low, size).T, X[low:high], beside[:size])
+            for k in range(size):
+                X[below[k]] -= beside[k]
+    reached = _reached(first, begin, rows, wanted)
+    for s in range(len(reached) - 1, -1, -1):
+        for high in range(first[s + 1], first[s] if reached[s] else first[s + 1], -PANEL):
+            low = max(high - PANEL, first[s])
+            size = _copied(start, values, low, high, first[s + 1], rows[begin[s] : begin[s + 1]], room, below)
+            for k in range(size):
+                beside[k] = X[below[k]]
+            np.dot(room[: (high - low) * size].reshape(high - low, size), beside[:size], product[: high - low])
+            for j in range(high - 1, low - 1, -1):
+                X[j] = X[j] / d[j] - product[j - low]
+                for i in range(j + 1, high):
+                    X[j] -= values[start[j] + i - j] * X[i]
+
+
+@kernel
+def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mask:
+    """Return which supernodes (n_supernodes,) have `marked` columns (n,), or descendants in the elimination tree that do."""
+    reached = np.zeros(len(first) - 1, np.bool_)
+    for s in range(len(reached)):
+        reached[s] = marked[first[s] : first[s + 1]].any()
+        if reached[s]:
+            for k in range(begin[s], begin[s + 1]):
+                marked[rows[k]] = True
+    return reached
+
+
+@kernel
+def _copied(
+    start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, panel: Array, below: Offsets
+) -> int:
+    """Fill `panel` with the columns `low` to ``high - 1`` of L from row `high` on, one after another; return their length.
+
+    `below` is filled with the numbers of these rows: `high` to ``end - 1``, in the same supernode, and `rest`.
+    """
+    size = end - high + len(rest)
+    for j in range(low, high):
+        for k in range(size):
+            panel[(j - low) * size + k] = values[start[j] + high - j + k]
+    for k in range(size):
+        below[k] = high + k if high + k < end else rest[high + k - end]
+    return size

@@ -14,9 +14,9 @@ from typing import Self
 import numpy as np
 from scipy.sparse import bsr_array
 
-from fastcontact.arrays import Array
+from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError, ModelError
-from fastcontact.linear.delassus import InverseColumns
+from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.krylov.iterations import (
     ConjugateGradients,
@@ -124,7 +124,7 @@ class Multigrid:
         self._residuals: ConjugateResiduals | None = None
         self._diagonal: Array | None = None
         self._build(rigid_modes, near)
-        self.columns = InverseColumns(n, self._solve_many, MOST_COLUMNS)
+        self.columns = InverseColumns(n, self._inverse_entries, MOST_COLUMNS)
 
     def near(self) -> Self:
         """Return a copy to be prepared for a matrix that differs little: its coarser levels are kept.
@@ -161,9 +161,9 @@ class Multigrid:
         self.K.change(precision)
         self._build(self._modes.astype(float))
 
-    def _solve_many(self, F: Array) -> Array:
-        """Return ``K^-1 F`` (n, k) [length] for right-hand sides F (n, k) [force]."""
-        return np.column_stack([self.solution(np.ascontiguousarray(f), None, None) for f in F.T])
+    def _inverse_entries(self, rows: Indices, columns: Indices) -> Array:
+        """Return the entries of ``K^-1`` in some `rows` (m,) and `columns` (k,), shape (m, k) [length / force]."""
+        return inverse_entries(self.K.shape[0], lambda f: self.solution(f, None, None), rows, columns)
 
     def constrain(self, elimination: Elimination | None, springs: Springs | None = None) -> None:
         """Set the equations and springs of the iteration, and change the hierarchy for them.

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import cg
 
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError
-from fastcontact.linear.delassus import InverseColumns
+from fastcontact.linear.delassus import InverseColumns, inverse_entries
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.elimination.loaded import LoadedIteration, put_back_tolerance, tighten
 from fastcontact.linear.multigrid.solver import MAX_ITERATIONS
@@ -59,7 +59,7 @@ class Pyamg(LinearSolver):
         """Build the hierarchy of K without modifying K; see `LinearSolver.prepare`."""
         self.K, self._modes = K, rigid_modes
         self._constrain(None)
-        self.columns = InverseColumns(K.shape[0], self._solve_many)
+        self.columns = InverseColumns(K.shape[0], self._inverse_entries)
         return K
 
     def _constrain(self, elimination: Elimination | None) -> None:
@@ -79,8 +79,8 @@ class Pyamg(LinearSolver):
         self._hierarchy = smoothed_aggregation_solver(self._A, B=modes, **OPTIONS)
         self.counters.setups += 1
 
-    def _solve_many(self, F: Array) -> Array:
-        return np.column_stack([self.solution(f, None, None) for f in F.T])
+    def _inverse_entries(self, rows: Indices, columns: Indices) -> Array:
+        return inverse_entries(self.K.shape[0], lambda f: self.solution(f, None, None), rows, columns)
 
     def solution(
         self, f: Array, elimination: Elimination | None, guess: Array | None, monitor: Monitor | None = None,

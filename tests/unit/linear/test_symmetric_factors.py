@@ -12,7 +12,7 @@ from fastcontact.analysis.criteria import Criteria
 from fastcontact.elasticity.constrained_system import supports_apart
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.linear import choice as linear
-from fastcontact.linear.cholesky import triangular_kernels
+from fastcontact.linear.cholesky import symmetric_factors, triangular_kernels
 from fastcontact.linear.cholesky.factorisation import fill_reducing, reordered
 from fastcontact.linear.factor_solver import KnownLoads
 
@@ -75,6 +75,33 @@ def test_triangular_kernels_are_those_of_numpy(n, density, seed):
     np.testing.assert_allclose((dense.T @ x)[~given], b[~given], atol=1e-13)
 
 
+@pytest.mark.parametrize("panel", [1, 3, 48])
+@pytest.mark.parametrize(("n", "density"), [(1, 0.0), (7, 0.0), (40, 0.05), (60, 0.3), (30, 1.0)])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_solutions_together_are_those_of_numpy(n, density, seed, panel, monkeypatch):
+    L, rng = lower(n, density, seed), np.random.default_rng(seed)
+    d, loaded, wanted = rng.uniform(1.0, 2.0, n), rng.random(n) < 0.1, rng.random(n) < 0.2
+    F = np.where(loaded[:, None], rng.normal(size=(n, 5)), 0.0)
+    exact = np.linalg.solve((L.toarray() * d) @ L.toarray().T, F)
+    monkeypatch.setattr(triangular_kernels, "PANEL", panel)
+    solve = getattr(triangular_kernels.solve_together, "py_func", triangular_kernels.solve_together)
+    for function in (solve, triangular_kernels.solve_together) if panel == 48 else (solve,):
+        X = F.copy()
+        function(*by_supernodes(L), d, loaded.copy(), wanted.copy(), X)
+        np.testing.assert_allclose(X[wanted], exact[wanted], atol=1e-13)
+
+
+def test_solutions_together_pass_over_supernodes_that_are_not_reached():
+    # An arrow: columns depend on the last one alone, which is in one supernode with the one before.
+    n = 6
+    L = csc_array(np.eye(n) + np.outer(np.arange(n) == n - 1, np.arange(n) < n - 1) * 0.5)
+    X, loaded, wanted = np.full((n, 2), np.nan), np.arange(n) == 1, np.arange(n) == 3
+    X[1], X[3:] = 1.0, 0.0
+    triangular_kernels.solve_together(*by_supernodes(L), np.ones(n), loaded, wanted, X)
+    np.testing.assert_allclose(X[[3, n - 1]], [[0.25] * 2, [-0.5] * 2], atol=1e-15)
+    assert np.isnan(X[[0, 2]]).all()
+
+
 def test_the_order_keeps_factors_as_small_as_superlu_does():
     K, _ = supported(10)
     order = fill_reducing(K, np.empty(0, np.intp))
@@ -93,13 +120,25 @@ def test_contact_is_eliminated_last():
 
 @pytest.mark.parametrize("name", FACTORED)
 @pytest.mark.parametrize("last", [True, False])
-@pytest.mark.parametrize("shape", [(), (3,)])
-def test_solutions_are_those_of_dense_algebra(name, last, shape):
+def test_solutions_are_those_of_dense_algebra(name, last):
     K, _, solver = prepared(name, last)
-    F = np.random.default_rng(3).normal(size=(K.shape[0], *shape))
-    exact = np.linalg.solve(K.toarray(), F)
-    np.testing.assert_allclose(solver._factors.solve(F), exact, atol=1e-12 * np.abs(exact).max())
+    f = np.random.default_rng(3).normal(size=K.shape[0])
+    exact = np.linalg.solve(K.toarray(), f)
+    np.testing.assert_allclose(solver._factors.solve(f), exact, atol=1e-12 * np.abs(exact).max())
     assert solver.counters.setups == 1
+
+
+@pytest.mark.parametrize("name", FACTORED)
+@pytest.mark.parametrize("last", [True, False])
+def test_entries_of_the_inverse_are_those_of_dense_algebra(name, last, monkeypatch):
+    K, top, solver = prepared(name, last)
+    exact = np.linalg.inv(K.toarray())
+    rng = np.random.default_rng(3)
+    for together in (128, 5):
+        monkeypatch.setattr(symmetric_factors, "TOGETHER", together)
+        for rows, columns in ((top, top[::-1]), (rng.permutation(len(exact))[:50], np.array([7])), (top, np.arange(0))):
+            found = solver._factors.inverse_entries(rows, columns)
+            np.testing.assert_allclose(found, exact[np.ix_(rows, columns)], atol=1e-13 * np.abs(exact).max())
 
 
 @pytest.mark.parametrize("name", FACTORED)
@@ -142,6 +181,17 @@ def test_forces_elsewhere_cost_a_solution():
     force = np.random.default_rng(4).normal(size=K.shape[0])
     u = solver.load(np.zeros(K.shape[0])).involved_solution(force, np.zeros(K.shape[0]))
     np.testing.assert_allclose(K @ u, force, atol=1e-12)
+
+
+@pytest.mark.parametrize("last", [True, False])
+def test_no_further_forces_cost_no_solution(last):
+    K, _, solver = prepared(last=last)
+    f, none = np.random.default_rng(4).normal(size=K.shape[0]), np.zeros(K.shape[0])
+    loaded, before = solver.load(f), solver.counters.iterations
+    for u in (loaded.involved_solution(none, None), loaded.full_solution(none)):
+        np.testing.assert_allclose(K @ u, f, atol=1e-12)
+        u[:] = np.nan  # a copy
+    assert solver.counters.iterations == before
 
 
 def test_loads_that_others_combine_to_cost_nothing():
