@@ -32,6 +32,11 @@ def test_random_models_end_right():
     assert sum(row.get("closed", 0) > 0 for row in rows) >= 0.8 * len(rows)
 
 
+def test_once_wrong_models_end_right():
+    """A step in which constraints penetrate from the start; dual functions whose choice depended on the numbering."""
+    check([101568, 102727, 102979])
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(1000, 1300, 50))
 def test_more_random_models_end_right(first):

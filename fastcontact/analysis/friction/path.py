@@ -88,7 +88,7 @@ def along(
             instants, touching = _touching(now, forces.gaps[0], waiting, _together(len(slip), int(closed.sum())))
             part = min(float(instants[touching].max()), 1.0)
             end = begin + part * (1.0 - begin)
-            slip = np.where(touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], 0.0 * gap), slip)
+            slip = np.where(touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip)
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
@@ -114,7 +114,9 @@ def _touching(now: Array, end: Array, waiting: Mask, count: int) -> tuple[Array,
     [length]. Fractions of constraints that do not close are infinite.
     """
     closing = waiting & (end < 0.0)
-    fraction = np.divide(np.maximum(now, 0.0), now - end, out=np.full_like(now, np.inf), where=closing & (now > end))
+    # Constraints that penetrate more now than at the end close at once.
+    instants = np.where(closing, 0.0, np.inf)
+    fraction = np.divide(np.maximum(now, 0.0), now - end, out=instants, where=closing & (now > end))
     last = np.sort(fraction[closing])[:count][-1]
     return fraction, closing & (fraction <= last * (1.0 + SINGLE_PRECISION))
 
