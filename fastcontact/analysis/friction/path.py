@@ -88,7 +88,9 @@ def along(
             instants, touching = _touching(now, forces.gaps[0], waiting, _together(len(slip), int(closed.sum())))
             part = min(float(instants[touching].max()), 1.0)
             end = begin + part * (1.0 - begin)
-            slip = np.where(touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip)
+            slip = np.where(
+                touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip
+            )
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
