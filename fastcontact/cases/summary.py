@@ -235,7 +235,7 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
     if summary["regularised"]:
         rows.append(_regularised_line(summary["regularised"], unit))
     for name, theory in summary["theory"].items():
-        rows += _theory_lines(name, theory)
+        rows += _theory_lines(name, theory, summary["contact"][name]["extent"])
     for entry in summary["sensitivities"]:
         rows += _sensitivity_lines(entry)
     if "modes" in summary:
@@ -306,7 +306,7 @@ def _regularised_line(report: Mapping[str, Any], unit: Mapping[str, str]) -> str
     )
 
 
-def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
+def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str]:
     titles = {
         "equal_approach": "theory at equal approach",
         "equal_force": "theory at equal force",
@@ -314,7 +314,7 @@ def _theory_lines(pair: str, theory: Mapping[str, Any]) -> list[str]:
     }
     if theory["equal_approach"]["approach"] is None:
         titles["equal_approach"] = "the theory given"
-    shown = {"force": "force {:+.3%}", "pressure_max": "largest pressure {:+.3%}", "radius": "radius {:+.2%}"}
+    shown = {"force": "force {:+.3%}", "pressure_max": "largest pressure {:+.3%}", "radius": f"{extent} {{:+.2%}}"}
     return [
         f"  contact '{pair}' against {titles[key]}: "
         + ", ".join(shown[name].format(off) for name, off in values["deviation"].items() if off is not None)
