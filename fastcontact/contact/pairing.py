@@ -325,9 +325,8 @@ def tangents(normal: Array, held: Array | None = None) -> list[Array]:
     both = 1.0 + normal @ mean
     slope = np.divide(normal @ axis, both, out=np.zeros(len(normal)), where=both > LENGTH_ROUND_OFF)
     first = axis - slope[:, None] * (mean + normal)
-    first -= (
-        np.einsum("nd,nd->n", first, normal)[:, None] * normal
-    )  # also of normals that are opposite but for round-off
+    # Normals that are opposite but for round-off also get perpendicular tangents.
+    first -= np.einsum("nd,nd->n", first, normal)[:, None] * normal
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second = np.cross(normal, first)
     if held is not None:

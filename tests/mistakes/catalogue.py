@@ -20,7 +20,7 @@ CASES = [
     ("probe misspelled", 'C1 = "C1"', 'C1 = "C9"', r"unknown group 'C9': did you mean 'C2' or 'C1'\?"),
     ("probe is a line", 'C1 = "C1"', 'C1 = "CONT1"', r"group 'CONT1' contains 21 points where exactly one is needed"),
     ("one body without material", '"SPHHAU", "SPHBAS"', '"SPHHAU"',
-     r"1584 solid cells have no material, in 'SPHBAS': give their groups one by add_material or \[\[material\]\]"),
+     r"1584 solid cells have no material, in 'SPHBAS': assign one to their groups by add_material or \[\[material\]\]"),
     ("material on lines", '"SPHHAU", "SPHBAS"', '"CONT1"',
      r"group 'CONT1' contains no solid cells, so it cannot have a material"),
     ("nu is a half", "nu = 0.3", "nu = 0.5", r"Poisson's ratio nu = 0\.5 must lie between -1 and 0\.5, both excluded"),

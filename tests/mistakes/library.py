@@ -264,7 +264,7 @@ MATERIALS = [
     Mistake("no material at all", lambda: solved(blocks(materials=False)), fc.ModelError,
             r"no material: call add_material\(LinearElastic\(E=\.\.\., nu=\.\.\.\)\) for the solid cells"),
     Mistake("one body without a material", lambda: solved(with_materials((1000.0, 0.3, "LOWER"))), fc.ModelError,
-            r"18 solid cells have no material, in 'UPPER': give their groups one by add_material or \[\[material\]\]"),
+            r"18 solid cells have no material, in 'UPPER': assign one to their groups by add_material or \[\[material\]\]"),
     Mistake("two materials for one group",
             lambda: solved(with_materials((1000.0, 0.3, ["LOWER", "UPPER"]), (2000.0, 0.3, "UPPER"))), fc.ModelError,
             r"18 cells of 'UPPER' have two materials, E = 1000, nu = 0\.3 and E = 2000, nu = 0\.3: give each group one; one for all other cells comes first, without groups"),

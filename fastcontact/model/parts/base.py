@@ -322,7 +322,7 @@ class ModelBase:
         groups = [g for g, members in self.mesh.cell_groups.items() if np.isin(members, cells).any()]
         named = f", in {', '.join(repr(g) for g in groups)}" if groups else ""
         raise ModelError(
-            f"{total} solid cells have no material{named}: give their groups one by add_material or [[material]]"
+            f"{total} solid cells have no material{named}: assign one to their groups by add_material or [[material]]"
         )
 
     def internal_forces(self, displacement: Array) -> Array:
