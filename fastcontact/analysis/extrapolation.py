@@ -1,4 +1,4 @@
-"""Predictor of a load step: displacements and contact forces extrapolated linearly in the load, or quadratically."""
+"""Predictor of a load step: polynomial extrapolation of displacements in the load, linear of contact forces."""
 
 from __future__ import annotations
 
@@ -15,69 +15,86 @@ from fastcontact.arrays import Array, Mask
 GapsAndForces = tuple[Array, Array]
 # Largest ratio of the current load increment to the last one at which steps are extrapolated.
 FARTHEST = 2.0
+# Highest degree of the polynomial that continues steps.
+DEGREE = 4
+# A polynomial of one more degree is clearly closer if its distance is this fraction. If any closer one were chosen,
+# indentations past yield, whose steps are not smooth, would take 4 % more iterations.
+SMOOTH = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Extrapolation:
-    """The last converged load steps, at most three, and their extrapolation to the current load.
+    """The last converged load steps, at most DEGREE + 1, and their extrapolation to the current load.
 
     Attributes
     ----------
-    ratio : float
-        Ratio of the current load increment to the last one; zero means no extrapolation [-].
-    earlier : float
-        Ratio of the last load increment to the one before it; zero means no quadratic extrapolation [-].
-    curved : bool
-        Whether quadratic extrapolation was closer than linear in the last step in which both were possible.
+    ratios : tuple of float
+        Ratio of each load increment to the one before it, that of the current increment last; zero means that steps are not
+        extrapolated across it [-].
+    degree : int
+        Degree of the polynomial in the load that continues the steps.
     loads : tuple of tuples of ndarray
-        The loads of the last three steps and of the current one: prescribed displacements [length] and forces [force].
+        The loads of the last steps and of the current one: prescribed displacements [length] and forces [force].
     states : tuple of (ndarray (n,), dict of str to GapsAndForces)
         Displacements [length], and gaps and multipliers of each pair, at the end of the last steps.
     """
 
-    ratio: float = 0.0
-    earlier: float = 0.0
-    curved: bool = False
+    ratios: tuple[float, ...] = ()
+    degree: int = 1
     loads: tuple[tuple[Array, ...], ...] = ()
     states: tuple[tuple[Array, Mapping[str, GapsAndForces]], ...] = ()
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the current load increment to the last one; zero means no extrapolation [-]."""
+        return self.ratios[-1] if self.ratios else 0.0
 
     def to(self, *parts: Array) -> Extrapolation:
         """Return the extrapolation to the loads of the next step.
 
         `parts` are arrays of prescribed displacements [length] and of forces [force].
         """
-        loads = (*self.loads[-3:], tuple(part.copy() for part in parts))
-        ratio = _growth(loads[-3:]) if len(self.states) >= 2 else 0.0
-        earlier = _growth(loads[-4:-1]) if ratio and len(self.states) == 3 else 0.0
-        return replace(self, ratio=ratio, earlier=earlier, loads=loads)
+        loads = (*self.loads[-2:], tuple(part.copy() for part in parts))
+        ratio = _growth(loads) if len(self.states) >= 2 else 0.0
+        return replace(self, ratios=(*self.ratios[1 - DEGREE :], ratio), loads=loads)
 
     def converged(self, u: Array, contact: Mapping[str, GapsAndForces], curve: bool = False) -> Extrapolation:
         """Return a copy to which the solution of a step is added.
 
-        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. `curve` keeps three
-        steps, for quadratic extrapolation, instead of two.
+        `u` (n,) are its displacements [length], and `contact` the gaps and multipliers of each pair. `curve` keeps enough
+        steps for polynomials of more than the first degree. The next step is continued with the highest degree up to which
+        every one came clearly closer to this step than the one below, and with one more where all of them did.
         """
-        curved = self.curved
-        if self.earlier:
-            curved = largest_difference(u, self._quadratic()) < largest_difference(u, self.displacement(u))
-        return replace(self, curved=curved, states=(*self.states[-2 if curve else -1 :], (u.copy(), contact)))
+        degree, highest = 0, self._highest
+        distances = [largest_difference(u, self._continued(k)) for k in range(highest + 1)] if curve else []
+        while degree < len(distances) - 1 and distances[degree + 1] < SMOOTH * distances[degree]:
+            degree += 1
+        degree = max(1, degree + (degree == highest))
+        return replace(self, degree=degree, states=(*self.states[-DEGREE if curve else -1 :], (u.copy(), contact)))
 
     def displacement(self, u: Array) -> Array:
         """Return initial displacements (n,) of a step [length]; without extrapolation the last ones, `u` (n,)."""
-        if not self.ratio:
-            return u
-        (before, _), (last, _) = self.states[-2:]
-        return last + self.ratio * (last - before)
+        return self._continued(1) if self.ratio else u
 
     def predicted(self, u: Array) -> Array:
-        """Return initial displacements (n,) [length], extrapolated quadratically if this was closer in the last step."""
-        return self._quadratic() if self.earlier and self.curved else self.displacement(u)
+        """Return initial displacements (n,) as `displacement`, by the polynomial of the chosen degree."""
+        return self._continued(min(self.degree, self._highest)) if self.ratio else u
 
-    def _quadratic(self) -> Array:
-        """Return the displacements (n,) of the parabola through the last three steps (Newton's divided differences)."""
-        first, before, last = (u for u, _ in self.states)
-        bend = (last - before - self.earlier * (before - first)) / (1.0 + 1.0 / self.earlier)
-        return self.displacement(last) + self.ratio * (1.0 + self.ratio) * bend
+    @property
+    def _highest(self) -> int:
+        """Highest possible degree, negative without states: the number of last increments that are all extrapolated."""
+        unbroken = next((k for k, ratio in enumerate(self.ratios[::-1]) if not ratio), len(self.ratios))
+        return min(unbroken, len(self.states) - 1)
+
+    def _continued(self, degree: int) -> Array:
+        """Return the displacements (n,) of the polynomial through the last ``degree + 1`` states, at the current load."""
+        states, out = [u for u, _ in self.states[-degree - 1 :][::-1]], self.states[-1][0]
+        increments = 1.0 / np.cumprod([1.0, *self.ratios[len(self.ratios) - degree : -1][::-1]])
+        loads = np.concatenate([[0.0], -np.cumsum(increments)])  # from the last one, in increments
+        for k in range(1, degree + 1):  # Lagrange polynomials
+            others = np.delete(loads[: degree + 1], k)
+            out = out + np.prod((self.ratio - others) / (loads[k] - others)) * (states[k] - states[0])
+        return out
 
     def active(self, name: str, last_active: Mask) -> Mask:
         """Return the initial active set (m,) of the pair `name`; without extrapolation `last_active` (m,)."""
@@ -98,25 +115,26 @@ class Extrapolation:
         return {
             "loads": [
                 [{"size": len(part), "places": np.flatnonzero(part), "values": part[part != 0.0]} for part in load]
-                for load in self.loads[-3:]
+                for load in self.loads[-2:]
             ],
-            "before": self.states[-2][0] if len(self.states) >= 2 else None,
-            "first": self.states[-3][0] if len(self.states) == 3 else None,
-            "curved": self.curved,
+            "before": [u for u, _ in self.states[:-1]],
+            "ratios": list(self.ratios),
+            "degree": self.degree,
             "contact": [{name: list(both) for name, both in contact.items()} for _, contact in self.states[-2:]],
         }
 
     @classmethod
     def from_dict(cls, kept: Mapping[str, Any], u: Array) -> Extrapolation:
         """Return the extrapolation for data of `to_dict`; `u` (n,) are the last displacements [length]."""
-        displacements = [u] if kept["before"] is None else [kept["before"], u]
+        before = kept["before"]
+        if not isinstance(before, list):  # earlier versions saved one array, or none
+            before = [] if before is None else [before]
         contacts = [{name: (both[0], both[1]) for name, both in contact.items()} for contact in kept["contact"]]
-        states: tuple[Any, ...] = tuple(zip(displacements, contacts)) if contacts else ()
-        if kept.get("first") is not None:
-            states = ((kept["first"], {}), *states)
+        contacts = [{}] * (len(before) + 1 - len(contacts)) + contacts
+        states: tuple[Any, ...] = tuple(zip([*before, u], contacts)) if kept["contact"] else ()
         # Earlier versions saved one array per step, either of displacements or of forces, and did not save which.
         loads = tuple(tuple(map(_dense, load)) for load in kept["loads"] if isinstance(load, list))
-        return cls(curved=bool(kept.get("curved", False)), loads=loads, states=states)
+        return cls(tuple(kept.get("ratios", ())), int(kept.get("degree", 1)), loads, states)
 
 
 def _growth(loads: tuple[tuple[Array, ...], ...]) -> float:

@@ -65,18 +65,25 @@ def on_a_curve(loads, path):
     return found
 
 
-@pytest.mark.parametrize("loads", [(1.0, 2.0, 3.0, 4.0), (1.0, 1.5, 2.5, 3.0)])
-def test_a_parabola_is_continued_once_it_was_closer_than_a_line(loads):
+@pytest.mark.parametrize("loads", [(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), (1.0, 1.5, 2.5, 3.0, 3.5, 4.5)])
+def test_a_smooth_path_is_continued_by_polynomials_of_ascending_degree(loads):
     def path(factor):
-        return np.array([1.0 + factor + 0.5 * factor**2, -(factor**2)])
+        return np.array([1.0 + factor + 0.5 * factor**3, -(factor**2)])
 
-    early = on_a_curve(loads[:3], path).to(np.full(2, loads[3]))
-    assert np.array_equal(early.predicted(path(3.0)), early.displacement(path(3.0)))  # not known to be closer yet
-    end = loads[3] + 0.5
+    early = on_a_curve(loads[:2], path).to(np.full(2, loads[2]))
+    assert np.array_equal(early.predicted(path(loads[1])), early.displacement(path(loads[1])))  # a line
+    end = loads[-1] + 0.5
     found = on_a_curve(loads, path).to(np.full(2, end))
-    assert found.predicted(path(loads[3])) == pytest.approx(path(end), rel=1e-13)
-    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[3])).to(np.full(2, end))
-    assert np.array_equal(again.predicted(path(loads[3])), found.predicted(path(loads[3])))
+    assert found.predicted(path(loads[-1])) == pytest.approx(path(end), rel=1e-13)
+    assert found.displacement(path(loads[-1])) != pytest.approx(path(end), rel=1e-2)
+    again = Extrapolation.from_dict(on_a_curve(loads, path).to_dict(), path(loads[-1])).to(np.full(2, end))
+    assert np.array_equal(again.predicted(path(loads[-1])), found.predicted(path(loads[-1])))
+
+
+def test_the_degree_does_not_grow_where_a_path_is_not_smooth():
+    zigzag = on_a_curve(range(1, 8), lambda factor: np.full(2, factor + 0.3 * (factor % 2))).to(np.full(2, 8.0))
+    assert zigzag.degree == 1
+    assert zigzag.predicted(np.full(2, 7.3)) == pytest.approx(np.full(2, 8.6))
 
 
 def test_a_kinked_path_is_continued_along_a_line():
