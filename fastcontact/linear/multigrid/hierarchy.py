@@ -69,12 +69,13 @@ class Hierarchy:
     def renewed(self, A: BlockMatrix) -> Hierarchy | None:
         """Return a hierarchy whose finest level is that of a matrix A of the same pattern, with the coarser levels kept.
 
-        It is a symmetric preconditioner of A, which costs a fifth of a new hierarchy. None is returned if there are no
-        coarser levels, or for another precision.
+        It is a symmetric preconditioner of A, which costs a tenth of a new hierarchy. The bound of the smoother is kept, too;
+        if it is so low that vectors are amplified, the iteration detects this. None is returned if there are no coarser
+        levels, or for another precision.
         """
         if len(self.levels) == 1 or A.data.dtype != self.dtype:
             return None
-        new, finest = copy.copy(self), self._level(A)
+        new, finest = copy.copy(self), self._level(A, self._free_bounds[0])
         finest.P, finest.R = self.levels[0].P, self.levels[0].R
         new.levels = [finest, *(level.without_equations() for level in self.levels[1:])]
         new.coarse = Coarse(self.coarse.matrix)
@@ -82,15 +83,16 @@ class Hierarchy:
         new.set_bounds()
         return new
 
-    def _level(self, A: BlockMatrix) -> Level:
-        """Return the level of a matrix, without transfer operators."""
+    def _level(self, A: BlockMatrix, bound: float | None = None) -> Level:
+        """Return the level of a matrix, without transfer operators; the `bound` of the smoother is estimated by default."""
         size = len(A.rows)
         matrix = replace(A, data=A.data.astype(self.dtype, copy=False), low=None)
         diagonal = matrix.diagonal_part(matrix.data)
         inverse = np.empty_like(diagonal)
         cycle_kernels.invert_blocks(diagonal, size, inverse)
-        level = Level(matrix, diagonal, inverse, 1.0)
-        level.bound = SAFETY * largest_eigenvalue(level)
+        level = Level(matrix, diagonal, inverse, bound or 1.0)
+        if bound is None:
+            level.bound = SAFETY * largest_eigenvalue(level)
         return level
 
     def _coarsened(self, A: BlockMatrix, level: Level, modes: Array) -> tuple[BlockMatrix, BlockMatrix, Array] | None:

@@ -16,7 +16,6 @@ from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
-from fastcontact.linear.krylov.krylov_kernels import CHUNK, WORK_OF_NUMBER
 from fastcontact.linear.multigrid import cycle_kernels, split_matrix_kernels, symmetric_storage_kernels
 
 Storage = tuple[Numbers, Numbers, Numbers, int]
@@ -169,8 +168,8 @@ class ScaledMatrix:
     release : bool
         Whether the low parts may overwrite K's numbers, so that K and its parts are never in memory at the same time,
         which saves a tenth of the peak with a million unknowns. K is empty afterwards.
-    unit : float, optional
-        Scaling factor; by default that for which the largest stiffness is about one.
+    near : ScaledMatrix, optional
+        Matrix whose unit and, for the same pattern, storage are used again. By default the largest stiffness is about one.
 
     Attributes
     ----------
@@ -181,21 +180,22 @@ class ScaledMatrix:
     shape, blocksize : (int, int)
     """
 
-    def __init__(self, K: bsr_array, precision: str, release: bool = False, unit: float | None = None) -> None:
+    def __init__(self, K: bsr_array, precision: str, release: bool = False, near: ScaledMatrix | None = None) -> None:
         self.shape, self.blocksize = K.shape, K.blocksize
-        self._store(K, precision, release, unit)
+        self._store(K, precision, release, near)
 
-    def _store(self, K: bsr_array, precision: str, release: bool, unit: float | None = None) -> None:
+    def _store(self, K: bsr_array, precision: str, release: bool, near: ScaledMatrix | None = None) -> None:
         self.unit = 1.0
         if precision == "double":
             self.scaled = block_matrix(K)
             return
-        if unit is None:
+        if near is None:
             size = range(K.blocksize[0])
             largest = block_matrix(K).diagonal_blocks()[:, size, size].max()
-            unit = float(0.5 ** np.round(np.log2(largest)))
-        self.unit = unit
-        self.scaled = _split(K, self.unit, release)
+            self.unit = float(0.5 ** np.round(np.log2(largest)))
+        else:
+            self.unit = near.unit
+        self.scaled = _split(K, self.unit, release, None if near is None else near.scaled)
 
     def change(self, precision: str) -> None:
         """Store the numbers for a cycle in another precision."""
@@ -234,8 +234,11 @@ class ScaledMatrix:
         return self.scaled.row_sums(u) / self.unit
 
 
-def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
-    """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`."""
+def _split(K: bsr_array, unit: float, release: bool, near: BlockMatrix | None) -> BlockMatrix:
+    """Return ``unit K``, split into high and low parts; see `ScaledMatrix` for `release`.
+
+    The storage of a matrix that is `near` is used if it has the same pattern.
+    """
     indptr, indices = (array.astype(np.int32, copy=False) for array in (K.indptr, K.indices))
     size, numbers = K.blocksize[0], K.data if K.data.base is None else K.data.base
     if release and numbers.size == K.data.size and numbers.flags.owndata and numbers.flags.c_contiguous:
@@ -243,43 +246,36 @@ def _split(K: bsr_array, unit: float, release: bool) -> BlockMatrix:
         K.indptr, K.indices, K.data = np.zeros_like(indptr), indices[:0], np.empty((0, *K.blocksize))
     else:
         numbers = K.data.copy()
-    storage = symmetric_storage(indptr, indices)
-    n = numbers.size
-    if storage is not ALL:
-        _keep_stored(indptr, indices, storage, numbers.reshape(-1), size * size)
-        n = len(storage[2]) * size * size
-        with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
-            numbers.resize((n,))
+    storage = ALL if near is None else near.storage
+    if near is None or not (np.array_equal(indptr, near.indptr) and np.array_equal(indices, near.indices)):
+        storage = symmetric_storage(indptr, indices)
+    n = numbers.size if storage is ALL else len(storage[2]) * size * size
     high = np.empty(n, np.float32)
-    _halve(unit, numbers.reshape(-1)[:n], high)
-    with contextlib.suppress(ValueError):
+    _store(indptr, indices, storage, unit, numbers.reshape(-1), size * size, high)
+    with contextlib.suppress(ValueError):  # another array references the memory, which then stays allocated
         numbers.resize(((n + 1) // 2,))
     low = numbers.reshape(-1).view(np.float32)[:n]
     return BlockMatrix(indptr, indices, high, (0,) * size, (0,) * size, low, storage)
 
 
-def _keep_stored(indptr: Numbers, indices: Numbers, storage: Storage, numbers: AnyArray, square: int) -> None:
-    """Move the stored blocks, of `square` numbers, to the beginning of the numbers of all blocks."""
-    start, widest = storage[0], widest_row(indptr)
-    end, n = 0, len(indptr) - 1
-    while end < n:  # rows whose stored blocks lie before unread ones: in parallel; otherwise few rows
+def _store(
+    indptr: Numbers, indices: Numbers, storage: Storage, unit: float, numbers: AnyArray, square: int, high: AnyArray
+) -> None:
+    """Fill the high parts of the stored blocks, of `square` numbers, times `unit`.
+
+    The low parts overwrite the beginning of the `numbers` of all blocks.
+    """
+    start, low = indptr if storage is ALL else storage[0], numbers.view(np.float32)
+    end, n, widest = 0, len(indptr) - 1, widest_row(indptr)
+    while end < n:  # rows whose low parts lie before unread numbers: in parallel; otherwise few rows
         first = end
-        behind = int(np.searchsorted(start, indptr[first], side="right")) - 1
-        end = max(behind, min(n, first + SHORTEST))
+        behind = int(np.searchsorted(start, 2 * int(indptr[first]), side="right")) - 1
+        end = max(min(n, behind), min(n, first + SHORTEST))
         work = WORK_OF_ROW if end == behind else 0
         spread(
-            symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, numbers,
-            square, numbers,
+            symmetric_storage_kernels.store_rows, end - first, work, first, widest, indptr, indices, storage, unit, numbers,
+            square, high, low,
         )  # fmt: skip
-
-
-def _halve(unit: float, numbers: AnyArray, high: AnyArray) -> None:
-    """Fill the high parts (n,) of ``unit numbers``; the low parts overwrite the first half of the numbers."""
-    end, n, low = 0, len(numbers), numbers.view(np.float32)[: len(numbers)]
-    while end < n:
-        first, end = end, min(n, max(2 * end, end + CHUNK))
-        work = WORK_OF_NUMBER if end <= 2 * first else 0
-        spread(split_matrix_kernels.split, end - first, work, first, unit, numbers, high, low)
 
 
 def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:

@@ -118,7 +118,7 @@ class Multigrid:
     def build(self, K: bsr_array, rigid_modes: Array, release: bool = False) -> None:
         """Build the hierarchy of K (n, n); see `LinearSolver.prepare`."""
         n, near = K.shape[0], self._near
-        self.K = ScaledMatrix(K, self.precision, release, None if near is None else self.K.unit)
+        self.K = ScaledMatrix(K, self.precision, release, None if near is None else self.K)
         self._modes = rigid_modes.astype(np.float32)  # for `build_in`; single precision suffices
         self._cg = ConjugateGradients(n)
         self._residuals: ConjugateResiduals | None = None

@@ -5,22 +5,8 @@ Together both parts have 48 of the 53 bits of double precision. Kernels take num
 split, (numbers,) where they are not.
 """
 
-import numpy as np
-
 from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, part_of, place_of
-
-
-@kernel
-def split(begin, end, shift, factor, numbers, high, low):
-    """Fill the parts of ``factor`` times numbers ``shift + begin`` to ``shift + end - 1``.
-
-    `low` may share memory with the beginning of `numbers`: a number is read before its memory is overwritten.
-    """
-    for k in range(shift + begin, shift + end):
-        number = factor * numbers[k]
-        high[k] = number
-        low[k] = number - np.float64(high[k])
 
 
 @kernel

@@ -116,28 +116,42 @@ def missing(low, high, indptr, indices, storage, counts):
 
 
 @kernel
-def _store_row(i, indptr, indices, storage, numbers, square, row, out):
-    """Store the blocks of a row; its numbers are copied first, because the stored blocks may overwrite them."""
-    part, begin = part_of(storage, i), indptr[i]
-    for e in range((indptr[i + 1] - begin) * square):
-        row[e] = numbers[begin * square + e]
-    for k in range(begin, indptr[i + 1]):
-        if part[0] <= indices[k] < i:
+def _store_row(i, indptr, indices, storage, factor, row, square, high, low):
+    """Split the stored blocks of a row times `factor` into their high and low parts; `row` are the numbers of all blocks."""
+    first, end = part_of(storage, i)
+    outside = diagonal = behind = indptr[i]  # places of the next block
+    if end:
+        outside, diagonal, behind = storage[0][i], storage[1][i] - 1, storage[1][i]
+    for k in range(indptr[i + 1] - indptr[i]):
+        j = indices[indptr[i] + k]
+        if first <= j < i and end:
             continue
-        at = place_of(storage, part, i, indices[k], k)[0]
+        if j < first or j >= end:
+            at = outside
+            outside += 1
+        elif j == i:
+            at = diagonal
+        else:
+            at = behind
+            behind += 1
         for e in range(square):
-            out[at * square + e] = row[(k - begin) * square + e]
+            number = factor * row[k * square + e]
+            high[at * square + e] = number
+            low[at * square + e] = number - np.float64(high[at * square + e])
 
 
 @kernel
-def store_rows(low, high, first, widest, indptr, indices, storage, numbers, square, out):
-    """Fill the stored blocks of rows from ``first + low`` on into `out`, from `numbers`, with `square` numbers per block.
+def store_rows(begin, end, shift, widest, indptr, indices, storage, factor, numbers, square, high, low):
+    """Fill the parts of the stored blocks of rows ``shift + begin`` to ``shift + end - 1`` times `factor`.
 
-    Rows have up to `widest` blocks. `out` may be the beginning of `numbers`: a row is read before its memory is overwritten.
+    Rows have up to `widest` blocks of `square` numbers. `low` may be the beginning of `numbers`: a row is read before its
+    memory is overwritten.
     """
     row = np.empty(widest * square)
-    for i in range(first + low, first + high):
-        _store_row(i, indptr, indices, storage, numbers, square, row, out)
+    for i in range(shift + begin, shift + end):
+        for e in range((indptr[i + 1] - indptr[i]) * square):
+            row[e] = numbers[indptr[i] * square + e]
+        _store_row(i, indptr, indices, storage, factor, row, square, high, low)
 
 
 @kernel

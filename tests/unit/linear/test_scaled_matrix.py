@@ -12,7 +12,6 @@ from fastcontact._jit import decorators, parallel
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.linear import choice as linear
 from fastcontact.linear.multigrid import matrix as matrices
-from fastcontact.linear.multigrid import split_matrix_kernels
 from fastcontact.linear.multigrid.matrix import ALL, ScaledMatrix, symmetric_storage
 
 EXACT = 2.0**-47  # of split numbers, in units of the largest number of a row
@@ -32,30 +31,22 @@ def matrix(n, size, scale=1.0, seed=0):
     return bsr_array(bsr_array(scale * full, blocksize=(size, size)))
 
 
-@pytest.mark.parametrize("n", [11, 5000, 20_001])
-def test_the_parts_are_the_nearest_number_and_the_rest(n):
-    numbers = np.random.default_rng(1).normal(size=n) * 10.0 ** np.random.default_rng(2).uniform(-12, 3, n)
-    high, low = np.empty((2, n), np.float32)
-    split_matrix_kernels.split(0, n, 0, 0.25, numbers, high, low)
-    np.testing.assert_array_equal(high, (0.25 * numbers).astype(np.float32))
-    np.testing.assert_array_equal(low, (0.25 * numbers - high).astype(np.float32))
-    np.testing.assert_allclose(4.0 * (high.astype(float) + low), numbers, rtol=2.0**-48)
-    in_place = numbers.copy()
-    matrices._halve(0.25, in_place, high)
-    np.testing.assert_array_equal(in_place.view(np.float32)[:n], low)
-
-
+@pytest.mark.parametrize("every", [False, True])
 @pytest.mark.parametrize(("n", "size", "shortest"), [(7, 1, 1024), (600, 2, 100), (1300, 1, 200)])
-def test_stored_blocks_may_take_the_place_of_all(n, size, shortest, monkeypatch):
+def test_the_parts_of_stored_blocks_may_take_the_place_of_all(n, size, shortest, every, monkeypatch):
+    """The high part is the nearest number, the low part the rest."""
     monkeypatch.setattr(matrices, "SHORTEST", shortest)
     K = matrix(n, size)
-    storage, square = symmetric_storage(K.indptr, K.indices), size * size
-    start, _, columns, _ = storage
-    found = K.data.reshape(-1).copy()
-    matrices._keep_stored(K.indptr, K.indices, storage, found, square)
+    storage, square = ALL if every else symmetric_storage(K.indptr, K.indices), size * size
+    start, columns = (K.indptr, K.indices) if every else (storage[0], storage[2])
+    numbers, high = K.data.reshape(-1).copy(), np.empty(len(columns) * square, np.float32)
+    matrices._store(K.indptr, K.indices, storage, 0.25, numbers, square, high)
     dense = K.toarray().reshape(n, size, n, size)
-    rows = np.repeat(np.arange(n), np.diff(start))
-    np.testing.assert_array_equal(found[: len(columns) * square].reshape(-1, size, size), dense[rows, :, columns])
+    expected = 0.25 * dense[np.repeat(np.arange(n), np.diff(start)), :, columns].ravel()
+    low = numbers.view(np.float32)[: len(high)]
+    np.testing.assert_array_equal(high, expected.astype(np.float32))
+    np.testing.assert_array_equal(low, (expected - high).astype(np.float32))
+    np.testing.assert_allclose(high.astype(float) + low, expected, rtol=2.0**-48)
 
 
 @pytest.mark.parametrize("release", [False, True])
