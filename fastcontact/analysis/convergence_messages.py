@@ -106,8 +106,6 @@ def not_balanced(bodies: FloatingBodies, rigid: RigidPosition, load: float, fric
 
 def limit_load(problem: Problem, state: State) -> str:
     """Return an addition to the message of a failed load step after `state` if bodies yield; otherwise empty."""
-    if problem.bodies is None or problem.bodies.finite:
-        return ""
     strain = max(
         (float(of_cells[..., PLASTIC_STRAIN].max(initial=0.0)) for of_cells in state.history.values()), default=0.0
     )
@@ -116,7 +114,7 @@ def limit_load(problem: Problem, state: State) -> str:
     beyond = (
         f", beyond the {LARGEST_PLASTIC_STRAIN} up to which linear kinematics are valid: "
         "the model bears less load than the body"
-        if strain > LARGEST_PLASTIC_STRAIN
+        if strain > LARGEST_PLASTIC_STRAIN and problem.model.strain == "small"
         else ""
     )
     return (

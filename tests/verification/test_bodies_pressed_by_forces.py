@@ -76,10 +76,11 @@ def test_a_force_takes_the_way_of_the_displacement(kinematics: str, element: str
     assert free.contact["pair"].normal_force < 1e-6 * force[1]
 
 
-def test_a_force_beyond_the_limit_load_is_told_as_such() -> None:
+@pytest.mark.parametrize("strain", ["small", "finite"])
+def test_a_force_beyond_the_limit_load_is_told_as_such(strain: str) -> None:
     """A strip without hardening bears 2 / sqrt(3) of its yield stress."""
     mesh = fc.generate.block((1.0, 1.0), (2, 2))
-    model = fc.Model(mesh, "plane_strain")
+    model = fc.Model(mesh, "plane_strain", strain=strain)
     model.add_material(PERFECT)
     model.fix("BOTTOM", "y")
     model.fix("LEFT", "x")
