@@ -42,6 +42,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # under load. The reference is the softest body, because a contact is not stiffer than the softer one
 # of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT, STIFF = 1e-3, 1.0
+# Newton steps of the positions are halved, at the shortest to SHORTEST, until they reduce the elongation of the springs by
+# DECREASE of the expected reduction: the contact state changes along a step.
+SHORTEST, DECREASE = 1 / 64, 1e-4
 # Largest number of positions for one pairing.
 MAX_POSITIONS = 100
 # Weight of the displacements that springs held before, in the choice of new ones: with it, multigrid takes 142 iterations
@@ -98,12 +101,14 @@ class Freed:
     stretched: Array
     springs: Indices
 
-    def slackened(self, elongation: Array) -> Array:
-        """Return the change (k,) of the positions [length] that makes springs with an `elongation` (k,) slack.
+    def slackened(self, elongation: Array) -> tuple[Array, float]:
+        """Return the change (k,) of the positions that makes springs with an `elongation` (k,) slack [length].
 
-        In motions that contact does not restrain, the springs move by their elongation.
+        In motions that contact does not restrain, the springs move by their elongation, which they keep; the largest one
+        that is left is returned, too.
         """
-        return elongation - self._inverse @ (elongation + self.stretched @ elongation)
+        change = elongation - self._inverse @ (elongation + self.stretched @ elongation)
+        return change, float(np.abs(elongation - self.stretched @ (self._inverse @ elongation)).max())
 
     def respond(self, force: Array, gaps: Array) -> Array:
         """Return the `Response` with springs that stay slack."""
@@ -273,6 +278,7 @@ class FloatingBodies:
             The last position, also if the springs do not become slack or if a contact problem does not converge.
         """
         position, before, iterations, relaxed = start, np.inf, 0, 0.0
+        step, length = None, 1.0
         mixing = Anderson(len(start) + 1, np.arange(len(start)))
         for positions in range(1, MAX_POSITIONS + 1):
             state = solve_at(position)
@@ -288,19 +294,25 @@ class FloatingBodies:
                 slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
             if slack or not state.settled or positions == MAX_POSITIONS:
                 break
+            if step is not None and length > SHORTEST and left > before - DECREASE * length * (before - step[1]):
+                length *= 0.5
+                position = position - length * step[0]
+                continue
             if left > before:
                 mixing.restart()
-            step = None if left > before else _newton_step(freed, state, elongation)
+            step, length = None if left > before else _newton_step(freed, state, elongation), 1.0
             # Without Newton's method positions are accelerated, because parts much softer than the springs, such as a
             # peeling layer, approach equilibrium slowly.
-            position = mixing.mixed(position, position + elongation) if step is None else position + step
+            position = mixing.mixed(position, position + elongation) if step is None else position + step[0]
             before, relaxed = left, 0.0 if step is None else left
         state = dataclasses.replace(state, iterations=iterations)
         return RigidPosition(state, position, self.stiffness * elongation, positions, slack, self.dofs)
 
 
-def _newton_step(freed: Callable[[Response], Freed] | None, state: Solution, elongation: Array) -> Array | None:
-    """Return the change of the positions (k,) by Newton's method [length], None if the response is unknown."""
+def _newton_step(
+    freed: Callable[[Response], Freed] | None, state: Solution, elongation: Array
+) -> tuple[Array, float] | None:
+    """Return the change of the positions by Newton's method, see `Freed.slackened`; None if the response is unknown."""
     if freed is None or state.response is None:
         return None
     try:

@@ -8,7 +8,7 @@ from models import elastic_model
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.analysis.floating_bodies import MAX_POSITIONS, FloatingBodies
+from fastcontact.analysis.floating_bodies import MAX_POSITIONS, FloatingBodies, Freed
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 from fastcontact.analysis.solution import Equilibrium
@@ -53,6 +53,30 @@ def test_anchors_follow_what_contact_holds():
     assert found.slack
     assert found.positions <= 6
     np.testing.assert_allclose(found.position, np.linalg.solve(held, load), rtol=1e-9)
+
+
+@pytest.mark.parametrize("start", [1.5, 1.7, 6.0])
+def test_newton_steps_that_overshoot_are_halved(start):
+    """Contact that is stiff near equilibrium and soft beyond: whole Newton steps alternate between both soft sides."""
+
+    def response(p):
+        stiff = abs(p) < 0.5
+        return (p if stiff else np.sign(p) * (0.5 + 0.25 * (abs(p) - 0.5))), (1.0 if stiff else 0.25)
+
+    slopes = []
+
+    def solve_at(position):
+        stretch, slope = response(position[0] - 0.1)
+        slopes.append(slope)
+        return dataclasses.replace(solution(-stretch), response=lambda: None)
+
+    def freed(held):
+        return Freed(held, np.eye(1), np.array([[-slopes[-1]]]), DOFS)
+
+    found = bodies_at(DOFS).settle(solve_at, freed, DOFS, np.array([start]), 1.0, 0.0, 0.0)
+    assert found.slack
+    assert found.positions <= 6
+    np.testing.assert_allclose(found.position, [0.1], rtol=1e-12)
 
 
 def test_what_nothing_holds_is_not_slack():
