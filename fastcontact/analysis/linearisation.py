@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
+from fastcontact.analysis.equilibrium import Terms
 from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import (
     Problem,
@@ -16,7 +17,6 @@ from fastcontact.analysis.problem import (
     near_nullspace,
     prepare_solver,
 )  # fmt: skip
-from fastcontact.analysis.terms import Terms
 from fastcontact.arrays import Array
 from fastcontact.elasticity.constrained_system import System
 from fastcontact.linear.sparse_rows import sum_of_blocks

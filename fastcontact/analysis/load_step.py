@@ -17,12 +17,12 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.contact_result import contact_results
+from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.newton import Beginning, newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work

@@ -18,6 +18,15 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.equilibrium import (
+    Balance,
+    Fluid,
+    StepEquilibrium,
+    Terms,
+    balance,
+    solve_displacements,
+    with_loads,
+)
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
@@ -25,8 +34,6 @@ from fastcontact.analysis.linearisation import linearised, load_about
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium, balance, solve_displacements, with_loads
-from fastcontact.analysis.terms import Fluid, Terms
 from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE

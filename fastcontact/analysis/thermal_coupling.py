@@ -16,12 +16,12 @@ from scipy.sparse import csr_array
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
+from fastcontact.analysis.equilibrium import Balance, StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium
 from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing

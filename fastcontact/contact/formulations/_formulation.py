@@ -29,8 +29,19 @@ from fastcontact.contact.linearised_geometry import (
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
-from fastcontact.contact.pairing import OVERHANG, Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
-from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
+from fastcontact.contact.pairing import (
+    OVERHANG,
+    Candidates,
+    Normals,
+    Pairing,
+    checked_normals,
+    gap_rows,
+    normals,
+    opposed,
+    pair,
+    rows_along,
+    tangents,
+)
 from fastcontact.contact.projection import (
     at_nodes_of_facets,
     interpolated,

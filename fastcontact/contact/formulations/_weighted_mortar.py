@@ -36,8 +36,7 @@ from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, ob
 from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, NodalNormals, Points, Slips, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
-from fastcontact.contact.prescribed_normals import Normals
+from fastcontact.contact.pairing import Candidates, Normals, Pairing, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import FacetBlock

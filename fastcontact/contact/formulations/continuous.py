@@ -18,8 +18,7 @@ from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.integration import all_nodes_carry, even_at_axis, facet_measure, fine_rule, gauss_rule
 from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, filled_up
-from fastcontact.contact.prescribed_normals import Normals
+from fastcontact.contact.pairing import Candidates, Normals, filled_up
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import shapes_at
