@@ -1,4 +1,4 @@
-"""Contact summary: resultant force and moment, area, centre of pressure, mean gap, frictional work, wear; forces of supports, springs and bolts."""
+"""Contact summary: resultants, area, mean gap, frictional work, wear; forces of supports, springs and bolts."""
 
 from __future__ import annotations
 
