@@ -30,8 +30,7 @@ from fastcontact.analysis.equilibrium import (
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
-from fastcontact.analysis.linearisation import linearised, load_about
-from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.tolerances import DECLINE
@@ -316,7 +315,11 @@ class _Newton:
             problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, by.replaces)
             if by.geometric == WHOLE:
                 self._kept = problem
-        load = load_about(problem, terms, u, self._load, iterate.rigid)
+        force, floating = self._load.force - terms.residual(u)[0] + problem.system.K @ u, problem.floating_bodies
+        if floating is not None and iterate.rigid is not None:
+            # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
+            force -= problem.system.K @ floating.rigid(u[floating.dofs])
+        load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
         enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
         inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
