@@ -64,12 +64,6 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
     )
 
 
-def no_contact_stops(bodies: FloatingBodies) -> str:
-    """Return the message for loads that separate bodies."""
-    motions = grouped(bodies.names)
-    return f"the loads pull bodies away, and no contact stops them ({motions}): reverse the loads or add supports"
-
-
 def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:
     """Return the message for loads beyond the friction cone, which would hold with `factor` times the `coefficients`."""
     given = np.unique(coefficients[coefficients > 0.0])

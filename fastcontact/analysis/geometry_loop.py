@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import astuple, dataclass, replace
-from typing import NoReturn
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -97,15 +96,7 @@ def settle_geometry(step: StepContext, iterate: Iterate) -> SettledContact:
     """
     touching = Touching(step, _linearises(step.problem))
     try:
-        try:
-            settled = _settle(step, iterate, touching)
-        except ConvergenceError as error:
-            if not touching.done:
-                raise
-            log.info("friction in increments of the step does not converge: %s", error)
-            touching.give_up()
-            iterate = replace(Iterate.of(step.state), history=iterate.history)
-            settled = _settle(step, iterate, touching)
+        settled = _settle(step, iterate, touching)
     except ConvergenceError as error:
         error.history = error.history or iterate.history
         raise
@@ -150,7 +141,10 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
             watch.forget()
         moved = _move(step, iterate, constraints, solution, displacement)
         if not (solution.settled or accuracy.inexact):
-            _raise_cycling(problem, constraints, solution, iterate)
+            nodes_that_change = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
+            iterate.history[-1]["nodes"] = nodes_that_change
+            text = active_set_cycles(problem, constraints, solution, nodes_that_change)
+            raise ConvergenceError(text, iterate.history)
         if not problem.until_settled:
             continue
         if not tolerances.inexact:
@@ -229,12 +223,6 @@ def _move(
         }
     )
     return moved
-
-
-def _raise_cycling(problem: Problem, constraints: StackedConstraints, solution: Solution, iterate: Iterate) -> NoReturn:
-    nodes = nearest_nodes(problem, constraints, np.flatnonzero(solution.active != solution.wanted))
-    iterate.history[-1]["nodes"] = nodes
-    raise ConvergenceError(active_set_cycles(problem, constraints, solution, nodes), iterate.history)
 
 
 class _Mixing:
