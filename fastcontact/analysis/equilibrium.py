@@ -7,12 +7,12 @@ the contact constraints, and :math:`\lambda` their Lagrange multipliers. A load 
 
 by Newton's method, see `newton`. `Balance` contains the reactions, and the residual with its bound; `StepEquilibrium` the
 solution. Contact is not a term: it is linearised together with its inequalities in `geometry_loop`.
-Only fluid pressure between the contact surfaces is one, `Fluid`.
+Only fluid pressure between the contact surfaces is one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Protocol
 
@@ -25,9 +25,7 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
-from fastcontact.contact.constraints import Wetted
 from fastcontact.elasticity.constrained_system import Stiffness
-from fastcontact.elasticity.following_pressure import FollowingPressure
 from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
 from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
 from fastcontact.errors import ConvergenceError
@@ -145,48 +143,41 @@ class SpringForces(Term):
         return self._K
 
 
-class FollowerLoad(Term):
-    """Pressure load that follows the deformed surface.
+class FollowingForce(Term):
+    """Force of a pressure that follows the deformed surface, in excess of the force that is a constant elsewhere.
 
-    The external forces of the step include the force of the pressure on the undeformed surface. The term therefore is this
-    force minus the force on the deformed surface. `factor` is the load multiplier [-].
+    The external forces of the step include the forces of a load on the undeformed surface. The linearised contact problem
+    includes those of a fluid between the contact surfaces at the displacements about which it was linearised. The term
+    therefore is this force minus the force at the current displacements.
+
+    Parameters
+    ----------
+    problem : Problem
+    force, stiffness : callable
+        Functions of the displacements (n_points, dim) [length], which return the nodal forces (n_points, dim) [force] and the
+        tangent (n_dofs, n_dofs) [force / length].
+    at : ndarray (n_dofs,)
+        Displacements for which the forces are included elsewhere [length].
+    factor : float
+        Load multiplier [-].
     """
 
-    def __init__(self, problem: Problem, pressure: FollowingPressure, factor: float) -> None:
-        self._problem, self._pressure, self._factor = problem, pressure, factor
-        self._before = pressure.at(np.zeros_like(problem.model.mesh.points))[0]
+    def __init__(
+        self, problem: Problem, force: Callable[[Array], Array], stiffness: Callable[[Array], csr_array], at: Array,
+        factor: float = 1.0,
+    ) -> None:  # fmt: skip
+        self._displacement, self._force, self._stiffness, self._factor = problem.displacement, force, stiffness, factor
+        self._before = force(problem.displacement(at))
 
     def residual(self, u: Array) -> tuple[Array, Energies]:
         """See `Term`."""
-        force, here = np.zeros_like(u), self._pressure.at(self._problem.displacement(u))[0]
+        force, here = np.zeros_like(u), self._force(self._displacement(u))
         force[: here.size] = -self._factor * (here - self._before).ravel()
         return force, (0.0, 0.0)
 
     def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
         """See `Term`."""
-        return self._factor * self._pressure.at(self._problem.displacement(u))[1]
-
-
-class Fluid(Term):
-    """Pressure of a fluid between the contact surfaces.
-
-    The linearised contact problem includes the fluid force at the displacements `at` (n_dofs,) [length], about which it was
-    linearised. The term therefore is this force minus the force at the current displacements.
-    """
-
-    def __init__(self, problem: Problem, wetted: Wetted, at: Array) -> None:
-        self._problem, self._wetted = problem, wetted
-        self._before = wetted.force(problem.displacement(at))
-
-    def residual(self, u: Array) -> tuple[Array, Energies]:
-        """See `Term`."""
-        force, here = np.zeros_like(u), self._wetted.force(self._problem.displacement(u))
-        force[: here.size] = (self._before - here).ravel()
-        return force, (0.0, 0.0)
-
-    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
-        """See `Term`."""
-        return self._wetted.stiffness(self._problem.displacement(u))
+        return self._factor * self._stiffness(self._displacement(u))
 
 
 class Terms:
@@ -212,12 +203,8 @@ class Terms:
             springs, n = problem.model.springs, problem.model.n_dofs
             self._parts = [self.bodies, *([SpringForces(springs, n)] if springs else [])]
             for (pressure, _), factor in zip(problem.following, load.following, strict=True):
-                self._parts.append(FollowerLoad(problem, pressure, factor))
-
-    @property
-    def prepared(self) -> bool:
-        """Whether the tangents of all terms are constant and included in the prepared matrix of the linear solver."""
-        return self.bodies is None
+                force, tangent = (lambda u, part=part, at=pressure.at: at(u)[part] for part in (0, 1))
+                self._parts.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
 
     def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
         """Return the sums of the nodal forces and of the energies of all terms, including the terms `more`; see `Term`."""
@@ -296,21 +283,16 @@ class Balance:
         """Raise a ConvergenceError for step `index` if the residual exceeds its bound."""
         if self.residual <= self.bound:
             return
-        raise ConvergenceError(
-            f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "
-            f"({problem.criteria.relative:g} of the largest force): {self._remedy(problem.solver.iterative)}",
-            history,
-            smaller_steps_help=False,
-        )
-
-    def _remedy(self, iterative: bool) -> str:
-        """Return a remedy for a residual above its bound."""
-        if iterative:
-            return "use the direct solver"
         more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
-        return (
+        remedy = "use the direct solver" if problem.solver.iterative else (
             "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
             f"in the place of a stiff body{more}"
+        )  # fmt: skip
+        raise ConvergenceError(
+            f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "
+            f"({problem.criteria.relative:g} of the largest force): {remedy}",
+            history,
+            smaller_steps_help=False,
         )
 
 
@@ -441,7 +423,7 @@ class StepEquilibrium:
             "history": history,
             **({} if scatter is None else {"scatter": asdict(scatter)}),
         }
-        if self.terms.prepared:
+        if self.terms.bodies is None:
             return counts
         names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
         of_newton = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}

@@ -73,18 +73,6 @@ class Iterate:
         """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
-    def permeable(self, name: str) -> Array | None:
-        """Return the last nodal pressures of a contact pair, infinite where the fluid has been displaced too often."""
-        pressure, fluid = self.pressure.get(name), self.fluid.get(name)
-        return pressure if pressure is None or fluid is None else np.where(fluid[1] < DISPLACED, pressure, np.inf)
-
-    def remember_fluid(self, name: str, constraints: Constraints) -> None:
-        """Store which nodes of a contact pair the fluid has reached, and how many times contact has displaced it there."""
-        if constraints.wetted is not None:
-            wet = constraints.wetted.pressure > 0.0
-            before, displaced = self.fluid.get(name, (wet, np.zeros(len(wet), int)))
-            self.fluid[name] = wet, displaced + (before & ~wet)
-
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
         """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
         for name, rows in constraints.rows.items():
@@ -102,9 +90,14 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
     parts = {}
     for name, pair in problem.pairs.items():
         at = problem.configuration(name, state, load, paired_at, u)
-        at = replace(at, pressure=iterate.permeable(name), rounded=iterate.rounded)
-        parts[name] = pair.constraints(at)
-        iterate.remember_fluid(name, parts[name])
+        pressure, fluid = iterate.pressure.get(name), iterate.fluid.get(name)
+        if pressure is not None and fluid is not None:  # impermeable where the fluid has been displaced too often
+            pressure = np.where(fluid[1] < DISPLACED, pressure, np.inf)
+        parts[name] = pair.constraints(replace(at, pressure=pressure, rounded=iterate.rounded))
+        if (wetted := parts[name].wetted) is not None:
+            wet = wetted.pressure > 0.0
+            before, displaced = fluid or (wet, np.zeros(len(wet), int))
+            iterate.fluid[name] = wet, displaced + (before & ~wet)
         if problem.force_driven.pairs:
             rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
             moved = at.obstacle_motion if rotates else None

@@ -20,7 +20,7 @@ from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.equilibrium import (
     Balance,
-    Fluid,
+    FollowingForce,
     StepEquilibrium,
     Terms,
     balance,
@@ -173,7 +173,7 @@ class _Newton:
                 break
             u, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)
-            if self._terms.prepared:
+            if self._terms.bodies is None:
                 if self._is_exact(balanced):
                     return StepEquilibrium(self._settled, u, balanced, self._terms)
                 continue
@@ -261,7 +261,7 @@ class _Newton:
         closed gaps, soft ones first: convergence stays quadratic except for motions that contact does not hold. If this does
         not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
         """
-        if self._terms.prepared:
+        if self._terms.bodies is None:
             begin = self._begin
             first = self._load is begin.load and self._settled is None
             loaded = begin.loaded if first else with_loads(self._problem, self._load)
@@ -363,13 +363,13 @@ class _Newton:
             part.resize((len(u), len(u)))
         return sum(parts[1:], parts[0]) if parts else None
 
-    def _fluid(self, at: Array) -> list[Fluid]:
+    def _fluid(self, at: Array) -> list[FollowingForce]:
         """Return the fluid pressures of the last contact that follow bodies, linearised `at` displacements (n_dofs,)."""
         bodies = self._problem.bodies
         if self._settled is None or bodies is None or not bodies.finite:
             return []
         wetted = [part.wetted for part in self._settled.constraints.parts.values()]
-        return [Fluid(self._problem, each, at) for each in wetted if each is not None]
+        return [FollowingForce(self._problem, w.force, w.stiffness, at) for w in wetted if w is not None]
 
     def _reach(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, float]:
         """Return the next displacements (n_dofs,), and the step length from u to the `target` (n_dofs,).

@@ -20,7 +20,7 @@ from fastcontact._tools.html_table import fields_table
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.sensitivity.adjoint import Adjoint, Change, Gradient
 from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
-from fastcontact.analysis.sensitivity.parameters import change_by, check_parameter
+from fastcontact.analysis.sensitivity.parameters import KINDS, check_parameter
 from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gradient
 from fastcontact.analysis.sensitivity.settled_step import checked_margin, settled_step
 from fastcontact.arrays import Array
@@ -144,7 +144,8 @@ def sensitivities(
     problem, contact = settled_step(model, step, ramp_of(ramp), criteria or Criteria(), linear_solver)
     nearest = checked_margin(contact, margin) if problem.pairs else 1.0
     contact, gradient = with_gradient(contact, step, tuple(quantity))
-    values, solutions = _derivatives(contact, gradient, [change_by(contact, parameter) for parameter in tuples])
+    changes = [KINDS[str(parameter[0])][1](contact, parameter) for parameter in tuples]
+    values, solutions = _derivatives(contact, gradient, changes)
     return Sensitivities(gradient.value, dict(zip(tuples, values.tolist(), strict=True)), nearest, solutions)
 
 

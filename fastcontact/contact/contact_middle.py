@@ -182,8 +182,9 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     weight = _weights(force, gap)
     mean = weight @ normal
     dim = points.shape[1]
+    meets_axis = np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
     if pair.axisymmetric and (
-        _meets_axis(points) or (abs(mean[0]) <= abs(mean[1]) and _told_apart_by_radius(surface, pair.points))
+        meets_axis or (abs(mean[0]) <= abs(mean[1]) and _told_apart_by_radius(surface, pair.points))
     ):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(surface, pair.points, pair.held)
@@ -208,11 +209,6 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], m
             centre[axis], mean[axis] = values[0], 0.0
     length = float(np.linalg.norm(mean))
     return ContactMiddle(centre, direction=mean / length if length > DIRECTED else None, ignored=ignored)
-
-
-def _meets_axis(points: Array) -> bool:
-    """Return whether one of the `points` (n, 2) [length] lies on the axis x = 0."""
-    return bool(np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max())
 
 
 def _told_apart_by_radius(surface: Surface, coordinates: Array) -> bool:

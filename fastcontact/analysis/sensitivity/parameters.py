@@ -57,11 +57,6 @@ def check_parameter(model: Model, parameter: Label) -> None:
     KINDS[kind][0](model, parameter)
 
 
-def change_by(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change of the residual with a parameter that `check_parameter` has accepted."""
-    return KINDS[str(parameter[0])][1](contact, parameter)
-
-
 def _item(kind: str, known: Mapping[str, Any], parameter: Label) -> Any:
     """Return the item of a given name; ModelError if there is none."""
     if parameter[1] not in known:

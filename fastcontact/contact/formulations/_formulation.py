@@ -273,8 +273,9 @@ class Formulation(ABC):
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
-        held = self._held_on_both_sides(Configuration.undeformed(self.points))
-        if held is None or not constraints.tangents:
+        # Directions in which all nodes of a facet are held do not count.
+        held = _without_whole_facets(self._both_held(Configuration.undeformed(self.points)), self.secondary)
+        if not (held.any() and constraints.tangents):
             return None
         nodes = self.nodes_of(constraints, moments)
         frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
@@ -497,14 +498,6 @@ class Formulation(ABC):
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
         return pairing, theirs
-
-    def _held_on_both_sides(self, at: Configuration) -> Array | None:
-        """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held; None without such directions.
-
-        Directions in which all nodes of a facet are held do not count.
-        """
-        held = _without_whole_facets(self._both_held(at), self.secondary)
-        return held if held.any() else None
 
     def _both_held(self, at: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""

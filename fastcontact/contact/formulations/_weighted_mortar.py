@@ -33,7 +33,7 @@ from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
-from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
+from fastcontact.contact.integration import areas_of_rule, nodal_areas
 from fastcontact.contact.linearised_geometry import Closing, NodalNormals, Points, Slips, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Normals, Pairing, filled_up, pair, tangents
@@ -96,9 +96,8 @@ class WeightedMortar(Formulation):
         self._test = [self._test_functions(block.element) for block in self.secondary.blocks]
         self._whole = []
         for block, T in zip(self.secondary.blocks, self._test, strict=True):
-            xi, weights = fine_rule(block.element)
-            dA = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
-            self._whole.append(dA @ elements.get(block.element).shape(xi) @ T.T)
+            N, dA = areas_of_rule(block, self.points, self.axisymmetric)
+            self._whole.append(dA @ N @ T.T)
 
     @property
     def eliminable(self) -> bool:
@@ -223,10 +222,8 @@ class WeightedMortar(Formulation):
 
     def _whole_facets(self, block: FacetBlock) -> OverlapPoints:
         """Return Gauss points of whole facets."""
-        xi, weights = fine_rule(block.element)
-        area = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
-        facet = np.repeat(np.arange(len(area)), len(xi))
-        return OverlapPoints(facet, np.tile(elements.get(block.element).shape(xi), (len(area), 1)), area.ravel())
+        N, area = areas_of_rule(block, self.points, self.axisymmetric)
+        return OverlapPoints(np.repeat(np.arange(len(area)), len(N)), np.tile(N, (len(area), 1)), area.ravel())
 
     def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
         """Return the variation of the nodal normals, or None if they are means of primary normals."""

@@ -36,7 +36,7 @@ from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
-from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.integration import areas_of_rule, facet_measure
 from fastcontact.contact.pair_options import spread
 from fastcontact.contact.pairing import Candidates, Normals
 from fastcontact.contact.surface import FacetBlock, Surface
@@ -70,9 +70,7 @@ class WholeFacets:
     def of(cls, block: FacetBlock, points: Array, axisymmetric: bool) -> WholeFacets:
         """Integrate over the facets of a block at reference `points` (n_points, dim) [length]."""
         element = elements.get(block.element)
-        xi, weights = fine_rule(block.element)
-        N = element.shape(xi)
-        dA = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
+        N, dA = areas_of_rule(block, points, axisymmetric)
         to_corners = elements.get(element.linear).shape(element.nodes).T
         return cls(block, to_corners, np.einsum("fq,qa,qb->fab", dA, N, N))
 
