@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -96,7 +97,7 @@ def contact_result(
     fluid = None if pair.options.source is None else np.zeros(len(points))
     if constraints.wetted is not None:
         fluid = constraints.wetted.pressure
-    abscissa, obstacle = pair.secondary.abscissa, {}
+    abscissa, obstacle = pair.secondary.abscissa, dict[str, Any]()
     if axis is not None:  # the distance from it
         arm = coordinates - axis[0]
         abscissa = np.linalg.norm(arm - (arm @ axis[1])[:, None] * axis[1], axis=1)

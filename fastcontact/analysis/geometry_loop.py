@@ -126,7 +126,9 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, step.extrapolation if extrapolates and update == 0 else None)
         accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift))
-        nodes = SharedNodes.of(constraints, problem.model.periodic_interfaces) if problem.shares_nodes else None
+        # Constraints of several pairs, or of both ends of a period, may be at one node.
+        ends = problem.model.periodic_interfaces
+        nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None
         once, closed = (constraints, active) if nodes is None else (nodes.once(constraints), nodes.closed(active))
         along = touching.step(step, constraints, iterate, nodes)
         if touching.unfinished:

@@ -142,6 +142,8 @@ class StepContext:
         Extrapolation of earlier steps, with which the step begins.
     expected : float
         Scale of the displacements in the first step, if only forces act [length].
+    index : int
+        Number of the step.
     path : Path or Slid, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -154,6 +156,7 @@ class StepContext:
     dofs: ActiveDofs
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     expected: float = 0.0
+    index: int = 0
     path: Path | Slid | None = None
 
     @cached_property

@@ -19,7 +19,8 @@ from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.contact_result import contact_results
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.newton import Beginning, newton
+from fastcontact.analysis.inequalities import StepContext
+from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
@@ -64,10 +65,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     begin = prepare_start(problem, state, index, load)
-    heated, solution = None, newton(problem, begin, load)
+    heated, solution = None, newton(begin, load)
     if problem.heat is not None:
-        solve = partial(newton, problem, begin)
-        heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, solve)
+        heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, partial(newton, begin))
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     return _ended(problem, begin.state, load, solution, iterations, (index, instant), heated)
 
@@ -123,12 +123,12 @@ def _ended(
     return end, result if heated is None else heated.completed(problem, result)
 
 
-def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> Beginning:
+def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:
     """Return the beginning of a load step.
 
     Its state is the `state` at the end of the previous step, with the bounds of round-off and of forces for the new `load`.
     If only forces act in the first step, no displacement is known. The solution without contact then provides the scale of
-    the displacements, `Beginning.expected`.
+    the displacements, `StepContext.expected`.
     """
     pushing = load if load.rise is None else expansion_as_force(problem, load)
     loaded = with_loads(problem, pushing)
@@ -156,7 +156,7 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
             extrapolation = extrapolation.to(*map(np.zeros_like, parts)).converged(state.u, {})
         start = replace(start, extrapolation=extrapolation.to(*parts))
-    return Beginning(start, index, load, loaded, expected)
+    return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
 
 
 def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
@@ -281,7 +281,8 @@ def recover(
         stress = recovery.nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):
-        stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, stress, mesh.n_points)
+        materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
+        stress, by_material = by_largest_von_mises(problem.sides, materials_of_cells, stress, mesh.n_points)
     von_mises, named = recovery.von_mises(stress), problem.model.units
     return StepResult(
         *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction, contact,

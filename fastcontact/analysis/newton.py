@@ -32,7 +32,6 @@ from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.solution import FrictionalEquilibrium
-from fastcontact.analysis.state import State
 from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
@@ -59,38 +58,13 @@ FORCING = 1e-3
 UNCHANGED = 100 * ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
-class Beginning:
-    """Data at the beginning of a load step.
-
-    Attributes
-    ----------
-    state : State
-    index : int
-        Number of the step.
-    load : StepLoad
-    loaded : Loaded
-        The prepared matrix with the right-hand side of the load.
-    expected : float
-        Expected displacement in the first step, if only forces act [length].
-    """
-
-    state: State
-    index: int
-    load: StepLoad
-    loaded: Loaded
-    expected: float
-
-
-def newton(
-    problem: Problem, begin: Beginning, load: StepLoad, before: StepEquilibrium | None = None
-) -> StepEquilibrium:
+def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
     """Return the equilibrium of a load step.
 
     Parameters
     ----------
-    problem : Problem
-    begin : Beginning
+    begin : StepContext
+        Data at the beginning of the step, with the linear solver at rest.
     load : StepLoad
         Load of `begin`, or the same with other temperatures.
     before : StepEquilibrium, optional
@@ -102,14 +76,14 @@ def newton(
         If the iterations do not converge, a cell is inverted, or forces stay out of balance.
     """
     start = begin.state
-    if problem.bodies is not None and (before is not None or start.extrapolation.ratio):
+    if begin.problem.bodies is not None and (before is not None or start.extrapolation.ratio):
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
-            return _Newton(problem, begin, load).iterated(origin)
+            return _Newton(begin, load).iterated(origin)
         except ConvergenceError as error:
             log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
-    return _Newton(problem, begin, load, before).iterated(start.u)
+    return _Newton(begin, load, before).iterated(start.u)
 
 
 @dataclass(frozen=True)
@@ -142,17 +116,15 @@ class Regularisation:
 class _Newton:
     """The iterations of a load step; see `newton` for the parameters."""
 
-    def __init__(
-        self, problem: Problem, begin: Beginning, load: StepLoad, before: StepEquilibrium | None = None
-    ) -> None:
-        self._problem, self._begin, self._start, self._load = problem, begin, begin.state, load
-        self._terms = Terms(problem, begin.state, load)
+    def __init__(self, begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> None:
+        self._problem, self._begin, self._start, self._load = begin.problem, begin, begin.state, load
+        self._terms = Terms(begin.problem, begin.state, load)
         settled = None if before is None else before.settled
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
         self._by = Regularisation()  # of the last tangent
-        self._replaces = bool(problem.force_driven.pairs)  # see `Regularisation.replaces`
+        self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
 
     @cached_property
     def _mixing(self) -> Anderson:
@@ -262,9 +234,8 @@ class _Newton:
         not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
         """
         if self._terms.bodies is None:
-            begin = self._begin
-            first = self._load is begin.load and self._settled is None
-            loaded = begin.loaded if first else with_loads(self._problem, self._load)
+            first = self._load is self._begin.load and self._settled is None
+            loaded = self._begin.loaded if first else with_loads(self._problem, self._load)
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         # Forces on a floating body that moves do not balance while springs along gaps do not resist its motion.
         if self._by.held and changes[-1] > changes[-2] > min(changes):
@@ -331,10 +302,13 @@ class _Newton:
         """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
         settled = None
         if problem.pairs:
-            u0, bodies, expected = self._iterate.u, problem.floating_bodies, self._begin.expected
+            u0, bodies = self._iterate.u, problem.floating_bodies
             lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
             dofs = problem.dofs.for_step(u0, lift)
-            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs, extrapolation, expected)
+            condensed = dofs.loaded(loaded)
+            step = replace(
+                self._begin, problem=problem, load=load, loaded=condensed, dofs=dofs, extrapolation=extrapolation
+            )
             settled = settle_geometry(step, self._iterate)
             self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)

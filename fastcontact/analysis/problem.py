@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -154,11 +153,6 @@ class Problem:
     heat: Heat | None = None
     linearised_at: Array | None = None
 
-    @cached_property
-    def material_of_cells(self) -> Numbers:
-        """Number (n_solids,) of the material of each solid cell; equal materials have the same number."""
-        return np.concatenate(list(self.field.distinct.values()))
-
     @property
     def until_settled(self) -> bool:
         """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
@@ -168,11 +162,6 @@ class Problem:
     def extrapolates(self) -> bool:
         """Whether load steps start from an extrapolation of earlier ones."""
         return self.solver.iterative or self.bodies is not None
-
-    @property
-    def shares_nodes(self) -> bool:
-        """Whether constraints of several contact pairs, or of both ends of a period, may be at one node."""
-        return len(self.pairs) > 1 or bool(self.model.periodic_interfaces)
 
     @property
     def shape(self) -> tuple[int, int]:

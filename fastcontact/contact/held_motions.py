@@ -134,8 +134,9 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
         for child in order[1:]:  # the sign of each vector is that for which it agrees with its nearest neighbour
             axis[child] *= np.sign(axis[child] @ axis[before[child]])
         # Between these, directions are interpolated with weights of the inverse distances to the power NEAREST.
-        along, away = np.tile(axis[order][0], (len(places), 1)), _distances(places, places[seeds[order]])
+        along = np.tile(axis[order][0], (len(places), 1))
         if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
+            away = _distances(places, places[seeds[order]])
             along = _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ axis[order])
         along[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", along, rest, along) >= TOGETHER**2
