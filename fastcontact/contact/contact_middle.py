@@ -188,8 +188,12 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     ):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(surface, pair.points, pair.held)
-    if closed.any():
-        planes = [plane for plane in planes if _reached(surface, plane[1], closed)]
+    if closed.any():  # only the planes that the contact reaches
+        reached = [
+            any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
+            for _, nodes in planes
+        ]
+        planes = [plane for plane, counts in zip(planes, reached, strict=True) if counts]
     if dim == 2:
         return _along_line(surface, pair.points, weight, planes, mean)
     return _in_space(points, weight, planes, mean)
@@ -254,15 +258,6 @@ def _weights(force: Array, gap: Array) -> Array:
     weight = np.zeros(len(force))
     weight[int(np.argmin(gap))] = 1.0
     return weight
-
-
-def _reached(surface: Surface, nodes: Indices, closed: Mask) -> bool:
-    """Return whether a facet with one of the `nodes` has a closed node."""
-    for block in surface.blocks:
-        touching = np.isin(block.local, nodes).any(axis=1)
-        if closed[block.local[touching]].any():
-            return True
-    return False
 
 
 def _along_line(

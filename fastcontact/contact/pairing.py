@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -265,14 +266,8 @@ def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
     Integers are padded with the last entry of the row, floating-point numbers with zeros.
     """
     width = max(values.shape[1] for values in arrays)
-    missing = [((0, 0), (0, width - values.shape[1])) for values in arrays]
-    integer = np.issubdtype(arrays[0].dtype, np.integer)
-    return np.concatenate(
-        [
-            np.pad(values, pad, mode="edge" if integer else "constant")
-            for values, pad in zip(arrays, missing, strict=True)
-        ]
-    )
+    mode: Any = "edge" if np.issubdtype(arrays[0].dtype, np.integer) else "constant"
+    return np.concatenate([np.pad(values, ((0, 0), (0, width - values.shape[1])), mode) for values in arrays])
 
 
 def gap_rows(
