@@ -235,29 +235,13 @@ class SegmentMortar(PressureFieldFormulation):
         covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
         kept = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.out(candidates)
         pairing = replace(faced, paired=kept)
-        field = self._pressure_field(facet, shape, np.where(kept, area, 0.0), area)
-        return self.of_points(candidates, pairing, field, at)
-
-    def _pressure_field(self, facet: Indices, shape: Array, area: Array, whole: Array) -> PressureField:
-        """Return the pressure field of m integration points.
-
-        Parameters
-        ----------
-        facet : ndarray of int (m,)
-            Number of the facet of each point.
-        shape : ndarray (m, n)
-            Shape functions of the n nodes of the facet at the point [-].
-        area : ndarray (m,)
-            Areas of the points, zero if a point cannot carry forces [area].
-        whole : ndarray (m,)
-            Areas of all points [area].
-        """
-        n, k = self.secondary.facets.shape
+        covering, (n, k) = np.where(kept, area, 0.0), self.secondary.facets.shape
         mass = np.zeros((n, k, k))
-        np.add.at(mass, facet, area[:, None, None] * shape[:, :, None] * shape[:, None, :])
-        field = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
-        points = self.secondary.local[facet], shape
-        return PressureField.of_points(points, (area, whole), self._rho, self.repeated(field), renewed=True)
+        np.add.at(mass, facet, covering[:, None, None] * shape[:, :, None] * shape[:, None, :])
+        values = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
+        around = self.secondary.local[facet], shape
+        field = PressureField.of_points(around, (covering, area), self._rho, self.repeated(values), renewed=True)
+        return self.of_points(candidates, pairing, field, at)
 
 
 FORMULATION = SegmentMortar
