@@ -28,21 +28,23 @@ _MODULES = {
     "topology": "mesh.topology",
 }
 _NAMES = {
-    "analysis.contact_resultants": (
+    "analysis.criteria": ("Criteria",),
+    "analysis.modal.shapes": ("Modes", "RingModes"),
+    "analysis.modes": ("modes",),
+    "analysis.resultants": (
         "ContactAnswers",
         "ContactResultants",
         "contact_answers",
         "contact_history",
         "contact_moment",
         "contact_resultants",
+        "pretension_history",
+        "spring_forces",
+        "support_forces",
         "wear",
     ),
-    "analysis.criteria": ("Criteria",),
-    "analysis.modal.shapes": ("Modes", "RingModes"),
-    "analysis.modes": ("modes",),
     "analysis.run": ("solve", "solve_steps"),
     "analysis.sensitivities": ("Sensitivities", "sensitivities"),
-    "analysis.support_forces": ("pretension_history", "spring_forces", "support_forces"),
     "cases.decks.deck": ("Deck", "read_deck"),
     "contact.found_contacts": ("FoundContacts", "find_contacts"),
     "elasticity.anisotropic_materials": ("Anisotropic", "Orthotropic"),

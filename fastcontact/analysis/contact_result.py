@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -84,11 +84,11 @@ def contact_result(
     multiplier, active = solution.multiplier[rows], solution.active[rows]
     active = active if constraints.wetted is None else active & ~constraints.wetted.rows
     gap, normal = pair.nodal_gap(at, displacement=displacement)
-    closed_nodes = _closed(pair, constraints, multiplier, active[: len(constraints.normal_forces(multiplier))], gap, at)
-    closed = closed_nodes.nodes
+    active_gaps = active[: len(constraints.normal_forces(multiplier))]
+    closed, pressure, nodal, kept = _closed(pair, constraints, multiplier, active_gaps, gap, at)
     if pair.options.tied:  # in the undeformed configuration
         normal = pair.nodal_gap(replace(at, displacement=np.zeros_like(at.displacement)))[1]
-    shear, sticking, tangential = _along_the_surface(constraints, solution, rows, normal, closed_nodes)
+    shear, sticking, tangential = _along_the_surface(constraints, solution, rows, normal, closed, kept)
     if pair.axisymmetric:  # The radial traction is an odd function of the radius.
         shear[coordinates[:, 0] <= LENGTH_ROUND_OFF * np.ptp(coordinates)] = 0.0
     forces, total, primary_points, primary_forces = _forces(pair, constraints, multiplier, tangential)
@@ -97,15 +97,25 @@ def contact_result(
     fluid = None if pair.options.source is None else np.zeros(len(points))
     if constraints.wetted is not None:
         fluid = constraints.wetted.pressure
+    abscissa, obstacle = pair.secondary.abscissa, dict[str, Any]()
+    if axis is not None:  # the distance from it
+        arm = coordinates - axis[0]
+        abscissa = np.linalg.norm(arm - (arm @ axis[1])[:, None] * axis[1], axis=1)
+    if isinstance(side := pair.primary, RigidSide):
+        obstacle = {
+            "obstacle_displacement": at.pose.displacement.copy(),
+            "obstacle_angle": None if side.rotation is None else at.pose.angle,
+            "torque": side.torque(coordinates + at.displacement[points], forces, at.pose),
+        }
     return ContactResult(
         name=name,
         formulation=pair.name,
         points=points,
         coordinates=coordinates,
-        abscissa=pair.secondary.abscissa if axis is None else _distance(coordinates, axis),
+        abscissa=abscissa,
         gap=gap,
-        pressure=closed_nodes.pressure,
-        multiplier=closed_nodes.multiplier,
+        pressure=pressure,
+        multiplier=nodal,
         force_vectors=forces,
         normal=normal,
         active=closed,
@@ -119,20 +129,8 @@ def contact_result(
         primary_points=primary_points,
         primary_force_vectors=primary_forces,
         fluid_pressure=fluid,
-        **_obstacle(pair, at, coordinates + at.displacement[points], forces),
+        **obstacle,
     )
-
-
-def _obstacle(pair: Formulation, at: Configuration, deformed: Array, forces: Array) -> dict[str, Any]:
-    """Return the position of a rigid obstacle, and the torque of `forces` acting at `deformed`; empty for bodies."""
-    side = pair.primary
-    if not isinstance(side, RigidSide):
-        return {}
-    return {
-        "obstacle_displacement": at.pose.displacement.copy(),
-        "obstacle_angle": None if side.rotation is None else at.pose.angle,
-        "torque": side.torque(deformed, forces, at.pose),
-    }
 
 
 def _forces(
@@ -149,92 +147,59 @@ def _forces(
 
 
 def _along_the_surface(
-    constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed_nodes: _Closed
+    constraints: Constraints, solution: Solution, rows: slice, normal: Array, closed: Mask, kept: Array
 ) -> tuple[Array, Mask, Array | None]:
     """Return nodal tractions (n_nodes, dim) [pressure], nodes that stick, and forces (m, k) of friction [force]."""
     multiplier, all_nodes = solution.multiplier[rows], np.ones(len(normal), bool)
     if constraints.tied is not None and constraints.tied.directions:
         _, tangential = constraints.tied.forces(multiplier)
         shear = _nodal_shear(constraints, constraints.tied.directions, tangential, normal)
-        return np.where(closed_nodes.nodes[:, None], shear, 0.0), all_nodes, None
+        return np.where(closed[:, None], shear, 0.0), all_nodes, None
     if not (isinstance(solution, FrictionalEquilibrium) and constraints.tangents):
         return np.zeros_like(normal), all_nodes, None
     tangential = solution.tangential[rows]
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
-    sticking = _mostly_sticking(constraints, solution.sticking[rows], multiplier, constraints.pressure(multiplier))
-    return shear * closed_nodes.kept[:, None], sticking, tangential
-
-
-@dataclass(frozen=True, eq=False)
-class _Closed:
-    """Closed nodes and their pressures, and the formulation's pressures at all nodes (m,) [pressure].
-
-    `multiplier` is the pressure field over the whole side; `own` is averaged at each node like the frictional tractions.
-    """
-
-    nodes: Mask
-    pressure: Array
-    multiplier: Array
-    own: Array
-
-    @property
-    def kept(self) -> Array:
-        """Factor (m,) from the raw to the reported pressures of closed nodes, by which tractions are scaled, too.
-
-        At most 1: where a field undershoots, the raw pressure of a node may nearly vanish, and its shear is arbitrary.
-        """
-        fraction = np.divide(self.pressure, self.own, out=np.ones_like(self.pressure), where=self.own > 0.0)
-        return np.where(self.nodes, np.minimum(fraction, 1.0) if self.own.min() < 0.0 else fraction, 0.0)
+    sticking, pressure = solution.sticking[rows], constraints.pressure(multiplier)
+    if len(sticking) != len(pressure):  # more force comes to a node from sticking constraints than from sliding ones
+        assert constraints.nodal is not None
+        sticking = constraints.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
+    return shear * kept[:, None], sticking, tangential
 
 
 def _closed(
     pair: Formulation, constraints: Constraints, multiplier: Array, active: Mask, gap: Array, at: Configuration
-) -> _Closed:
-    """Return the closed nodes of a pair, and nodal pressures that integrate to the contact force."""
-    assert constraints.nodal is not None
+) -> tuple[Mask, Array, Array, Array]:
+    """Return the closed nodes of a pair, and pressures that integrate to the contact force.
+
+    Returns
+    -------
+    closed : ndarray of bool (n_nodes,)
+        Secondary nodes in contact: by their pressure, or because they cannot separate.
+    pressure : ndarray (n_nodes,)
+        Pressures at closed nodes [pressure].
+    multiplier : ndarray (n_nodes,)
+        The pressure field over the whole side [pressure].
+    kept : ndarray (n_nodes,)
+        Factor from the raw to the reported pressures of closed nodes, by which tractions are scaled, too. At most 1: where a
+        field undershoots, the raw pressure of a node may nearly vanish, and its shear is arbitrary.
+    """
+    field, excluded = constraints.nodal, pair.options.excluded_nodes(pair.secondary)
+    assert field is not None
     forces = constraints.normal_forces(constraints.contact_forces(multiplier))
-    excluded = pair.options.excluded_nodes(pair.secondary)
-    over_side, shares = constraints.nodal.over_whole_side(forces), constraints.nodal.shares(forces)
-    closed = _closed_nodes(pair, constraints, active, gap, over_side, at) & ~excluded
-    closed, pressure = _carried(pair, constraints, closed, over_side, shares)
-    nodal = constraints.nodal.pressure(forces) * constraints.nodal.covered
-    return _Closed(closed, pressure, np.where(excluded, 0.0, over_side), nodal)
-
-
-def nodal_pressure(pair: Formulation, constraints: Constraints, multiplier: Array, closed: Mask) -> Array:
-    """Return the reported nodal pressures (n_nodes,) for multipliers (m,) [force] and `closed` nodes [pressure]."""
-    assert constraints.nodal is not None
-    forces = constraints.normal_forces(constraints.contact_forces(multiplier))
-    return _carried(
-        pair, constraints, closed, constraints.nodal.over_whole_side(forces), constraints.nodal.shares(forces)
-    )[1]
-
-
-def _carried(
-    pair: Formulation, constraints: Constraints, closed: Mask, nodal: Array, shares: Array
-) -> tuple[Mask, Array]:
-    """Return `carried` for a pair."""
-    assert constraints.nodal is not None
-    return carried(
-        closed, nodal, shares, constraints.nodal.nodal_areas, pair.secondary, constraints.equality is not None
-    )
-
-
-def _closed_nodes(
-    pair: Formulation, constraints: Constraints, active: Mask, gap: Array, pressure: Array, at: Configuration
-) -> Mask:
-    """Return which secondary nodes are in contact: by their pressure, or because they cannot separate."""
-    assert constraints.nodal is not None
+    over_side, covered = field.over_whole_side(forces), field.covered
     if pair.options.always_closed:
-        covered = constraints.nodal.covered
         # Nodes beyond the end of the other side are unpaired, but parts of their facets may face it.
-        return np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
-    # Nodes of a cohesive layer are closed under tension as well.
-    closed = constraints.nodal.closed_nodes(
-        active, gap, pressure if pair.options.cohesion is None else np.abs(pressure)
-    )
-    for_good = pair.never_opening(pair.points[pair.secondary.points], at)
-    return closed if for_good is None else closed | (for_good & np.isfinite(gap))
+        closed = np.isfinite(gap) if isinstance(covered, float) else np.isfinite(gap) | (covered > 0.0)
+    else:
+        # Nodes of a cohesive layer are closed under tension as well.
+        closed = field.closed_nodes(active, gap, over_side if pair.options.cohesion is None else np.abs(over_side))
+        for_good = pair.never_opening(pair.points[pair.secondary.points], at)
+        closed = closed if for_good is None else closed | (for_good & np.isfinite(gap))
+    closed, pressure = carried(constraints, forces, closed & ~excluded, pair.secondary)
+    raw = field.pressure(forces) * covered  # averaged at each node like the frictional tractions
+    fraction = np.divide(pressure, raw, out=np.ones_like(pressure), where=raw > 0.0)
+    kept = np.where(closed, np.minimum(fraction, 1.0) if raw.min() < 0.0 else fraction, 0.0)
+    return closed, pressure, np.where(excluded, 0.0, over_side), kept
 
 
 def _nodal_shear(
@@ -256,21 +221,6 @@ def _nodal_shear(
         forces += along_normal[:, None] * normals(directions)
     traction = nodal.traction(forces) * np.reshape(nodal.covered, (-1, 1))
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
-
-
-def _mostly_sticking(constraints: Constraints, sticking: Mask, multiplier: Array, pressure: Array) -> Mask:
-    """Return the nodes to which more force comes from sticking constraints than from sliding ones."""
-    if len(sticking) == len(pressure):
-        return sticking
-    assert constraints.nodal is not None
-    return constraints.nodal.pressure(np.where(sticking, multiplier, 0.0)) > 0.5 * pressure
-
-
-def _distance(positions: Array, axis: tuple[Array, Array]) -> Array:
-    """Return the distances (n,) of reference positions from an axis (point, direction) [length]."""
-    foot, direction = axis
-    arm = positions - foot
-    return np.linalg.norm(arm - (arm @ direction)[:, None] * direction, axis=1)
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:

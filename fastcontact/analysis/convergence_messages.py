@@ -30,7 +30,11 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     The nodes that moved most are added to the last entry of the history.
     """
     last = history[-1]
-    last["nodes"] = _most_moved(problem, change)
+    size = np.linalg.norm(change.reshape(problem.shape), axis=1)
+    sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
+    last["nodes"] = {
+        name: points[np.argsort(-size[points], kind="stable")[:3]].tolist() for name, points in sides.items()
+    }
     changes = [entry["displacement_change"] for entry in history]
     circles = len(changes) > WINDOW and min(changes[-WINDOW:]) > 0.5 * max(changes[-WINDOW:])
     more = "More updates do not help, since they repeat in a cycle: use" if circles else (
@@ -62,12 +66,6 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
         f"the active set did not converge in {solution.iterations} iterations: {cause}. Use more load steps{other} or more "
         "iterations (max_active_set_iterations)"
     )
-
-
-def no_contact_stops(bodies: FloatingBodies) -> str:
-    """Return the message for loads that separate bodies."""
-    motions = grouped(bodies.names)
-    return f"the loads pull bodies away, and no contact stops them ({motions}): reverse the loads or add supports"
 
 
 def friction_exceeded(bodies: FloatingBodies, factor: float, coefficients: Array) -> str:
@@ -149,13 +147,6 @@ def nearest_nodes(problem: Problem, constraints: StackedConstraints, rows: Indic
             away = constraints.parts[name].positions[rows_in_pair][:, None] - problem.model.mesh.points[points][None]
             nodes[name] = np.unique(points[np.linalg.norm(away, axis=2).argmin(axis=1)]).tolist()
     return nodes
-
-
-def _most_moved(problem: Problem, change: Array) -> Nodes:
-    """Return, by contact pair, the three secondary nodes whose displacement changes (n_dofs,) most."""
-    size = np.linalg.norm(change.reshape(problem.shape), axis=1)
-    sides = {name: pair.secondary.points for name, pair in problem.pairs.items()}
-    return {name: points[np.argsort(-size[points], kind="stable")[:3]].tolist() for name, points in sides.items()}
 
 
 def named_nodes(problem: Problem, nodes: Mapping[str, list[int]]) -> str:

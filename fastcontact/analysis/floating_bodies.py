@@ -153,14 +153,20 @@ class FloatingBodies:
         self, motions: FreeMotions, system: System, relative_stiffness: float, before: Indices | None = None
     ) -> None:
         diagonal, weightless = system.matrix.diagonal(), system.weightless
-        typical = _softest(diagonal, system.free & ~weightless, motions.displacement != 0.0)
+        # The smallest median of the diagonal over the unknowns that each mode moves, and over those that no mode moves.
+        solid, moving = system.free & ~weightless, motions.displacement != 0.0
+        groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
+        typical = min(float(np.median(diagonal[group])) for group in groups if group.any())
         diagonal = np.where(weightless, typical, diagonal)
         self._dim = system.matrix.blocksize[0]
         self.names = motions.names()
         weights = np.sqrt(np.maximum(diagonal, 0.0))
         if before is not None:
             weights[before] *= KEPT
-        self.dofs = _spring_dofs(system.unknowns_of(motions.displacement), weights)
+        # The unknowns with springs determine the amplitudes of the modes, are far apart and have large weights.
+        modes = system.unknowns_of(motions.displacement)
+        _, _, order = qr((modes * weights[:, None]).T, mode="economic", pivoting=True)
+        self.dofs = np.sort(order[: modes.shape[1]]).astype(np.intp)
         self._places = [
             f"{'xyz'[dof % self._dim]} of {self._owner(motions, dof, weightless)}" for dof in self.dofs.tolist()
         ]
@@ -319,23 +325,3 @@ def _newton_step(
         return freed(state.response()).slackened(elongation)
     except LinAlgError:  # the constraints are linearly dependent
         return None
-
-
-def _softest(diagonal: Array, solid: Mask, moving: Mask) -> float:
-    """Return the smallest median of `diagonal` (n,) over groups of unknowns.
-
-    The groups are the `solid` unknowns (n,) that each of k modes moves, marked in the columns of `moving` (n, k), and the
-    `solid` unknowns that no mode moves.
-    """
-    groups = [solid & group for group in (*moving.T, ~moving.any(axis=1))]
-    return min(float(np.median(diagonal[group])) for group in groups if group.any())
-
-
-def _spring_dofs(motions: Array, weights: Array) -> Indices:
-    """Return k of n unknowns whose values determine the amplitudes of the rigid-body modes `motions` (n, k).
-
-    They are chosen by a QR factorisation with column pivoting of the modes times `weights` (n,), so that they are far apart
-    and have large weights.
-    """
-    _, _, order = qr((motions * weights[:, None]).T, mode="economic", pivoting=True)
-    return np.sort(order[: motions.shape[1]]).astype(np.intp)

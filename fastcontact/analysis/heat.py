@@ -174,7 +174,15 @@ class Heat:
         used[P.indices] = self.body >= 0
         free = np.flatnonzero(used & ~self.fixed)
         rise = np.where(self.fixed, rise, 0.0)
-        rise[free] = self._solved(csr_array(A[free][:, free]), f[free] - (A @ rise)[free])
+        if len(free):
+            dim, inner_A = self.model.mesh.dim, csr_array(A[free][:, free])
+            solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(free), tolerance=self.linear_tolerance)
+            # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only. Factors need both.
+            inner_A = csr_array(0.5 * (inner_A + inner_A.T))
+            inner_A.sort_indices()
+            blocks = bsr_array((inner_A.data[:, None, None], inner_A.indices, inner_A.indptr), shape=inner_A.shape)
+            solver.prepare(blocks, np.ones((len(free), 1)))
+            rise[free] = solver.load(f[free] - (A @ rise)[free]).full_solution(np.zeros(len(free)))
         out = A @ rise - f
         reaction = np.where(self.fixed, out, 0.0)
         round_off = SUM_ROUND_OFF * float((abs(A) @ np.abs(rise)).max())
@@ -190,18 +198,6 @@ class Heat:
             )
         sums = {"supports": reaction, "loads": loads, "films": given_off, "friction": rubbed}
         return Temperatures(rise, reaction, {**{k: float(v.sum()) for k, v in sums.items()}, "imbalance": residual})
-
-    def _solved(self, A: csr_array, f: Array) -> Array:
-        """Return the solution (n,) of ``A x = f``, A symmetric and positive definite."""
-        if not len(f):
-            return f
-        dim = self.model.mesh.dim
-        solver = choice.make(self.linear_solver, dim=dim, n_dofs=len(f), tolerance=self.linear_tolerance)
-        # Sums of sparse matrices drop entries that cancel, also on one side of the diagonal only. Factors need both.
-        A = csr_array(0.5 * (A + A.T))
-        A.sort_indices()
-        solver.prepare(bsr_array((A.data[:, None, None], A.indices, A.indptr), shape=A.shape), np.ones((len(f), 1)))
-        return solver.load(f).full_solution(np.zeros(len(f)))
 
     def _check_reached(self, contact: csr_array | None, films: csr_array) -> None:
         """Raise ConvergenceError if the temperature of a body is undetermined."""

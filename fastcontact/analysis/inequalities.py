@@ -6,7 +6,6 @@ contact restrains, are held by springs, whose positions are iterated; see `float
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -16,11 +15,11 @@ import numpy as np
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
 from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
-from fastcontact.analysis.convergence_messages import friction_exceeded, no_contact_stops, not_balanced
+from fastcontact.analysis.convergence_messages import friction_exceeded, not_balanced
 from fastcontact.analysis.extrapolation import Extrapolation
-from fastcontact.analysis.floating_bodies import FloatingBodies, Freed, RigidPosition
+from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid, Solution
+from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Slid, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
@@ -28,7 +27,7 @@ from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.protocol import Loaded
 from fastcontact.model.model import gaps_at_rest
-from fastcontact.model.rigid_motions import generalised, needed_friction, resisting, stopped_at
+from fastcontact.model.rigid_motions import generalised, grouped, needed_friction, resisting, stopped_at
 from fastcontact.round_off import SINGLE_PRECISION
 
 # Number of times that contact displaces fluid from a node in a load step after which the node stays dry. At the front of the
@@ -74,18 +73,6 @@ class Iterate:
         """Return the initial iterate of a load step."""
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
-    def permeable(self, name: str) -> Array | None:
-        """Return the last nodal pressures of a contact pair, infinite where the fluid has been displaced too often."""
-        pressure, fluid = self.pressure.get(name), self.fluid.get(name)
-        return pressure if pressure is None or fluid is None else np.where(fluid[1] < DISPLACED, pressure, np.inf)
-
-    def remember_fluid(self, name: str, constraints: Constraints) -> None:
-        """Store which nodes of a contact pair the fluid has reached, and how many times contact has displaced it there."""
-        if constraints.wetted is not None:
-            wet = constraints.wetted.pressure > 0.0
-            before, displaced = self.fluid.get(name, (wet, np.zeros(len(wet), int)))
-            self.fluid[name] = wet, displaced + (before & ~wet)
-
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
         """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
         for name, rows in constraints.rows.items():
@@ -103,9 +90,14 @@ def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Itera
     parts = {}
     for name, pair in problem.pairs.items():
         at = problem.configuration(name, state, load, paired_at, u)
-        at = replace(at, pressure=iterate.permeable(name), rounded=iterate.rounded)
-        parts[name] = pair.constraints(at)
-        iterate.remember_fluid(name, parts[name])
+        pressure, fluid = iterate.pressure.get(name), iterate.fluid.get(name)
+        if pressure is not None and fluid is not None:  # impermeable where the fluid has been displaced too often
+            pressure = np.where(fluid[1] < DISPLACED, pressure, np.inf)
+        parts[name] = pair.constraints(replace(at, pressure=pressure, rounded=iterate.rounded))
+        if (wetted := parts[name].wetted) is not None:
+            wet = wetted.pressure > 0.0
+            before, displaced = fluid or (wet, np.zeros(len(wet), int))
+            iterate.fluid[name] = wet, displaced + (before & ~wet)
         if problem.force_driven.pairs:
             rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
             moved = at.obstacle_motion if rotates else None
@@ -150,6 +142,8 @@ class StepContext:
         Extrapolation of earlier steps, with which the step begins.
     expected : float
         Scale of the displacements in the first step, if only forces act [length].
+    index : int
+        Number of the step.
     path : Path or Slid, optional
         Load path of the step, if friction is solved along it in increments; or the data at the beginning of its last
         increment, if only this increment is solved again.
@@ -162,6 +156,7 @@ class StepContext:
     dofs: ActiveDofs
     extrapolation: Extrapolation = field(default_factory=Extrapolation)
     expected: float = 0.0
+    index: int = 0
     path: Path | Slid | None = None
 
     @cached_property
@@ -274,13 +269,27 @@ def _with_floating_bodies(
         known, near = solution.wanted, dofs.put(near.copy(), dofs.displacement(solution.u, at))
         return solution
 
-    start = iterate.u[bodies.dofs]
+    def failure(text: str, **options: bool) -> ConvergenceError:
+        more = needed_friction(constraints, modes, iterate.u, *loads)
+        text = text if more is None else friction_exceeded(bodies, more, constraints.coefficients)
+        return ConvergenceError(text, iterate.history, **options)
+
+    start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
+    size = float(np.ptp(problem.model.mesh.points, axis=0).max())
+    # Work of the loads on each free rigid-body motion, and the size of the model.
+    loads = generalised(bodies.motions, step.load.force, state.largest_rigid_force), size
     if not iterate.history:
-        moved = _approach(step, bodies, constraints, iterate.u)
+        rows, gap0 = resisting(constraints)
+        moved = stopped_at(rows @ modes, gap0 + rows @ iterate.u, *loads)
+        if moved is None:
+            names = grouped(bodies.names)
+            text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
+            raise failure(text, smaller_steps_help=False)
         unilateral = active if constraints.equality is None else active & ~constraints.equality
         if not unilateral.any():
-            start = start + moved
-            known = active | _touching(step, constraints, iterate.u + bodies.rigid(moved))
+            start, u = start + moved, iterate.u + bodies.rigid(moved)
+            # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
+            known = active | constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
     noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response takes many linear solutions, which are cheap with factors only.
     freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
@@ -288,56 +297,13 @@ def _with_floating_bodies(
         solve_at, freed, dofs.numbers(bodies.dofs), start, state.largest_rigid_force, noise, state.gap_round_off
     )
     if rigid.state.settled and not rigid.slack:
-        more = _missing_friction(step, bodies, constraints, iterate.u)
         gaps = gaps_at_rest(problem.model, bodies.motions)
-        text = not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.coefficients.any()), gaps)
-        text = text if more is None else friction_exceeded(bodies, more, constraints.coefficients)
-        raise ConvergenceError(text, iterate.history)
+        raise failure(
+            not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.coefficients.any()), gaps)
+        )
     iterate.rigid = rigid
     solution = rigid.state
-    if freed is not None and solution.response is not None:
-        solution = replace(solution, response=partial(_response, freed, solution.response))
+    held = solution.response
+    if freed is not None and held is not None:
+        solution = replace(solution, response=lambda: freed(held()).respond)
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.position))
-
-
-def _response(freed: Callable[[Response], Freed], held: Callable[[], Response]) -> Response:
-    """Return the linear response with springs that stay slack, given that of a solution with springs at its position."""
-    return freed(held()).respond
-
-
-def _touching(step: StepContext, constraints: Constraints, u: Array) -> Mask:
-    """Return which constraints (m,) are closed at the displacements u (n_dofs,) [length] that `_approach` computed."""
-    size = float(np.ptp(step.problem.model.mesh.points, axis=0).max())
-    # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
-    return constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
-
-
-def _approach(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> Array:
-    """Return the amplitudes (k,) of the free rigid-body motions at which contact can balance the loads [length].
-
-    u (n_dofs,) are the displacements from which the bodies move [length].
-
-    Raises
-    ------
-    ConvergenceError
-        If no contact stops the bodies.
-    """
-    work, size = _loads(step, bodies)
-    rows, gap0 = resisting(constraints)
-    stop = stopped_at(rows @ bodies.motions.displacement, gap0 + rows @ u, work, size)
-    if stop is None:
-        more = _missing_friction(step, bodies, constraints, u)
-        text = no_contact_stops(bodies) if more is None else friction_exceeded(bodies, more, constraints.coefficients)
-        raise ConvergenceError(text, smaller_steps_help=False)
-    return stop
-
-
-def _missing_friction(step: StepContext, bodies: FloatingBodies, constraints: Constraints, u: Array) -> float | None:
-    """Return the factor on the coefficients of friction that holds the bodies, None if they suffice or none does [-]."""
-    return needed_friction(constraints, bodies.motions.displacement, u, *_loads(step, bodies))
-
-
-def _loads(step: StepContext, bodies: FloatingBodies) -> tuple[Array, float]:
-    """Return the work of the loads on each free rigid-body motion (k,) [force], and the size of the model [length]."""
-    work = generalised(bodies.motions, step.load.force, step.state.largest_rigid_force)
-    return work, float(np.ptp(step.problem.model.mesh.points, axis=0).max())

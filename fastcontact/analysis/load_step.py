@@ -17,17 +17,17 @@ import numpy as np
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis.contact_result import contact_results
+from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
-from fastcontact.analysis.newton import Beginning, newton
+from fastcontact.analysis.inequalities import StepContext
+from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
 from fastcontact.analysis.wear import Worn
 from fastcontact.analysis.work import contact_work
-from fastcontact.arrays import Array, Mask
-from fastcontact.contact.cohesion import Bond
+from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
@@ -65,10 +65,9 @@ def load_step(problem: Problem, state: State, index: int, instant: float) -> tup
     problem.solver.put_back(state.solver)
     solved_before = problem.solver.counters.iterations
     begin = prepare_start(problem, state, index, load)
-    heated, solution = None, newton(problem, begin, load)
+    heated, solution = None, newton(begin, load)
     if problem.heat is not None:
-        solve = partial(newton, problem, begin)
-        heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, solve)
+        heated, solution = settle_heat(problem, begin.state, cold, instant, rise, solution, partial(newton, begin))
     iterations = solution.counts(problem.solver.counters.iterations - solved_before)
     return _ended(problem, begin.state, load, solution, iterations, (index, instant), heated)
 
@@ -105,9 +104,6 @@ def _ended(
         end = save_contact_history(problem, start, load, settled, end)
         contact = contact_results(problem, start, load, settled, end)
         end, contact = keep_path(problem, start, load, settled, end, contact, balanced.energy)
-        touched = start.touched.union(name for name, pair in contact.items() if pair.active.any())
-        met = {name: positions for name, positions in end.first_contact.items() if name in touched}
-        end = replace(end, touched=touched, first_contact=met)
     elif start.work is not None:
         end = replace(end, work=start.work.after(balanced.energy, 0.0, (0.0, 0.0, 0.0)))
     if problem.extrapolates:
@@ -127,12 +123,12 @@ def _ended(
     return end, result if heated is None else heated.completed(problem, result)
 
 
-def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> Beginning:
+def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) -> StepContext:
     """Return the beginning of a load step.
 
     Its state is the `state` at the end of the previous step, with the bounds of round-off and of forces for the new `load`.
     If only forces act in the first step, no displacement is known. The solution without contact then provides the scale of
-    the displacements, `Beginning.expected`.
+    the displacements, `StepContext.expected`.
     """
     pushing = load if load.rise is None else expansion_as_force(problem, load)
     loaded = with_loads(problem, pushing)
@@ -160,13 +156,14 @@ def prepare_start(problem: Problem, state: State, index: int, load: StepLoad) ->
         if problem.bodies is not None and not (extrapolation.loads or state.u.any()):
             extrapolation = extrapolation.to(*map(np.zeros_like, parts)).converged(state.u, {})
         start = replace(start, extrapolation=extrapolation.to(*parts))
-    return Beginning(start, index, load, loaded, expected)
+    return StepContext(problem, start, load, loaded, problem.dofs, start.extrapolation, expected, index)
 
 
 def save_contact_history(problem: Problem, start: State, load: StepLoad, settled: SettledContact, end: State) -> State:
-    """Return the state `end` with the contact data that later steps need.
+    """Return the state `end` with the contact data that later steps need, see `State`.
 
-    These are active sets, pressures, bonds, elastic slips, points of first contact, and the data for extrapolation.
+    In 3D, the point of first contact is constant after the bodies have touched. Before that it is the node with the smallest
+    gap at the current positions of obstacles and clearances.
 
     Parameters
     ----------
@@ -179,11 +176,26 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
     end : State
         State at the end of the step, with its displacements.
     """
+    displacement, solution, first_contact = problem.displacement(end.u), settled.solution, dict(start.first_contact)
+    never_opening, elastic_slip, bonds = dict(start.never_opening), {}, {}
+    for name, rows in settled.constraints.rows.items():
+        pair, part = problem.pairs[name], settled.constraints.parts[name]
+        if problem.model.mesh.dim == 3 and name not in first_contact:
+            first_contact[name] = pair.first_contact(problem.configuration(name, start, load, displacement, end.u))
+        if pair.options.kind == "bilateral_once_closed":
+            # Points that have slid beyond the other side may return to it.
+            closed = solution.active[rows] | (False if part.equality is None else part.equality)
+            never_opening[name] = part.positions, closed
+        compliant = part.compliance is not None or part.tangential_softness is not None
+        if compliant and part.tangents and isinstance(solution, FrictionalEquilibrium):
+            slips = part.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
+            elastic_slip[name] = part.positions, slips
+        if isinstance(part.tied, Layer):
+            bonds[name] = part.tied.after(part, end.u)
     return replace(
         end, active=settled.iterate.active, pressure=settled.iterate.pressure, rigid=settled.iterate.rigid,
-        last_change=settled.last_change, first_contact=first_contacts(problem, start, load, end.u),
-        never_opening=never_opening(problem, start, settled), elastic_slip=elastic_slips(settled),
-        bonds=bonds(settled, end.u),
+        last_change=settled.last_change, first_contact=first_contact, never_opening=never_opening,
+        elastic_slip=elastic_slip, bonds=bonds,
     )  # fmt: skip
 
 
@@ -221,53 +233,10 @@ def keep_path(
     stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
     released = sum(entry.released for entry in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)
-    return replace(end, worn=worn, slipped=slipped, forces=forces, work=work), results_so_far
-
-
-def first_contacts(problem: Problem, start: State, load: StepLoad, u: Array) -> dict[str, tuple[Array, Array]]:
-    """Return the point of first contact (dim,) [length] of each contact pair in 3D, and the unit normal (dim,) there [-].
-
-    The point is constant after the bodies have touched. Before that it is the node with the smallest gap at the current
-    positions of obstacles and clearances.
-    """
-    if problem.model.mesh.dim == 2:
-        return {}
-    return {
-        name: start.first_contact[name]
-        if name in start.first_contact
-        else pair.first_contact(problem.configuration(name, start, load, problem.displacement(u), u))
-        for name, pair in problem.pairs.items()
-    }
-
-
-def never_opening(problem: Problem, start: State, settled: SettledContact) -> dict[str, tuple[Array, Mask]]:
-    """Return, for each pair without separation, the positions (m, dim) of its constraints and which (m,) have closed."""
-    positions = dict(start.never_opening)
-    for name, rows in settled.constraints.rows.items():
-        if problem.pairs[name].options.kind == "bilateral_once_closed":
-            constraints, closed = settled.constraints.parts[name], settled.solution.active[rows].copy()
-            if constraints.equality is not None:  # points that have slid beyond the other side may return to it
-                closed |= constraints.equality
-            positions[name] = constraints.positions, closed
-    return positions
-
-
-def elastic_slips(settled: SettledContact) -> dict[str, tuple[Array, Array]]:
-    """Return the positions and elastic slips of each pair with tangential compliance, see `State.elastic_slip`."""
-    given, solution = {}, settled.solution
-    for name, rows in settled.constraints.rows.items():
-        constraints = settled.constraints.parts[name]
-        compliant = constraints.compliance is not None or constraints.tangential_softness is not None
-        if compliant and constraints.tangents and isinstance(solution, FrictionalEquilibrium):
-            slips = constraints.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
-            given[name] = constraints.positions, slips
-    return given
-
-
-def bonds(settled: SettledContact, u: Array) -> dict[str, Bond]:
-    """Return the state of the cohesive layer, for each contact pair that has one, at displacements u (n_dofs,) [length]."""
-    parts = settled.constraints.parts.items()
-    return {name: part.tied.after(part, u) for name, part in parts if isinstance(part.tied, Layer)}
+    touched = start.touched.union(name for name, contact in results.items() if contact.active.any())
+    met = {name: positions for name, positions in end.first_contact.items() if name in touched}
+    end = replace(end, worn=worn, slipped=slipped, forces=forces, work=work, touched=touched, first_contact=met)
+    return end, results_so_far
 
 
 def recover(
@@ -293,18 +262,15 @@ def recover(
         The nonlinear bodies at the end of the step; None if bodies are linear.
     """
     mesh, u = problem.model.mesh, problem.displacement(end.u)
-    temperature, initial = (
-        problem.factors(load, instant[1]) for load in (problem.model.temperatures, problem.model.initial_states)
-    )
+    sections, reaction = problem.model.pretensions, reaction.reshape(-1, mesh.dim)
+    parts = problem.model.temperatures, problem.model.initial_states, sections
+    temperature, initial, pulls = (problem.factors(histories, instant[1]) for histories in parts)
     pressures = [multiplier(table, problem.ramp, instant[1]) for _, table in problem.following]
     factors = {"temperature_factors": temperature, "initial_factors": initial, "pressure_factors": pressures}
     iterations = {**iterations, **{key: multipliers for key, multipliers in factors.items() if multipliers}}
     heat = None if end.rise is None else problem.model.reference_temperature + end.rise
-    sections = problem.model.pretensions
     if sections:
-        pulls = [multiplier(load.ramp, problem.ramp, instant[1]) for load in sections]
-        pretension = section_results(sections, u, reaction.reshape(-1, mesh.dim), pulls)
-        iterations = {**iterations, "pretension": pretension}
+        iterations["pretension"] = section_results(sections, u, reaction, pulls)
     if bodies is not None:
         stress = recovery.nodal_average(mesh, bodies.stress, problem.sides)
     else:
@@ -315,11 +281,12 @@ def recover(
         stress = recovery.nodal_stress(mesh, problem.model.kinematics, *materials, problem.sides, offset)
     by_material = None
     if len(problem.sides.points):
-        stress, by_material = by_largest_von_mises(problem.sides, problem.material_of_cells, stress, mesh.n_points)
+        materials_of_cells = np.concatenate(list(problem.field.distinct.values()))
+        stress, by_material = by_largest_von_mises(problem.sides, materials_of_cells, stress, mesh.n_points)
     von_mises, named = recovery.von_mises(stress), problem.model.units
     return StepResult(
-        *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction.reshape(-1, mesh.dim),
-        contact, iterations, material_stress=by_material,
+        *instant, u.copy(), stress, von_mises, recovery.von_mises_signed(stress, von_mises), reaction, contact,
+        iterations, material_stress=by_material,
         cell_fields={} if bodies is None or problem.bodies is None else problem.bodies.cell_fields(bodies, u),
         temperature=heat, units=named and units_of_results(named, problem.model.kinematics),
     )  # fmt: skip

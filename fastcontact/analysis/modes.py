@@ -15,7 +15,7 @@ from fastcontact.analysis.modal.eigenpairs import Reduced, lowest
 from fastcontact.analysis.modal.held_contact import Conditions, held_contact, joined
 from fastcontact.analysis.modal.shapes import Modes
 from fastcontact.analysis.problem import near_nullspace
-from fastcontact.analysis.stages import at_present_length, stage_of
+from fastcontact.analysis.stages import stage_of
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.held_motions import HeldMotions
 from fastcontact.elasticity.cell_stress import CellStress
@@ -188,7 +188,10 @@ class _Vibration:
     def lowest(self, n: int, linear_solver: str, wave: Wave | None = None) -> tuple[Array, Array]:
         """Return the n lowest eigenvalues (n,) and displacements (n_dofs, n), in the real form of a wave."""
         model, driven = self.model, self.model.force_driven
-        relations = [*model.relations, *at_present_length(model)]
+        locks = [
+            bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions
+        ]  # they keep their present length
+        relations = [*model.relations, *locks]
         K, M, near = driven.stiffness(self.K), driven.stiffness(self.M), driven.near_nullspace(near_nullspace(model))
         supported, massless = driven.supported(self.supported).ravel(), driven.without_stiffness
         if wave is not None:

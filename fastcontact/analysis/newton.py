@@ -18,15 +18,20 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.equilibrium import (
+    Balance,
+    FollowingForce,
+    StepEquilibrium,
+    Terms,
+    balance,
+    solve_displacements,
+    with_loads,
+)
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
-from fastcontact.analysis.linearisation import linearised, load_about
-from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.problem import Problem, StepLoad, linearised
 from fastcontact.analysis.solution import FrictionalEquilibrium
-from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium, balance, solve_displacements, with_loads
-from fastcontact.analysis.terms import Fluid, Terms
 from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
@@ -53,38 +58,13 @@ FORCING = 1e-3
 UNCHANGED = 100 * ROUND_OFF
 
 
-@dataclass(frozen=True, eq=False)
-class Beginning:
-    """Data at the beginning of a load step.
-
-    Attributes
-    ----------
-    state : State
-    index : int
-        Number of the step.
-    load : StepLoad
-    loaded : Loaded
-        The prepared matrix with the right-hand side of the load.
-    expected : float
-        Expected displacement in the first step, if only forces act [length].
-    """
-
-    state: State
-    index: int
-    load: StepLoad
-    loaded: Loaded
-    expected: float
-
-
-def newton(
-    problem: Problem, begin: Beginning, load: StepLoad, before: StepEquilibrium | None = None
-) -> StepEquilibrium:
+def newton(begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> StepEquilibrium:
     """Return the equilibrium of a load step.
 
     Parameters
     ----------
-    problem : Problem
-    begin : Beginning
+    begin : StepContext
+        Data at the beginning of the step, with the linear solver at rest.
     load : StepLoad
         Load of `begin`, or the same with other temperatures.
     before : StepEquilibrium, optional
@@ -96,14 +76,14 @@ def newton(
         If the iterations do not converge, a cell is inverted, or forces stay out of balance.
     """
     start = begin.state
-    if problem.bodies is not None and (before is not None or start.extrapolation.ratio):
+    if begin.problem.bodies is not None and (before is not None or start.extrapolation.ratio):
         origin = start.extrapolation.predicted(start.u) if before is None else before.u
         try:
-            return _Newton(problem, begin, load).iterated(origin)
+            return _Newton(begin, load).iterated(origin)
         except ConvergenceError as error:
             log.info("the step restarts from the previous displacement instead of a predicted one: %s", error)
             before = None
-    return _Newton(problem, begin, load, before).iterated(start.u)
+    return _Newton(begin, load, before).iterated(start.u)
 
 
 @dataclass(frozen=True)
@@ -136,17 +116,15 @@ class Regularisation:
 class _Newton:
     """The iterations of a load step; see `newton` for the parameters."""
 
-    def __init__(
-        self, problem: Problem, begin: Beginning, load: StepLoad, before: StepEquilibrium | None = None
-    ) -> None:
-        self._problem, self._begin, self._start, self._load = problem, begin, begin.state, load
-        self._terms = Terms(problem, begin.state, load)
+    def __init__(self, begin: StepContext, load: StepLoad, before: StepEquilibrium | None = None) -> None:
+        self._problem, self._begin, self._start, self._load = begin.problem, begin, begin.state, load
+        self._terms = Terms(begin.problem, begin.state, load)
         settled = None if before is None else before.settled
         self._iterate = Iterate.of(begin.state) if settled is None else settled.iterate
         self._settled: SettledContact | None = None
         self._kept: Problem | None = None  # the last tangent, if another iteration may use it
         self._by = Regularisation()  # of the last tangent
-        self._replaces = bool(problem.force_driven.pairs)  # see `Regularisation.replaces`
+        self._replaces = bool(begin.problem.force_driven.pairs)  # see `Regularisation.replaces`
 
     @cached_property
     def _mixing(self) -> Anderson:
@@ -167,7 +145,7 @@ class _Newton:
                 break
             u, fraction = self._reach(before, target, changes)
             balanced = self._balanced(u, contact_force, before)
-            if self._terms.prepared:
+            if self._terms.bodies is None:
                 if self._is_exact(balanced):
                     return StepEquilibrium(self._settled, u, balanced, self._terms)
                 continue
@@ -255,10 +233,9 @@ class _Newton:
         closed gaps, soft ones first: convergence stays quadratic except for motions that contact does not hold. If this does
         not suffice, parts of the geometric stiffness are left out. Once springs were sufficient, they are tried first.
         """
-        if self._terms.prepared:
-            begin = self._begin
-            first = self._load is begin.load and self._settled is None
-            loaded = begin.loaded if first else with_loads(self._problem, self._load)
+        if self._terms.bodies is None:
+            first = self._load is self._begin.load and self._settled is None
+            loaded = self._begin.loaded if first else with_loads(self._problem, self._load)
             return self._contact(self._problem, self._load, loaded, u, self._start.extrapolation)
         # Forces on a floating body that moves do not balance while springs along gaps do not resist its motion.
         if self._by.held and changes[-1] > changes[-2] > min(changes):
@@ -309,7 +286,11 @@ class _Newton:
             problem = linearised(self._problem, K, u, iterate.rigid, contact, by.stiff, by.replaces)
             if by.geometric == WHOLE:
                 self._kept = problem
-        load = load_about(problem, terms, u, self._load, iterate.rigid)
+        force, floating = self._load.force - terms.residual(u)[0] + problem.system.K @ u, problem.floating_bodies
+        if floating is not None and iterate.rigid is not None:
+            # Under load, the tangent resists rigid-body rotations, which the unknowns of floating bodies do not include.
+            force -= problem.system.K @ floating.rigid(u[floating.dofs])
+        load = replace(self._load, force=force)
         iterate.u, iterate.history = u.copy(), []
         enough = min(max(problem.criteria.geometry, FORCING * changes[-1]), NOTABLE)
         inner = replace(problem, criteria=replace(problem.criteria, geometry=enough))
@@ -321,10 +302,13 @@ class _Newton:
         """Return displacements and contact forces of a problem whose terms are linear, and store the contact."""
         settled = None
         if problem.pairs:
-            u0, bodies, expected = self._iterate.u, problem.floating_bodies, self._begin.expected
+            u0, bodies = self._iterate.u, problem.floating_bodies
             lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
             dofs = problem.dofs.for_step(u0, lift)
-            step = StepContext(problem, self._start, load, dofs.loaded(loaded), dofs, extrapolation, expected)
+            condensed = dofs.loaded(loaded)
+            step = replace(
+                self._begin, problem=problem, load=load, loaded=condensed, dofs=dofs, extrapolation=extrapolation
+            )
             settled = settle_geometry(step, self._iterate)
             self._iterate = settled.iterate
         solution = solve_displacements(problem, load, loaded, settled, u)
@@ -353,13 +337,13 @@ class _Newton:
             part.resize((len(u), len(u)))
         return sum(parts[1:], parts[0]) if parts else None
 
-    def _fluid(self, at: Array) -> list[Fluid]:
+    def _fluid(self, at: Array) -> list[FollowingForce]:
         """Return the fluid pressures of the last contact that follow bodies, linearised `at` displacements (n_dofs,)."""
         bodies = self._problem.bodies
         if self._settled is None or bodies is None or not bodies.finite:
             return []
         wetted = [part.wetted for part in self._settled.constraints.parts.values()]
-        return [Fluid(self._problem, each, at) for each in wetted if each is not None]
+        return [FollowingForce(self._problem, w.force, w.stiffness, at) for w in wetted if w is not None]
 
     def _reach(self, u: Array, target: Array, changes: list[float]) -> tuple[Array, float]:
         """Return the next displacements (n_dofs,), and the step length from u to the `target` (n_dofs,).

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import parallel
 from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies
+from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
 from fastcontact.analysis.state import State
 from fastcontact.analysis.wear import at_points
 from fastcontact.analysis.work import Work
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import HeldMotions
@@ -36,11 +36,14 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
+from fastcontact.linear.sparse_rows import sum_of_blocks
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
 from fastcontact.model.obstacle_rotation import angle_at
+from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import PartHistory, Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import FreeMotions, free_motions
+from fastcontact.round_off import SINGLE_PRECISION
 
 ByRamp = Mapping[PartHistory, Array]
 
@@ -150,11 +153,6 @@ class Problem:
     heat: Heat | None = None
     linearised_at: Array | None = None
 
-    @cached_property
-    def material_of_cells(self) -> Numbers:
-        """Number (n_solids,) of the material of each solid cell; equal materials have the same number."""
-        return np.concatenate(list(self.field.distinct.values()))
-
     @property
     def until_settled(self) -> bool:
         """Whether the contact geometry is updated until displacements converge; otherwise the number of updates is fixed."""
@@ -164,11 +162,6 @@ class Problem:
     def extrapolates(self) -> bool:
         """Whether load steps start from an extrapolation of earlier ones."""
         return self.solver.iterative or self.bodies is not None
-
-    @property
-    def shares_nodes(self) -> bool:
-        """Whether constraints of several contact pairs, or of both ends of a period, may be at one node."""
-        return len(self.pairs) > 1 or bool(self.model.periodic_interfaces)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -203,8 +196,8 @@ class Problem:
             rise = self.model.temperature_rise(self.factors(temperatures, instant))
         return StepLoad(lift, force, obstacles, clearances, angles, following, frictions, fluids, rise)
 
-    def factors(self, histories: Iterable[Temperature | InitialState], instant: float) -> list[float]:
-        """Return the load factors of temperatures or initial states at an instant of the ramp [-]."""
+    def factors(self, histories: Iterable[Temperature | InitialState | Pretension], instant: float) -> list[float]:
+        """Return the load factors of temperatures, initial states or pretension sections at an instant of the ramp [-]."""
         return [multiplier(history.ramp, self.ramp, instant) for history in histories]
 
     def displacement(self, u: Array) -> Array:
@@ -331,21 +324,70 @@ def prepare(
         driven.relations(model.relations),
         driven.without_stiffness,
     )
-    contact_dofs = _contact_dofs(mesh, pairs, len(driven))
-    involved = system.involved(contact_dofs)
-    motions = floating_motions(model, supported)
+    of_driven = mesh.n_points + np.arange(len(driven))
+    of_sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
+    points = np.unique(np.concatenate([of_driven, *of_sides])).astype(np.intp)
+    contact_dofs = (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
+    motions = _floating_motions(model, supported)
     bodies = FloatingBodies(motions, system, SOFT if solver.iterative else STIFF) if len(motions) else None
-    involved = prepare_solver(solver, system, bodies, driven.near_nullspace(near_nullspace(model)), involved)
+    dofs = _prepared_dofs(model, solver, system, bodies, contact_dofs)
     return Problem(
-        model, ramp, criteria, solver, pairs, field, sides, system, bodies,
-        active_dofs(system, contact_dofs, involved, pairs, bodies, solver),
-        contact_dofs, driven, driven.prescribed(prescribed), driven.forces(_forces(model)),
-        solver.snapshot(), tuple(doubtful), model.nonlinear_bodies(field), model.following_pressures(),
+        model, ramp, criteria, solver, pairs, field, sides, system, bodies, dofs, contact_dofs, driven,
+        driven.prescribed(prescribed), driven.forces(_forces(model)), solver.snapshot(), tuple(doubtful),
+        model.nonlinear_bodies(field), model.following_pressures(),
         prepared_heat(model, ramp, criteria, linear_solver, solver.tolerance),
     )  # fmt: skip
 
 
-def floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
+def linearised(
+    problem: Problem, K: bsr_array, u: Array, rigid: RigidPosition | None, contact: csr_array | None, stiff: bool,
+    replaces: bool,
+) -> Problem:  # fmt: skip
+    """Return the problem whose system and linear solver use the tangent of the terms at displacements u.
+
+    In finite strain, rigid-body modes of floating bodies are those of the deformed configuration.
+
+    Parameters
+    ----------
+    problem : Problem
+    K : bsr_array (n, n)
+        Tangent of the terms, see `Terms.tangent`; it is modified [force / length].
+    u : ndarray (n_dofs,)
+        Displacements about which the terms are linearised [length].
+    rigid : RigidPosition, optional
+        Last position of floating bodies.
+    contact : csr_array (n_dofs, n_dofs), optional
+        Stiffness due to contact, which is added to K [force / length].
+    stiff : bool
+        Whether the springs of floating bodies are as stiff as the bodies.
+    replaces : bool
+        Whether floating bodies have no springs of their own if `contact` resists all their motions. The iteration of their
+        positions may not converge for a tangent that is nearly singular.
+    """
+    K, model, floating = problem.force_driven.stiffness(K), problem.model, problem.floating_bodies
+    system = problem.system.renewed(K if contact is None else sum_of_blocks(K, contact))
+    solver, displacement, finite = (
+        problem.solver.near(),
+        problem.displacement(u),
+        problem.bodies and problem.bodies.finite,
+    )
+    if floating is not None and finite:
+        motions = floating.motions
+        if model.kinematics != "axisymmetric":
+            turned = _floating_motions(model, model.prescribed_by_ramp()[0], displacement)
+            motions = turned if len(turned) == len(motions) else motions
+        before, soft = floating.dofs if rigid is None else rigid.dofs, problem.solver.iterative and not stiff
+        floating = FloatingBodies(motions, system, SOFT if soft else STIFF, before)
+    if replaces and floating is not None and contact is not None:
+        modes = floating.motions.displacement
+        values = np.linalg.eigvalsh(modes.T @ (contact @ modes))
+        floating = None if values[0] > SINGLE_PRECISION * values[-1] else floating
+    dofs = _prepared_dofs(model, solver, system, floating, problem.contact_dofs, displacement)
+    at = u if finite else None
+    return replace(problem, system=system, solver=solver, dofs=dofs, floating_bodies=floating, linearised_at=at)
+
+
+def _floating_motions(model: Model, supported: Mask, displacement: Array | float = 0.0) -> FreeMotions:
     """Return the rigid-body modes that supports and multi-point constraints leave free.
 
     Rotations are those of the configuration with the displacements `displacement` (n_points, dim) [length]; `supported`
@@ -354,20 +396,6 @@ def floating_motions(model: Model, supported: Mask, displacement: Array | float 
     deformed = model.mesh.replace(points=model.mesh.points + displacement)
     motions = free_motions(deformed, model.kinematics, supported, model.holding_rows())
     return model.force_driven.motions(motions)
-
-
-def active_dofs(
-    system: System, contact_dofs: Indices, involved: Indices, pairs: Mapping[str, Formulation],
-    bodies: FloatingBodies | None, solver: LinearSolver,
-) -> ActiveDofs:  # fmt: skip
-    """Return the degrees of freedom of the contact problem.
-
-    They are those of the contact surfaces and of the springs of floating bodies if the solver condenses the stiffness
-    matrix to the unknowns `involved`. Otherwise they are all degrees of freedom.
-    """
-    if pairs and solver.condenses:
-        return SurfaceDofs(system, contact_dofs, np.empty(0, np.intp) if bodies is None else bodies.dofs, involved)
-    return ActiveDofs(system, contact_dofs)
 
 
 def _forces(model: Model) -> dict[Table | None, Array]:
@@ -382,42 +410,37 @@ def _forces(model: Model) -> dict[Table | None, Array]:
     return forces
 
 
-def prepare_solver(
-    solver: LinearSolver, system: System, bodies: FloatingBodies | None, modes: Array, involved: Indices
-) -> Indices:
-    """Prepare the linear solver for the matrix of a system, with the springs of floating bodies added.
+def _prepared_dofs(
+    model: Model, solver: LinearSolver, system: System, bodies: FloatingBodies | None, contact_dofs: Indices,
+    displacement: Array | float = 0.0,
+) -> ActiveDofs:  # fmt: skip
+    """Prepare the linear solver for a system, and return the degrees of freedom of the contact problem.
+
+    They are those of the contact surfaces and of the springs of floating bodies if the solver condenses the stiffness
+    matrix. Otherwise they are all degrees of freedom.
 
     Parameters
     ----------
+    model : Model
     solver : LinearSolver
     system : System
     bodies : FloatingBodies or None
-    modes : ndarray (n_dofs, k)
-        Near null space for multigrid.
-    involved : ndarray of int
-        Unknowns that contact constraints may involve.
-
-    Returns
-    -------
-    ndarray of int
-        `involved`, including the unknowns at springs.
+        Floating bodies, whose springs are added to the matrix.
+    contact_dofs : ndarray of int
+        Degrees of freedom of the contact surfaces.
+    displacement : ndarray (n_points, dim)
+        Displacements at which the near null space is computed [length].
     """
-    matrix = system.matrix if bodies is None else bodies.with_springs(system.matrix)
+    involved, matrix = system.involved(contact_dofs), system.matrix
     if bodies is not None:
-        involved = np.union1d(involved, bodies.dofs)
-    modes = system.unknowns_of(modes)  # frees the memory of the modes of all displacements
+        involved, matrix = np.union1d(involved, bodies.dofs), bodies.with_springs(matrix)
+    modes = system.unknowns_of(model.force_driven.near_nullspace(near_nullspace(model, displacement)))
     kept = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.keep(kept)
-    return involved
-
-
-def _contact_dofs(mesh: Any, pairs: Mapping[str, Formulation], n_driven: int) -> Indices:
-    """Return the displacement components of all points on contact surfaces, and of force-driven obstacles."""
-    sides = [side.points for pair in pairs.values() for side in (pair.secondary, pair.primary)]
-    points = np.unique(np.concatenate(sides)) if sides else np.empty(0, np.intp)
-    moved = mesh.n_points + np.arange(n_driven)
-    return (np.concatenate([points, moved])[:, None].astype(np.intp) * mesh.dim + np.arange(mesh.dim)).ravel()
+    if model.contact and solver.condenses:
+        return SurfaceDofs(system, contact_dofs, np.empty(0, np.intp) if bodies is None else bodies.dofs, involved)
+    return ActiveDofs(system, contact_dofs)
 
 
 def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:

@@ -11,11 +11,10 @@ import numpy as np
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.facet_sag import sag_warnings
 from fastcontact.analysis.interpenetration import interpenetration
+from fastcontact.analysis.locking import locking_warning, nonlinear_scatter_warnings, scatter_warnings
 from fastcontact.analysis.neglected_rotation import neglected_rotation
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.state import State
-from fastcontact.analysis.stress_scatter import nonlinear_scatter_warnings, scatter_warnings
-from fastcontact.analysis.volumetric_locking import locking_warning
 from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation

@@ -96,25 +96,15 @@ def solve(
     """
     steps, ramp = Steps(resume), ramp_of(ramp)
     total = len(steps) + len(restart.remaining(ramp, steps[-1] if steps else None))
-    new = partial(
-        solve_steps, model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
-        linear_precision=linear_precision, criteria=criteria, resume=steps,
-    )  # fmt: skip
-    return _gathered(new, steps, Progress(total, show=progress, done=len(steps)), on_step)
-
-
-def _gathered(
-    new: Callable[[], Iterator[StepResult]],
-    steps: Steps,
-    progress: Progress,
-    on_step: Callable[[StepResult], None] | None,
-) -> Steps:
-    """Append to `steps` those that ``new()`` yields, and return `steps`; `on_step` is called with each new step."""
-    with progress:
-        for step in new():
+    with Progress(total, show=progress, done=len(steps)) as shown:
+        new = solve_steps(
+            model, ramp, linear_solver=linear_solver, linear_tolerance=linear_tolerance,
+            linear_precision=linear_precision, criteria=criteria, resume=steps,
+        )  # fmt: skip
+        for step in new:
             if on_step is not None:
                 on_step(step)
-            progress.step(step)
+            shown.step(step)
             if steps and steps[-1].restart is not None:
                 steps[-1] = replace(steps[-1], restart=None)
             steps.append(step)

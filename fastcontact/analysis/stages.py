@@ -62,11 +62,6 @@ def go_on(
     )
 
 
-def at_present_length(model: Model) -> list[MultiPointConstraint]:
-    """Return the constraints that keep the length of all pretension sections in small motions."""
-    return [bolt.locked(model.mesh.points.size, 0.0) for bolt in model.pretensions]
-
-
 def _names(model: Model) -> list[str]:
     """Return the names of the constraints, and of the temporary temperatures and films, of a model."""
     temporary = [load for load in model.heat_loads if isinstance(load, TemporaryHeat)]

@@ -51,36 +51,33 @@ def _parts(
     """
     begin, end = span
     middle = 0.5 * (begin + end)
-    if halved < state.halved and begin < middle < end:
-        return _both(problem, state, index, (begin, middle, end), halved)
     most = problem.criteria.max_halvings * (1 if problem.bodies is None else 2)
-    try:
-        after, result = load_step(problem, state, index, end)
-        if halved == most or not begin < middle < end or not _slides_while_touching(problem, state, after):
-            return _sized(problem, after, result, halved), [result]
-    except ConvergenceError as error:
-        if halved >= most or not begin < middle < end or not error.smaller_steps_help:
-            where = f"from {begin:.6g} to {end:.6g}"
-            often = "once" if halved == 1 else f"{halved} times"
-            part = (
-                f"step {index} was cut in halves {often}, the part {where} fails" if halved else f"step {index} {where}"
-            )
-            limit = limit_load(problem, state) or friction_used(problem, state)
-            final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
-            # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
-            raise final.with_traceback(error.__traceback__) from None
-        reason = str(error).split(". ")[0]
-        for listener in listeners:
-            listener(index, begin, end)
-        log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
-    return _both(problem, state, index, (begin, middle, end), halved)
-
-
-def _both(
-    problem: Problem, state: State, index: int, span: tuple[float, float, float], halved: int
-) -> tuple[State, list[StepResult]]:
-    """Solve both halves of the span (begin, middle, end); see `_parts`."""
-    begin, middle, end = span
+    last = halved >= most or not begin < middle < end
+    if halved >= state.halved or not begin < middle < end:
+        try:
+            after, result = load_step(problem, state, index, end)
+            if last or not _slides_while_touching(problem, state, after):
+                if problem.bodies is not None:  # how many times the next step is halved before its first attempt
+                    few = len(result.iterations["history"]) <= FEW
+                    after = replace(after, halved=max(halved - few, 0))
+                return after, [result]
+        except ConvergenceError as error:
+            if last or not error.smaller_steps_help:
+                where = f"from {begin:.6g} to {end:.6g}"
+                often = "once" if halved == 1 else f"{halved} times"
+                part = (
+                    f"step {index} was cut in halves {often}, the part {where} fails"
+                    if halved
+                    else f"step {index} {where}"
+                )
+                limit = limit_load(problem, state) or friction_used(problem, state)
+                final = ConvergenceError(f"{error} ({part}{limit})", error.history, smaller_steps_help=False)
+                # Keep the traceback of the original error, but do not chain it: its message is part of the new one.
+                raise final.with_traceback(error.__traceback__) from None
+            reason = str(error).split(". ")[0]
+            for listener in listeners:
+                listener(index, begin, end)
+            log.warning("step %d from %.6g to %.6g does not converge, cut in halves: %s", index, begin, end, reason)
     state, first = _parts(problem, state, index, (begin, middle), halved + 1)
     state, second = _parts(problem, state, index, (middle, end), halved + 1)
     return state, first + second
@@ -95,14 +92,6 @@ def _slides_while_touching(problem: Problem, state: State, after: State) -> bool
     if allowed is None or problem.bodies is None or state.work is None or after.work is None:
         return False
     return after.work.touching - state.work.touching > allowed * after.work.friction
-
-
-def _sized(problem: Problem, state: State, result: StepResult, halved: int) -> State:
-    """Return the state with the number of times that the next step is halved before its first attempt."""
-    if problem.bodies is None:
-        return state
-    few = len(result.iterations["history"]) <= FEW
-    return replace(state, halved=max(halved - few, 0))
 
 
 def _joined(parts: list[StepResult]) -> StepResult:

@@ -16,12 +16,12 @@ from scipy.sparse import csr_array
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
 from fastcontact.analysis.contact_result import areas
+from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
-from fastcontact.analysis.step_equilibrium import Balance, StepEquilibrium
 from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
 from fastcontact.contact.conductance import crossing
@@ -103,7 +103,8 @@ def settle_heat(
         heated = _conducted(problem, start, load, instant, equilibrium)
         change = largest_difference(heated.rise, rise)
         settled = change <= enough * largest(heated.rise) or not problem.model.expands
-        if settled or _pushes_little(problem, heated.rise - rise, equilibrium.balance, enough):
+        negligible = max(enough * equilibrium.balance.largest, equilibrium.balance.noise)
+        if settled or largest(problem.model.expansion_forces(problem.field, heated.rise - rise).ravel()) <= negligible:
             return replace(heated, balance={**heated.balance, "exchanges": exchange}), equilibrium
         rise = mixing.mixed(rise, heated.rise)
         equilibrium = solve(expanded(problem, load, rise), equilibrium)
@@ -113,15 +114,6 @@ def settle_heat(
         "conductance fall gradually with the gap, or grow from zero with the pressure",
         equilibrium.history,
     )
-
-
-def _pushes_little(problem: Problem, rise: Array, balance: Balance, enough: float) -> bool:
-    """Return whether the nodal forces of a temperature rise (n_points,) [temperature] are negligible.
-
-    They are compared with the largest force of the balance, times the relative tolerance `enough`.
-    """
-    forces = problem.model.expansion_forces(problem.field, rise)
-    return largest(forces.ravel()) <= max(enough * balance.largest, balance.noise)
 
 
 def expanded(problem: Problem, load: StepLoad, rise: Array) -> StepLoad:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.analysis.contact_resultants import contact_moment
+from fastcontact.analysis.resultants import contact_moment
 from fastcontact.cases.keys import NUMBER, keys_of
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fastcontact._tools.versions import versions
-from fastcontact.analysis.contact_resultants import contact_resultants
+from fastcontact.analysis.resultants import contact_resultants
 from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError

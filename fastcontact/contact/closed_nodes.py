@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
+from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.surface import Surface
 from fastcontact.round_off import SUM_ROUND_OFF
 
@@ -20,67 +21,46 @@ from fastcontact.round_off import SUM_ROUND_OFF
 NO_AREA = 1e-3
 
 
-def carried(
-    closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface, may_pull: bool = False
-) -> tuple[Mask, Array]:
-    """Return the closed nodes (m,) without tension, and pressures (m,) at these nodes that carry the contact force.
+def carried(constraints: Constraints, forces: Array, closed: Mask, side: Surface) -> tuple[Mask, Array]:
+    """Return the closed nodes (n,) without tension, and pressures (n,) at these nodes that carry the contact force.
 
     Parameters
     ----------
-    closed : ndarray of bool (m,)
+    constraints : Constraints
+        The m constraints of the pair. With equality constraints, pressures of closed nodes may be negative.
+    forces : ndarray (m,)
+        Normal forces of the constraints [force].
+    closed : ndarray of bool (n,)
         Nodes in contact.
-    nodal : ndarray (m,)
-        Pressures of all nodes [pressure].
-    shares : ndarray (m,)
-        Shares of all nodes in the contact force: their pressures times their areas, except at nodes without area [force].
-    areas : ndarray (m,)
-        Integrals of the shape functions of the nodes over the side [area].
     side : Surface
-    may_pull : bool
-        Whether pressures of closed nodes may be negative.
+        The secondary side.
     """
+    field, may_pull = constraints.nodal, constraints.equality is not None
+    assert field is not None
+    nodal, shares, areas = field.over_whole_side(forces), field.shares(forces), field.nodal_areas
+    with_area = areas > NO_AREA * np.abs(areas).mean()  # these may receive shares of other nodes
     while True:
         if not may_pull:
             closed = closed & (nodal >= 0.0)
-            if shares.sum() > 0.0 and not _takers(closed, areas).any():
-                return _alone(shares, areas)
-        pressure = nodal + _received(closed, nodal, shares, areas, side)
+            if shares.sum() > 0.0 and not (closed & with_area).any():
+                most = np.argmax(np.where(with_area, shares, -np.inf))
+                alone = np.arange(len(areas)) == most
+                return alone, np.where(alone, shares.sum() / areas[most], 0.0)
+        takers = closed & with_area
+        moving = np.where(closed, shares - nodal * areas, shares)
+        moving[takers | (np.abs(moving) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
+        pressure = nodal + (_received(takers, moving, areas, side) if moving.any() else np.zeros_like(moving))
         tension = closed & (pressure < 0.0)
         if may_pull or not tension.any():
             return closed, np.where(closed, pressure, 0.0)
         closed = closed & ~tension
 
 
-def _received(closed: Mask, nodal: Array, shares: Array, areas: Array, side: Surface) -> Array:
-    """Return the changes (m,) of pressures at closed nodes by the shares of other nodes; for parameters see `carried`."""
-    takers = _takers(closed, areas)
-    moving = np.where(closed, shares - nodal * areas, shares)
-    moving[takers | (np.abs(moving) <= SUM_ROUND_OFF * np.abs(shares).max(initial=0.0))] = 0.0
-    if not moving.any():
-        return np.zeros_like(moving)
-    # Shares move from ring to ring towards the receiving nodes, beginning with the ring that is farthest away.
-    rings = _rings(takers, moving, side)
-    for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
-        room = np.where(inner, areas if inner is takers else 1.0, 0.0)
-        given = np.divide(moving, side.near @ room, out=np.zeros_like(moving), where=outer)
-        moving = np.where(outer, 0.0, moving) + room * (side.near @ given)
-    return np.divide(moving, areas, out=np.zeros_like(moving), where=takers)
+def _received(takers: Mask, moving: Array, areas: Array, side: Surface) -> Array:
+    """Return the changes (n,) of pressures at the nodes `takers` (n,) by the shares `moving` (n,) of other nodes [pressure].
 
-
-def _takers(closed: Mask, areas: Array) -> Mask:
-    """Return the closed nodes (m,) with an area, which may receive shares of other nodes."""
-    return closed & (areas > NO_AREA * np.abs(areas).mean())
-
-
-def _alone(shares: Array, areas: Array) -> tuple[Mask, Array]:
-    """Return the node with the largest share as the only closed one (m,), with the pressure (m,) for the complete force."""
-    most = np.argmax(np.where(_takers(np.ones(len(areas), bool), areas), shares, -np.inf))
-    closed = np.arange(len(areas)) == most
-    return closed, np.where(closed, shares.sum() / areas[most], 0.0)
-
-
-def _rings(takers: Mask, moving: Array, side: Surface) -> list[Mask]:
-    """Return masks (m,) of the receiving nodes, of their neighbours, and so on, until all nodes with shares are included."""
+    Shares move from ring to ring of neighbours towards the receiving nodes, beginning with the ring that is farthest away.
+    """
     rings, reached = [takers], takers.copy()
     while (moving[~reached] != 0.0).any():
         ring = (side.near @ rings[-1].astype(np.float64) > 0.0) & ~reached
@@ -88,4 +68,8 @@ def _rings(takers: Mask, moving: Array, side: Surface) -> list[Mask]:
             break
         rings.append(ring)
         reached |= ring
-    return rings
+    for inner, outer in zip(rings[-2::-1], rings[:0:-1], strict=True):
+        room = np.where(inner, areas if inner is takers else 1.0, 0.0)
+        given = np.divide(moving, side.near @ room, out=np.zeros_like(moving), where=outer)
+        moving = np.where(outer, 0.0, moving) + room * (side.near @ given)
+    return np.divide(moving, areas, out=np.zeros_like(moving), where=takers)

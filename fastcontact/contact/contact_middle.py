@@ -16,16 +16,102 @@ not half the arc.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
+from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.held_motions import TOGETHER, HeldMotions
 from fastcontact.contact.projection import nodal_normals
 from fastcontact.contact.surface import Surface
-from fastcontact.contact.unrolled_line import UnrolledLine, unrolled
 from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
+
+
+@dataclass(frozen=True, eq=False)
+class UnrolledLine:
+    """A line through nodes.
+
+    Attributes
+    ----------
+    nodes : ndarray (k, 2)
+        In order; the first is repeated at the end of a closed line [length].
+    abscissa : ndarray (k,)
+        Length along the line to each of them [length].
+    closed : bool
+    """
+
+    nodes: Array
+    abscissa: Array
+    closed: bool = False
+
+    @property
+    def length(self) -> float:
+        """Length of the whole line [length]."""
+        return float(self.abscissa[-1])
+
+    @classmethod
+    def straight(cls, middle: Array, direction: Array, reach: float) -> UnrolledLine:
+        """Return a straight line on both sides of `middle` (2,) along `direction` (2,), each `reach` long [length]."""
+        return cls(middle + np.outer([-reach, reach], direction), np.array([0.0, 2.0 * reach]))
+
+    def at(self, length: float) -> Array:
+        """Return the point (2,) at an arc length along the line [length]."""
+        return np.array([np.interp(length, self.abscissa, component) for component in self.nodes.T])
+
+    def lengths(self, positions: Array) -> Array:
+        """Return the arc length (n,) of the point of the line nearest to each of `positions` (n, 2) [length]."""
+        last = len(self.nodes) - 1
+        node = nearest(self.nodes, positions)[1]
+        best, arc_length = np.full(len(positions), np.inf), np.zeros(len(positions))
+        for piece in (np.clip(node - 1, 0, last - 1), np.clip(node, 0, last - 1)):
+            begin, along = self.nodes[piece], self.nodes[piece + 1] - self.nodes[piece]
+            size = np.einsum("nd,nd->n", along, along)
+            fraction = np.clip(np.einsum("nd,nd->n", positions - begin, along) / size, 0.0, 1.0)
+            away = np.linalg.norm(begin + fraction[:, None] * along - positions, axis=1)
+            nearer = away < best
+            best[nearer] = away[nearer]
+            arc_length[nearer] = (self.abscissa[piece] + fraction * np.sqrt(size))[nearer]
+        return arc_length
+
+
+def unrolled(surface: Surface, coordinates: Array, middle: Array | None) -> UnrolledLine | None:
+    """Return a surface in the plane as one line; None where it is in several pieces or branches.
+
+    A closed line is cut open opposite to `middle` (2,) [length], or at its lowest point without one.
+    """
+    if surface.abscissa.any():
+        return UnrolledLine(coordinates[surface.points], surface.abscissa)
+    order = _loop(surface)
+    if order is None:
+        return None
+    nodes = coordinates[surface.points][order]
+    away = -nodes[:, 1] if middle is None else np.linalg.norm(nodes - middle, axis=1)
+    nodes = np.roll(nodes, -int(np.argmax(away)), axis=0)
+    nodes = np.concatenate([nodes, nodes[:1]])
+    lengths = np.linalg.norm(np.diff(nodes, axis=0), axis=1)
+    return UnrolledLine(nodes, np.concatenate([[0.0], np.cumsum(lengths)]), closed=True)
+
+
+def _loop(surface: Surface) -> list[int] | None:
+    """Return the nodes of a surface, as rows of its points, in order around one closed line; None if it is open."""
+    following: dict[int, int] = {}
+    for block in surface.blocks:
+        middles = block.local[:, 2:]
+        chains = np.concatenate([block.local[:, :1], middles, block.local[:, 1:2]], axis=1).tolist()
+        for chain in chains:
+            for begin, end in pairwise(chain):
+                if begin in following:
+                    return None
+                following[begin] = end
+    first = next(iter(following))
+    order, here = [first], following.get(first)
+    while here is not None and here != first and len(order) <= len(following):
+        order.append(here)
+        here = following.get(here)
+    return order if here == first and len(order) == len(surface.points) else None
+
 
 # A plane of symmetry cuts the surface: its normal and that of the surface are nearly perpendicular [cosine].
 ACROSS = 0.5
@@ -96,13 +182,18 @@ def contact_middle(pair: Formulation, normal: Array, force: Array, closed: Mask,
     weight = _weights(force, gap)
     mean = weight @ normal
     dim = points.shape[1]
+    meets_axis = np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max()
     if pair.axisymmetric and (
-        _meets_axis(points) or (abs(mean[0]) <= abs(mean[1]) and _told_apart_by_radius(surface, pair.points))
+        meets_axis or (abs(mean[0]) <= abs(mean[1]) and _told_apart_by_radius(surface, pair.points))
     ):
         return ContactMiddle(np.array([0.0, float(weight @ points[:, 1])]), direction=np.array([0.0, 1.0]))
     planes = symmetry_planes(surface, pair.points, pair.held)
-    if closed.any():
-        planes = [plane for plane in planes if _reached(surface, plane[1], closed)]
+    if closed.any():  # only the planes that the contact reaches
+        reached = [
+            any(closed[block.local[np.isin(block.local, nodes).any(axis=1)]].any() for block in surface.blocks)
+            for _, nodes in planes
+        ]
+        planes = [plane for plane, counts in zip(planes, reached, strict=True) if counts]
     if dim == 2:
         return _along_line(surface, pair.points, weight, planes, mean)
     return _in_space(points, weight, planes, mean)
@@ -122,11 +213,6 @@ def _in_space(points: Array, weight: Array, planes: list[tuple[int, Indices]], m
             centre[axis], mean[axis] = values[0], 0.0
     length = float(np.linalg.norm(mean))
     return ContactMiddle(centre, direction=mean / length if length > DIRECTED else None, ignored=ignored)
-
-
-def _meets_axis(points: Array) -> bool:
-    """Return whether one of the `points` (n, 2) [length] lies on the axis x = 0."""
-    return bool(np.abs(points[:, 0]).min() <= LENGTH_ROUND_OFF * np.ptp(points, axis=0).max())
 
 
 def _told_apart_by_radius(surface: Surface, coordinates: Array) -> bool:
@@ -172,15 +258,6 @@ def _weights(force: Array, gap: Array) -> Array:
     weight = np.zeros(len(force))
     weight[int(np.argmin(gap))] = 1.0
     return weight
-
-
-def _reached(surface: Surface, nodes: Indices, closed: Mask) -> bool:
-    """Return whether a facet with one of the `nodes` has a closed node."""
-    for block in surface.blocks:
-        touching = np.isin(block.local, nodes).any(axis=1)
-        if closed[block.local[touching]].any():
-            return True
-    return False
 
 
 def _along_line(

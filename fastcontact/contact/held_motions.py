@@ -133,24 +133,17 @@ def alike(projectors: Array, places: Array) -> list[tuple[Array, Mask]]:
         order, before = breadth_first_order(minimum_spanning_tree(csr_array(away)), 0, directed=False)
         for child in order[1:]:  # the sign of each vector is that for which it agrees with its nearest neighbour
             axis[child] *= np.sign(axis[child] @ axis[before[child]])
-        along = _from_nearest(axis[order], places[seeds[order]], places)
+        # Between these, directions are interpolated with weights of the inverse distances to the power NEAREST.
+        along = np.tile(axis[order][0], (len(places), 1))
+        if not (axis[order] @ axis[order][0] > 1.0 - ROUND_OFF).all():
+            away = _distances(places, places[seeds[order]])
+            along = _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ axis[order])
         along[seeds[order]] = axis[order]
         held = np.einsum("nd,nde,ne->n", along, rest, along) >= TOGETHER**2
         along[held] = _unit(np.einsum("nde,ne->nd", rest[held], along[held]))
         directions.append((along, held))
         rest[held] = without(rest[held], along[held], 0.0)
     return directions
-
-
-def _from_nearest(directions: Array, origin: Array, places: Array) -> Array:
-    """Return unit vectors at `places` (n, dim), interpolated between `directions` (k, dim) at `origin` (k, dim).
-
-    Weights are the inverse distances to the power NEAREST.
-    """
-    if (directions @ directions[0] > 1.0 - ROUND_OFF).all():
-        return np.tile(directions[0], (len(places), 1))
-    away = _distances(places, origin)
-    return _unit((away.min(axis=1, keepdims=True) / away) ** NEAREST @ directions)
 
 
 def _distances(one: Array, other: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import csr_array, eye_array
 
 from fastcontact.arrays import Array, Numbers
-from fastcontact.contact.surface import Surface
+from fastcontact.contact.surface import FacetBlock, Surface
 from fastcontact.linear.sparse_rows import Entries
 from fastcontact.mesh import elements, quadrature
 from fastcontact.mesh.area_vectors import area_vectors
@@ -61,6 +61,16 @@ def all_nodes_carry(element: str) -> bool:
     return bool(areas.min() >= 1e-6 * areas.max())
 
 
+def areas_of_rule(block: FacetBlock, points: Array, axisymmetric: bool) -> tuple[Array, Array]:
+    """Return the shape functions (n_quad, k) [-] at the points of the `fine_rule`, and their areas (n_facets, n_quad) [area].
+
+    `points` (n_points, dim) are the coordinates of all points [length].
+    """
+    xi, weights = fine_rule(block.element)
+    measure = facet_measure(block.facets, block.element, points, xi, axisymmetric)
+    return elements.get(block.element).shape(xi), measure * weights
+
+
 def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_array:
     """Return the mass matrix (m, m) of a surface, the integrals of products of two shape functions [area].
 
@@ -69,9 +79,7 @@ def mass_matrix(surface: Surface, points: Array, axisymmetric: bool) -> csr_arra
     """
     entries = Entries()
     for block in surface.blocks:
-        xi, weights = fine_rule(block.element)
-        N = elements.get(block.element).shape(xi)
-        dA = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
+        N, dA = areas_of_rule(block, points, axisymmetric)
         entries.add(block.local, block.local, np.einsum("fq,qa,qb->fab", dA, N, N))
     return entries.matrix((len(surface.points), len(surface.points)))
 
@@ -111,9 +119,8 @@ def lumped_areas(side: Surface, points: Array, axisymmetric: bool) -> Array:
     """
     areas = np.zeros(len(side.points))
     for block in side.blocks:
-        xi, weights = fine_rule(block.element)
-        measure = facet_measure(block.facets, block.element, points, xi, axisymmetric) * weights
-        shares = measure @ elements.get(block.element).shape(xi) ** 2
+        N, measure = areas_of_rule(block, points, axisymmetric)
+        shares = measure @ N**2
         shares *= (measure.sum(axis=1) / shares.sum(axis=1))[:, None]
         np.add.at(areas, block.local, shares)
     return areas

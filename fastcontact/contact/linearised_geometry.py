@@ -221,7 +221,11 @@ class _SurfacePoints:
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
         """Prepare the variation of facet normals; return their derivatives (n, dim - 1, dim) along the facet."""
         self._up = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
-        second = _second_derivatives(primary, facet, xi)
+        # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
+        ends = [(xi + step, xi - step) for step in 0.5 * np.eye(xi.shape[1])]
+        second = np.stack(
+            [places(primary, facet, a).gradient - places(primary, facet, b).gradient for a, b in ends], axis=3
+        )
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
         return -np.einsum("njd,nij->nid", self._up, curvature)
 
@@ -249,18 +253,6 @@ class _SurfacePoints:
         for slope, step in zip(slopes, xi.T, strict=True):
             total -= slope @ (step[:, None] * force)
         return total
-
-
-def _second_derivatives(primary: Surface, facet: Indices, xi: Array) -> Array:
-    """Return the second derivatives (n, k, dim - 1, dim - 1) of shape functions in facets (n,), k as in `Places`.
-
-    They are at most quadratic along each axis, so that central differences of gradients are exact.
-    """
-    step, columns = 0.5 * np.eye(xi.shape[1]), []
-    for axis in step:
-        ahead, behind = places(primary, facet, xi + axis).gradient, places(primary, facet, xi - axis).gradient
-        columns.append(ahead - behind)
-    return np.stack(columns, axis=3)
 
 
 class _ObstaclePoints:

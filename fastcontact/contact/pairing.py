@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -20,12 +21,14 @@ from fastcontact.contact.projection import (
     at_nodes_of_facets,
     facet_normals,
     interpolated,
+    nodal_normals,
     places,
     smooth_ends,
     smooth_normals,
 )
 from fastcontact.contact.search.closest import Closest, closest_of_kinds
 from fastcontact.contact.surface import Surface
+from fastcontact.errors import ContactError, unknown
 from fastcontact.mesh import elements
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -263,14 +266,8 @@ def filled_up(arrays: Sequence[AnyArray]) -> AnyArray:
     Integers are padded with the last entry of the row, floating-point numbers with zeros.
     """
     width = max(values.shape[1] for values in arrays)
-    missing = [((0, 0), (0, width - values.shape[1])) for values in arrays]
-    integer = np.issubdtype(arrays[0].dtype, np.integer)
-    return np.concatenate(
-        [
-            np.pad(values, pad, mode="edge" if integer else "constant")
-            for values, pad in zip(arrays, missing, strict=True)
-        ]
-    )
+    mode: Any = "edge" if np.issubdtype(arrays[0].dtype, np.integer) else "constant"
+    return np.concatenate([np.pad(values, ((0, 0), (0, width - values.shape[1])), mode) for values in arrays])
 
 
 def gap_rows(
@@ -366,3 +363,44 @@ def rows_along(
     matrix = csr_array((values.ravel(), columns.ravel(), start), shape=(len(candidates.nodes), n_dofs))
     matrix.sum_duplicates()
     return matrix
+
+
+Normals = str | Sequence[float]
+KINDS = ("facet", "averaged", "secondary")
+# Cosine of the angle beyond which two sides do not face each other: about 85 degrees.
+FACING = 0.1
+
+
+def checked_normals(normals: Normals, points: Array, primary: Surface | RigidSide) -> str | tuple[float, ...]:
+    """Return a key of `KINDS`, or a unit vector (dim,); `points` (n_points, dim) are reference coordinates [length].
+
+    Raises
+    ------
+    ContactError
+        If `normals` is neither, if the vector points into the body behind `primary`, or if `primary` is a rigid obstacle,
+        which has its own normals.
+    """
+    dim = points.shape[1]
+    if isinstance(normals, str):
+        if normals not in KINDS:
+            raise ContactError(unknown("kind of normals", normals, [*KINDS, "a vector"]))
+        checked: str | tuple[float, ...] = normals
+    else:
+        vector = np.asarray(normals, float)
+        length = np.linalg.norm(vector)
+        if vector.shape != (dim,) or not (np.isfinite(length) and length > 0):
+            raise ContactError(f"normals = {normals!r} must be one of {', '.join(KINDS)}, or a vector of {dim} numbers")
+        checked = tuple((vector / length).tolist())
+        if isinstance(primary, Surface) and (nodal_normals(primary, points) @ vector).mean() <= FACING * length:
+            raise ContactError(
+                f"normals = {normals!r} must point out of the body of '{primary.group}', the primary side: reverse the vector"
+            )
+    if isinstance(primary, RigidSide) and checked not in ("facet", "averaged"):
+        raise ContactError(f"normals = {normals!r} are for contact between bodies: a rigid obstacle has its own")
+    return checked
+
+
+def opposed(pairing: Pairing, normals: Array) -> Pairing:
+    """Return a pairing whose normals are opposite to those of the secondary side (n, dim), and face the primary's."""
+    facing = np.einsum("nd,nd->n", pairing.normal, normals) < -FACING
+    return replace(pairing, normal=np.where(facing[:, None], -normals, pairing.normal), paired=pairing.paired & facing)

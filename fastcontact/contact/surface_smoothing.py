@@ -145,11 +145,15 @@ def _axes(block: FacetBlock, coordinates: Array, normal: Array) -> Array:
 
 def smooth_side(side: Surface, points: Array) -> SmoothSide | None:
     """Return the smooth surface of a side at `points` (n_points, dim); None where its facets have no sag."""
-    if _in_one_plane(points[side.points]):
+    away = points[side.points] - points[side.points].mean(axis=0)
+    if np.linalg.svd(away, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(away):  # in one plane
         return None
     near, nodes, valid = _neighbours(side, np.concatenate([_normals(block, points) for block in side.blocks]))
     around, first, fits = points[side.points[nodes]], 0, []
-    if _flat(around, valid):
+    away, inside = np.where(valid[:, :, None], around, 0.0), valid[:, :, None]
+    away = np.where(inside, away - (away.sum(axis=1) / valid.sum(axis=1)[:, None])[:, None], 0.0)
+    least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
+    if (least <= (LENGTH_ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all():  # around each facet
         return None
     for block in side.blocks:
         rows = slice(first, first + len(block.facets))
@@ -182,21 +186,6 @@ def _neighbours(side: Surface, normal: Array) -> tuple[csr_array, Indices, Mask]
     padded = np.zeros(valid.shape, np.intp)
     padded[valid] = around.indices
     return near, padded, valid
-
-
-def _in_one_plane(points: Array) -> bool:
-    """Return whether points (n, dim) lie in one plane."""
-    away = points - points.mean(axis=0)
-    return bool(np.linalg.svd(away, compute_uv=False)[-1] <= LENGTH_ROUND_OFF * np.linalg.norm(away))
-
-
-def _flat(around: Array, valid: Mask) -> bool:
-    """Return whether the points `around` (n, m, dim) each facet are coplanar."""
-    count = valid.sum(axis=1)[:, None]
-    away = np.where(valid[:, :, None], around, 0.0)
-    away = np.where(valid[:, :, None], away - (away.sum(axis=1) / count)[:, None], 0.0)
-    least = np.linalg.eigvalsh(away.transpose(0, 2, 1) @ away)[:, 0]
-    return bool((least <= (LENGTH_ROUND_OFF * np.linalg.norm(away, axis=(1, 2))) ** 2).all())
 
 
 @dataclass(frozen=True, eq=False)

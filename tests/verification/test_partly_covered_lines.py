@@ -6,7 +6,7 @@ from models import elastic_model, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
-from fastcontact.contact.formulations._determined_field import DETERMINED, WholeFacets, determined
+from fastcontact.contact.formulations.mortar import DETERMINED, WholeFacets, determined
 from fastcontact.mesh.generate import block
 
 pytestmark = pytest.mark.each_value

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import block_diag, bsr_array, csr_array, diags_array, vstack
 
-from fastcontact.analysis.contact_resultants import end_of
+from fastcontact.analysis.resultants import end_of
 from fastcontact.analysis.wear import at_points
 from fastcontact.arrays import Array, Indices
 from fastcontact.contact.configuration import Configuration

@@ -16,12 +16,12 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse import csr_array, eye_array
 
-from fastcontact.analysis.contact_result import nodal_pressure
 from fastcontact.analysis.inequalities import Iterate, pair_surfaces
 from fastcontact.analysis.problem import Problem, StepLoad
 from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.closed_nodes import carried
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
 from fastcontact.errors import ModelError
@@ -126,8 +126,9 @@ class MovingContact:
             return np.empty(0)
         constraints = constraints or self.constraints
         assert self.closed is not None
-        forces = multiplier[constraints.rows[self.pair]]
-        return nodal_pressure(self.problem.pairs[self.pair], constraints.parts[self.pair], forces, self.closed)
+        part = constraints.parts[self.pair]
+        forces = part.normal_forces(part.contact_forces(multiplier[constraints.rows[self.pair]]))
+        return carried(part, forces, self.closed, self.problem.pairs[self.pair].secondary)[1]
 
     def along(self, changed: Callable[[float], MovingContact], by: float) -> Array:
         """Return the derivative of `Sample.all`; `changed(d)` returns the contact with the parameter changed by d."""

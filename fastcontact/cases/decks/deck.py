@@ -14,8 +14,8 @@ from fastcontact._tools.html_table import html_table
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.result_warnings import largest_rotation
+from fastcontact.analysis.resultants import multipliers
 from fastcontact.analysis.run import solve_steps
-from fastcontact.analysis.support_forces import multipliers
 from fastcontact.arrays import Array, Numbers
 from fastcontact.cases.decks.blocks import Location, read_blocks
 from fastcontact.cases.decks.building import Building

@@ -24,9 +24,6 @@ class _Formulations(Mapping[str, type[Formulation]]):
         formulation: type[Formulation] = importlib.import_module(f"{__name__}.{name}").FORMULATION
         return formulation
 
-    def __contains__(self, name: object) -> bool:
-        return name in self._names
-
     def __iter__(self) -> Iterator[str]:
         return iter(self._names)
 

@@ -52,13 +52,14 @@ def _plane(corners, count, origin, axes):
 
 
 @kernel
-def _project(corners, count, origin, axes, flat):
-    """Fill `flat` (count, 2) with the coordinates of a polygon in a plane."""
+def _flatten(points, count, shifted, origin, axes, flat):
+    """Fill `flat` (count, 2) with the coordinates of `points` in a plane, the first `shifted` ones relative to its origin."""
     for k in range(count):
         for a in range(2):
             flat[k, a] = 0.0
             for d in range(3):
-                flat[k, a] += (corners[k, d] - origin[d]) * axes[a, d]
+                shift = origin[d] if k < shifted else 0.0
+                flat[k, a] += (points[k, d] - shift) * axes[a, d]
 
 
 @kernel
@@ -114,9 +115,9 @@ def _clip(subject, count, window, n_window, spare):
 @kernel
 def _common(corners, count, others, n_others, origin, axes, subject, window, spare):
     """Fill `subject` with the overlap of two polygons; return its number of corners, 0 for none."""
-    _project(corners, count, origin, axes, subject)
+    _flatten(corners, count, count, origin, axes, subject)
     whole = _area(subject, count)
-    _project(others, n_others, origin, axes, spare)
+    _flatten(others, n_others, n_others, origin, axes, spare)
     for k in range(n_others):  # facets that face each other turn opposite ways
         window[k, 0], window[k, 1] = spare[n_others - 1 - k, 0], spare[n_others - 1 - k, 1]
     count = _clip(subject, count, window, n_others, spare)
@@ -212,17 +213,6 @@ def _fill_terms(n_terms, s, t, terms):
         terms[7, 0], terms[7, 1], terms[7, 2] = s * t * t, t * t, 2.0 * s * t
     if n_terms > 8:
         terms[8, 0], terms[8, 1], terms[8, 2] = s * s * t * t, 2.0 * s * t * t, 2.0 * s * s * t
-
-
-@kernel
-def _flatten(facet, origin, axes, flat):
-    """Fill `flat` (n_terms, 2) with the terms of a facet in the coordinates of a plane."""
-    for k in range(facet.shape[0]):
-        for a in range(2):
-            flat[k, a] = 0.0
-            for d in range(3):
-                shift = origin[d] if k == 0 else 0.0
-                flat[k, a] += (facet[k, d] - shift) * axes[a, d]
 
 
 @innermost_kernel
@@ -346,8 +336,8 @@ def integrate(
     exact = n == 3 and m == 3
     for i in range(start[low], start[high]):
         s, p = pairs[i, 0], pairs[i, 1]
-        _flatten(deformed[s], origin[s], axes[s], flat)
-        _flatten(other_deformed[p], origin[s], axes[s], other_flat)
+        _flatten(deformed[s], n, 1, origin[s], axes[s], flat)  # coefficients: only the first is a position
+        _flatten(other_deformed[p], m, 1, origin[s], axes[s], other_flat)
         count = _common(secondary[s], n_secondary, primary[p], n_primary, origin[s], axes[s], subject, window, spare)
         for d in range(2):
             xi[d], other_xi[d] = middle[d], other_middle[d]

@@ -29,8 +29,19 @@ from fastcontact.contact.linearised_geometry import (
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.overclosure import OverclosureLaw
 from fastcontact.contact.pair_options import PairOptions
-from fastcontact.contact.pairing import OVERHANG, Candidates, Pairing, gap_rows, normals, pair, rows_along, tangents
-from fastcontact.contact.prescribed_normals import Normals, checked_normals, opposed
+from fastcontact.contact.pairing import (
+    OVERHANG,
+    Candidates,
+    Normals,
+    Pairing,
+    checked_normals,
+    gap_rows,
+    normals,
+    opposed,
+    pair,
+    rows_along,
+    tangents,
+)
 from fastcontact.contact.projection import (
     at_nodes_of_facets,
     interpolated,
@@ -262,8 +273,9 @@ class Formulation(ABC):
 
     def _tied_at_supports(self, constraints: Constraints, moments: csr_array, areas: Array | None) -> csr_array | None:
         """Return the `reduction` of the multipliers of a tied pair; None if no node is held by supports on both sides."""
-        held = self._held_on_both_sides(Configuration.undeformed(self.points))
-        if held is None or not constraints.tangents:
+        # Directions in which all nodes of a facet are held do not count.
+        held = _without_whole_facets(self._both_held(Configuration.undeformed(self.points)), self.secondary)
+        if not (held.any() and constraints.tangents):
             return None
         nodes = self.nodes_of(constraints, moments)
         frames = [moments @ direction for direction in (normals(constraints.directions), *constraints.directions)]
@@ -486,14 +498,6 @@ class Formulation(ABC):
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])
             theirs[rows] = np.einsum("nk,nkde->nde", facing.shape, self.held.at(facing.nodes))
         return pairing, theirs
-
-    def _held_on_both_sides(self, at: Configuration) -> Array | None:
-        """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held; None without such directions.
-
-        Directions in which all nodes of a facet are held do not count.
-        """
-        held = _without_whole_facets(self._both_held(at), self.secondary)
-        return held if held.any() else None
 
     def _both_held(self, at: Configuration) -> Array:
         """Return projectors (n_nodes, dim, dim) onto directions in which both sides are held."""

@@ -12,10 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.contact.integration import facet_measure, fine_rule
+from fastcontact.contact.integration import areas_of_rule
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.surface import FacetBlock, Surface
-from fastcontact.mesh import elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,13 +95,11 @@ def obstacle_overlap(
     """
     mass, faced = [], []
     for block in secondary.blocks:
-        xi, weights = fine_rule(block.element)
-        N = elements.get(block.element).shape(xi)
+        N, whole = areas_of_rule(block, points[0], axisymmetric)
         positions = np.einsum("qk,fkd->fqd", N, points[1][block.facets])
         gap, normal, paired, _ = obstacle.facing(positions.reshape(-1, positions.shape[2]), pose)
         foot = positions - (np.where(paired, gap, 0.0)[:, None] * normal).reshape(positions.shape)
-        area = facet_measure(block.facets, block.element, points[0], xi, axisymmetric) * weights
-        area = np.where(paired.reshape(area.shape), area, 0.0)
+        area = np.where(paired.reshape(whole.shape), whole, 0.0)
         mass.append(np.einsum("fq,qa,qb->fab", area, N, N))
         faced.append(np.einsum("fq,qa,fqd->fad", area, N, foot))
     return Overlap(mass, [], faced)

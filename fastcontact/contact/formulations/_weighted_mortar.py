@@ -33,11 +33,10 @@ from fastcontact.contact.formulations._cut_lines import line_overlap
 from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions, positive
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
-from fastcontact.contact.integration import facet_measure, fine_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import Closing, NodalNormals, Points, Slips, WeightedForces, faced
+from fastcontact.contact.integration import areas_of_rule, nodal_areas
+from fastcontact.contact.linearised_geometry import Closing, NodalNormals, Points, WeightedForces, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
-from fastcontact.contact.pairing import Candidates, Pairing, filled_up, pair, tangents
-from fastcontact.contact.prescribed_normals import Normals
+from fastcontact.contact.pairing import Candidates, Normals, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
 from fastcontact.contact.search.limits import BEYOND
 from fastcontact.contact.surface import FacetBlock
@@ -89,30 +88,28 @@ class WeightedMortar(Formulation):
     name: ClassVar[str] = "mortar"
     weighs_gaps: ClassVar[bool] = True
     _whole: list[Array] = field(init=False, repr=False)
+    _test: list[Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if str(self.multipliers) not in MULTIPLIERS:
             raise ContactError(unknown("kind of multipliers", self.multipliers, MULTIPLIERS))
-        self._test = [self._test_functions(block.element) for block in self.secondary.blocks]
-        self._whole = []
-        for block, T in zip(self.secondary.blocks, self._test, strict=True):
-            xi, weights = fine_rule(block.element)
-            dA = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
-            self._whole.append(dA @ elements.get(block.element).shape(xi) @ T.T)
+        self._test, self._whole = [], []
+        for block in self.secondary.blocks:
+            if self.multipliers == "dual":
+                T = positive(block.element)
+            else:  # shape functions of the corners, and zero at mid-side nodes
+                element = elements.get(block.element)
+                linear = elements.get(element.linear).shape(element.nodes).T
+                T = np.vstack([linear, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
+            self._test.append(T)
+            N, dA = areas_of_rule(block, self.points, self.axisymmetric)
+            self._whole.append(dA @ N @ T.T)
 
     @property
     def eliminable(self) -> bool:
         """See `Formulation`; standard multipliers couple the corners of quadratic facets through their mid nodes."""
         return self.multipliers == "dual" or self.secondary.order == 1
-
-    def _test_functions(self, name: str) -> Array:
-        """Return the non-negative functions of a facet that sum to one, as coefficients (n_nodes, n_nodes)."""
-        if self.multipliers == "dual":
-            return positive(name)
-        element = elements.get(name)
-        linear = elements.get(element.linear).shape(element.nodes)
-        return np.vstack([linear.T, np.zeros((element.n_nodes - element.n_corners, element.n_nodes))])
 
     def _overlap(self, deformed: Array, pose: Pose) -> Overlap:
         if isinstance(self.primary, RigidSide):
@@ -189,11 +186,10 @@ class WeightedMortar(Formulation):
         at, acts, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
-        for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
+        of_blocks = zip(self.secondary.blocks, self._test, self._functions(coverage), strict=True)
+        for number, (block, T, (psi, _)) in enumerate(of_blocks):
             inside = self._whole_facets(block) if overlap.points is None else overlap.points[number]
             facet, shape, area = (values[acts[block.local].any(axis=1)[inside.facet]] for values in inside)
-            T = self._test[number]
-            psi, _ = self._functions(T, mass, coverage.kept[block.local], self._fraction(number, coverage.weights))
             columns = first + np.arange(len(facet))[:, None]
             functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
             tests.add(block.local[facet], columns, (area[:, None] * (shape @ T.T))[:, :, None])
@@ -207,40 +203,26 @@ class WeightedMortar(Formulation):
         points = faced(candidates, pairing, rows, self.primary, deformed, along, at.pose, closest=True)
         weighted = scaled(csr_array(functions.matrix(size)[:, rows]), 1.0 / weight)
         mean = csr_array(tests.matrix(size)[:, rows])
-        own_normals = self._own_normals(pairing, deformed, at.pose)
-        slips = None if slipping is None else self._varied_slips(*slipping, normal, tangential, at)
+        own_normals: NodalNormals | Points | None = None  # if nodal normals are not means of primary normals
+        if isinstance(self.primary, RigidSide):
+            own = self.secondary.points[:, None]
+            here, all_nodes = Candidates(own, np.ones(own.shape)), np.arange(len(own))
+            own_normals = faced(here, pairing, all_nodes, self.primary, deformed, self.normals, at.pose)
+        elif self.normals == "secondary":
+            own_normals = NodalNormals(self.secondary, deformed)
+        slips = None
+        if slipping is not None:
+            directions, motion, length = slipping
+            slips = self._sliding(motion, directions, tangential, at)
+            if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
+                closing = Closing.of(normal, NodalNormals(self.secondary, deformed), motion @ slips.start, length)
+                slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return WeightedForces(self.secondary, points, weighted, mean, normal, multiplier, own_normals, slips)
-
-    def _varied_slips(
-        self, directions: Array, mean: csr_array, length: Array, normal: Array, tangential: Array, at: Configuration
-    ) -> Slips:
-        """Return the slips of `_linearised`."""
-        slips = self._sliding(mean, directions, tangential, at)
-        if isinstance(self.primary, RigidSide) or self.slip != "symmetric":
-            return slips
-        nodal = NodalNormals(self.secondary, self.points + at.displacement)
-        closing = Closing.of(normal, nodal, mean @ slips.start, length)
-        return replace(slips, total=slips.total + closing.vector, closing=closing)
 
     def _whole_facets(self, block: FacetBlock) -> OverlapPoints:
         """Return Gauss points of whole facets."""
-        xi, weights = fine_rule(block.element)
-        area = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric) * weights
-        facet = np.repeat(np.arange(len(area)), len(xi))
-        return OverlapPoints(facet, np.tile(elements.get(block.element).shape(xi), (len(area), 1)), area.ravel())
-
-    def _own_normals(self, pairing: Pairing, deformed: Array, pose: Pose) -> NodalNormals | Points | None:
-        """Return the variation of the nodal normals, or None if they are means of primary normals."""
-        if isinstance(self.primary, RigidSide):
-            nodes = self.secondary.points[:, None]
-            here, all_nodes = Candidates(nodes, np.ones(nodes.shape)), np.arange(len(nodes))
-            return faced(here, pairing, all_nodes, self.primary, deformed, self.normals, pose)
-        return NodalNormals(self.secondary, deformed) if self.normals == "secondary" else None
-
-    def _fraction(self, number: int, weights: list[Array]) -> Array:
-        """Return the fraction (n_facets, k) of the weights of a block's functions that faces the other side."""
-        full_area = self._whole[number]
-        return np.where(full_area > 0.0, weights[number] / np.where(full_area > 0.0, full_area, 1.0), 0.0)
+        N, area = areas_of_rule(block, self.points, self.axisymmetric)
+        return OverlapPoints(np.repeat(np.arange(len(area)), len(N)), np.tile(N, (len(area), 1)), area.ravel())
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
@@ -326,30 +308,34 @@ class WeightedMortar(Formulation):
         The third result contains the integrals of psi with the distance by which smooth surfaces are closer than facets (m,)
         [volume].
         """
-        overlap, weights, kept = coverage
+        overlap = coverage.overlap
         size = (len(self.secondary.points), len(self.points))
         rows, across, functions = Entries(), Entries(), {}
         closer = np.zeros((size[0], self.points.shape[1]))
-        for number, (block, mass) in enumerate(zip(self.secondary.blocks, overlap.mass, strict=True)):
-            psi, products = self._functions(
-                self._test[number], mass, kept[block.local], self._fraction(number, weights)
-            )
+        of_blocks = zip(self.secondary.blocks, self._functions(coverage), overlap.closer, strict=True)
+        for block, (psi, products), depth in of_blocks:
             rows.add(block.local, block.facets, products)
             functions[block.element] = psi
-            np.add.at(closer, block.local, psi @ overlap.closer[number])
+            np.add.at(closer, block.local, psi @ depth)
         for coupling in overlap.couplings:
             secondary_facet, primary_facet = coupling.pairs.T
             values = functions[coupling.secondary.element][secondary_facet] @ coupling.integrals
             across.add(coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values)
         return rows.matrix(size), across.matrix(size), closer
 
-    def _functions(self, T: Array, mass: Array, kept: Mask, fraction: Array) -> tuple[Array, Array]:
-        """Return the coefficients of psi in shape functions, and its integrals with these, both (n_facets, k, k)."""
-        if self.multipliers == "standard":
-            psi = np.where(kept[:, :, None], T, 0.0)
-            return psi, psi @ mass
-        psi, D = dual_functions(T @ mass @ T.T, kept, fraction)
-        return psi @ T, D @ np.linalg.inv(T).T
+    def _functions(self, coverage: Coverage) -> list[tuple[Array, Array]]:
+        """Return the coefficients of psi in shape functions of each block, and the integrals with these, (n_facets, k, k)."""
+        functions, given = [], zip(self._test, coverage.overlap.mass, coverage.weights, self._whole, strict=True)
+        for block, (T, mass, weights, whole) in zip(self.secondary.blocks, given, strict=True):
+            kept = coverage.kept[block.local]
+            if self.multipliers == "standard":
+                psi = np.where(kept[:, :, None], T, 0.0)
+                functions.append((psi, psi @ mass))
+            else:  # by the fraction of the weights of a block's functions that faces the other side
+                fraction = np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0)
+                psi, D = dual_functions(T @ mass @ T.T, kept, fraction)
+                functions.append((psi @ T, D @ np.linalg.inv(T).T))
+        return functions
 
     def _taking_part(self, covered: list[Array]) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""

@@ -16,10 +16,16 @@ from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
-from fastcontact.contact.integration import all_nodes_carry, even_at_axis, facet_measure, fine_rule, gauss_rule
+from fastcontact.contact.integration import (
+    all_nodes_carry,
+    areas_of_rule,
+    even_at_axis,
+    facet_measure,
+    fine_rule,
+    gauss_rule,
+)
 from fastcontact.contact.pair_options import spread
-from fastcontact.contact.pairing import Candidates, filled_up
-from fastcontact.contact.prescribed_normals import Normals
+from fastcontact.contact.pairing import Candidates, Normals, filled_up
 from fastcontact.contact.surface import FacetBlock
 from fastcontact.errors import ContactError, unknown
 from fastcontact.linear.sparse_rows import shapes_at
@@ -114,9 +120,8 @@ class Continuous(PressureFieldFormulation):
         if self.integration != "node":
             measure = facet_measure(block.facets, block.element, self.points, xi, self.axisymmetric)
             return np.maximum(measure * weights, 0.0).ravel()
-        fine, w = fine_rule(block.element)
-        measure = facet_measure(block.facets, block.element, self.points, fine, self.axisymmetric) * w
-        areas = measure @ elements.get(block.element).shape(fine)
+        N, measure = areas_of_rule(block, self.points, self.axisymmetric)
+        areas = measure @ N
         if block.element == "line3":  # at the axis the integral vanishes, except for the curvature of the facet
             areas[np.abs(areas) < 1e-3 * areas[:, 2:]] = 0.0
         return areas.ravel()

@@ -1,21 +1,216 @@
-"""Mortar contact: gaps are integrated over the segments in which two facets overlap.
+r"""Mortar contact: gaps are integrated over the segments in which two facets overlap.
 
-There are two methods of this name. In 2D with standard multipliers, the contact status is determined at integration points,
-see `_segment_mortar`. In 3D, or with dual multipliers, each secondary node has one weighted gap, see `_weighted_mortar`.
+There are two methods of this name. In 3D, or with dual multipliers, each secondary node has one weighted gap, see
+`_weighted_mortar`. In 2D with standard multipliers, the contact status is determined at integration points.
+
+This file contains the latter. In each pairing the secondary facets are divided into segments, see `_cut_lines`, and each
+segment gets Gauss points (Puso and Laursen, 2004). The integrals are thus exact, and a uniform pressure is transmitted
+exactly between non-matching meshes. Neither node-to-segment contact nor quadrature over complete facets achieves this.
+
+Segments without an opposite facet carry no pressure, and the pressure field is projected over the other segments. If the
+primary surface ends within a secondary facet, the pressure ends at this point. The pressure at an integration point and the
+complementarity conditions are those of `_pressure_field`.
+
+If only a strip of a facet faces the other side, the integration points in this strip hardly determine a field over the
+complete facet: on a strip of the fraction :math:`\theta` at one end of a line, the value of a polynomial of degree k at the
+other end has a weight proportional to :math:`\theta^{2k+1}`. The measure is the smallest generalised eigenvalue of two mass
+matrices of the facet, with integrals over the covered part and over the complete facet. If it is too small, the field is
+simplified. It becomes linear between the corners of a quadratic facet, or the mean of the values at nodes that other facets
+determine. Constant fields remain representable, so that a uniform pressure is transmitted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
+import numpy as np
+from scipy.sparse import coo_array, csr_array, diags_array, lil_array
+
+from fastcontact.arrays import Array, Indices, Mask
+from fastcontact.contact.closed_nodes import NO_AREA
+from fastcontact.contact.configuration import Configuration
+from fastcontact.contact.constraints import Constraints
+from fastcontact.contact.formulations._cut_lines import line_points
 from fastcontact.contact.formulations._formulation import Formulation
-from fastcontact.contact.formulations._segment_mortar import SegmentMortar
+from fastcontact.contact.formulations._pressure_field import PressureField, PressureFieldFormulation
 from fastcontact.contact.formulations._weighted_mortar import WeightedMortar
+from fastcontact.contact.integration import areas_of_rule, facet_measure
+from fastcontact.contact.pair_options import spread
+from fastcontact.contact.pairing import Candidates, Normals
+from fastcontact.contact.surface import FacetBlock, Surface
+from fastcontact.errors import ContactError
+from fastcontact.mesh import elements, quadrature
+from fastcontact.round_off import SINGLE_PRECISION
+
+# Smallest generalised eigenvalue at which a field counts as determined. A linear field needs about a seventh of the length
+# of a line, a quadratic one two fifths. Errors of the values at the other end are amplified by at most 30.
+DETERMINED = 1e-3
 
 
-class Mortar(SegmentMortar):
-    """The formulation ``"mortar"`` of users; `variant` selects the method."""
+@dataclass(frozen=True, eq=False)
+class WholeFacets:
+    """Mass matrices of the complete facets of a block, which have k nodes each.
+
+    Attributes
+    ----------
+    block : FacetBlock
+    to_corners : ndarray (n_corners, k)
+        Coefficients that express the linear shape functions of the corners by the k shape functions of the facet [-].
+    mass : ndarray (n_facets, k, k)
+        Integrals of products of two shape functions over each facet [area].
+    """
+
+    block: FacetBlock
+    to_corners: Array
+    mass: Array
+
+    @classmethod
+    def of(cls, block: FacetBlock, points: Array, axisymmetric: bool) -> WholeFacets:
+        """Integrate over the facets of a block at reference `points` (n_points, dim) [length]."""
+        element = elements.get(block.element)
+        N, dA = areas_of_rule(block, points, axisymmetric)
+        to_corners = elements.get(element.linear).shape(element.nodes).T
+        return cls(block, to_corners, np.einsum("fq,qa,qb->fab", dA, N, N))
+
+    def degrees(self, mass: Array) -> Indices:
+        """Return the degree (n_facets,) of the field that the covered part of each facet determines.
+
+        It is 2 for the field of the shape functions, 1 for a field that is linear between the corners, 0 if neither is
+        determined, and -1 if no part of the facet is covered. `mass` (n_facets, k, k) are the integrals over the covered part
+        [area].
+        """
+        degrees = np.full(len(mass), 2)
+        degrees[~mass.any(axis=(1, 2))] = -1
+        size = np.einsum("fkk->f", self.mass)
+        partly = np.flatnonzero((degrees == 2) & (np.abs(mass - self.mass).max(axis=(1, 2)) > SINGLE_PRECISION * size))
+        full, partial, T = self.mass[partly], mass[partly], self.to_corners
+        linear = _smallest(T @ full @ T.T, T @ partial @ T.T) > DETERMINED
+        degrees[partly] = np.where(_smallest(full, partial) > DETERMINED, 2, np.where(linear, 1, 0))
+        return degrees
+
+
+def _smallest(full: Array, mass: Array) -> Array:
+    """Return the smallest eigenvalue (n_facets,) of ``mass x = eigenvalue * full x`` for each pair of mass matrices [-]."""
+    inverse = np.linalg.inv(np.linalg.cholesky(full))
+    return np.asarray(np.linalg.eigvalsh(inverse @ mass @ inverse.transpose(0, 2, 1))[:, 0])
+
+
+def determined(
+    side: Surface, fields: list[WholeFacets], masses: list[Array], excluded: Mask
+) -> tuple[csr_array, Indices]:
+    """Return the map from the independent values of the field to all nodal values, and the nodes of the independent values.
+
+    Parameters
+    ----------
+    side : Surface
+        The secondary side, with m nodes.
+    fields : list of WholeFacets
+        Mass matrices of the complete facets, for each block of the side.
+    masses : list of ndarray (n_facets, n_nodes, n_nodes)
+        Integrals of products of two shape functions over the covered part of each facet, for each block [area].
+    excluded : ndarray of bool (m,)
+        Nodes that have no independent value.
+
+    Returns
+    -------
+    values : csr_array (m, k)
+        Map from independent to nodal values [-].
+    nodes : ndarray of int (k,)
+        Node of each independent value.
+    """
+    degrees = [field.degrees(mass) for field, mass in zip(fields, masses, strict=True)]
+    kept = np.zeros(len(side.points), bool)
+    for field, degree in zip(fields, degrees, strict=True):
+        kept[field.block.local[degree == 2]] = True
+        kept[field.block.local[degree == 1][:, : len(field.to_corners)]] = True
+    kept &= ~excluded
+    for field, degree, mass in zip(fields, degrees, masses, strict=True):
+        _give_each_a_value(kept, field.block.local[degree >= 0], mass[degree >= 0], excluded)
+    independent = np.flatnonzero(kept)
+    values = spread(side, excluded, independent) if excluded.any() else csr_array(diags_array(kept.astype(float)))
+    if any((degree[degree >= 0] < 2).any() for degree in degrees):
+        values = _interpolated(csr_array(values), fields, degrees, kept, excluded)
+    return csr_array(csr_array(values)[:, independent]), independent
+
+
+def _give_each_a_value(kept: Mask, local: Indices, mass: Array, excluded: Mask) -> None:
+    """Make one node independent in each facet that has no independent node, by setting `kept` (m,) in place.
+
+    The node with the largest covered area is chosen.
+    """
+    for row in np.flatnonzero(~kept[local].any(axis=1)):
+        nodes = local[row]
+        if not (kept[nodes].any() or excluded[nodes].all()):
+            kept[nodes[np.argmax(np.where(excluded[nodes], -np.inf, mass[row].sum(axis=1)))]] = True
+
+
+def _interpolated(
+    values: csr_array, fields: list[WholeFacets], degrees: list[Indices], with_value: Mask, excluded: Mask
+) -> csr_array:
+    """Return the map `values` (m, m) with rows added for nodes that are neither independent nor excluded.
+
+    The value at a corner is the mean of those at the independent nodes of its facets. The values at other nodes are
+    interpolated linearly between the corners.
+    """
+    m = len(with_value)
+    pairs = []
+    for field, degree in zip(fields, degrees, strict=True):
+        local = field.block.local[degree >= 0]
+        corners = local[:, : len(field.to_corners)]
+        row, column = np.repeat(corners, local.shape[1], axis=1).ravel(), np.tile(local, corners.shape[1]).ravel()
+        kept = ~with_value[row] & ~excluded[row] & with_value[column]
+        pairs.append(np.column_stack([row[kept], column[kept]]))
+    row, column = np.unique(np.concatenate(pairs), axis=0).T
+    count = np.bincount(row, minlength=m)
+    values = csr_array(diags_array((with_value | excluded).astype(float)) @ values)
+    values = csr_array(values + coo_array((1.0 / count[row], (row, column)), shape=(m, m)))
+    return csr_array(values + _between_corners(fields, degrees, with_value | excluded) @ values)
+
+
+def _between_corners(fields: list[WholeFacets], degrees: list[Indices], done: Mask) -> csr_array:
+    """Return rows (m, m) that interpolate linearly between corners, for mid nodes that are not marked in `done` (m,)."""
+    between = lil_array((len(done), len(done)))
+    for field, degree in zip(fields, degrees, strict=True):
+        corners = len(field.to_corners)
+        facet, k = np.nonzero(~done[field.block.local[:, corners:]] & (degree >= 0)[:, None])
+        for nodes, node in zip(field.block.local[facet], k + corners, strict=True):
+            # The facets on both sides of an edge give the same row.
+            between[nodes[node], nodes[:corners]] = field.to_corners[:, node]
+    return csr_array(between)
+
+
+@dataclass(eq=False)
+class SegmentMortar(PressureFieldFormulation):
+    """Mortar contact of lines with standard multipliers. The parameters of `PressureFieldFormulation` apply as well.
+
+    Parameters
+    ----------
+    n_gauss : int, optional
+        Number of Gauss points per segment; by default 3 on linear and 4 on quadratic facets.
+    multipliers : str
+        ``"standard"``: the multiplier field is interpolated with the shape functions of the secondary facets.
+    """
+
+    projection_tolerance: float = SINGLE_PRECISION
+    normals: Normals | None = "averaged"
+    surface_smoothing: bool = True
+    n_gauss: int | None = None
+    multipliers: str = "standard"
+
+    name: ClassVar[str] = "mortar"
+    against_obstacles: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.n_gauss is not None and self.n_gauss < 2:
+            raise ContactError(f"n_gauss = {self.n_gauss} points per piece do not integrate it exactly: use at least 2")
+        facets, element = self.secondary.facets, self.secondary.element
+        xi, weights = quadrature.gauss_line(3)
+        lengths = facet_measure(facets, element, self.points, xi, False) @ weights
+        self._whole = [WholeFacets.of(self.secondary.blocks[0], self.points, self.axisymmetric)]
+        self._rho = self.augmentation * self.modulus / float(lengths.min())
 
     @classmethod
     def variant(cls, dim: int, options: Mapping[str, Any]) -> type[Formulation]:
@@ -23,5 +218,30 @@ class Mortar(SegmentMortar):
         weighted = dim == 3 or str(options.get("multipliers", "standard")) != "standard"
         return WeightedMortar if weighted else SegmentMortar
 
+    def unilateral(self, at: Configuration) -> Constraints:
+        """Intersect the facets on the deformed configuration, and return one constraint per integration point."""
+        deformed = self.points + at.displacement
+        assert isinstance(self.primary, Surface)
+        block, borders = self.secondary.blocks[0], self.options.borders(self.secondary)
+        n_gauss = block.facets.shape[1] + 1 if self.n_gauss is None else self.n_gauss
+        points = line_points(
+            block, self.primary, self.points, deformed, self.axisymmetric, n_gauss, self.projection_tolerance, borders
+        )
+        facet, shape, area = points.facet, points.shape, points.area
+        candidates = Candidates(self.secondary.facets[facet], shape, facet, points.xi[:, None])
+        faced = self.facing(candidates, at)
+        paired = np.repeat(faced.paired.reshape(-1, n_gauss).mean(axis=1) > 0.5, n_gauss)
+        total = np.bincount(facet, weights=area)
+        covered = np.bincount(facet, weights=np.where(paired, area, 0.0))
+        kept = paired & (covered > NO_AREA * total)[facet] & (area > 0) & ~self.options.out(candidates)
+        pairing = replace(faced, paired=kept)
+        covering, (n, k) = np.where(kept, area, 0.0), self.secondary.facets.shape
+        mass = np.zeros((n, k, k))
+        np.add.at(mass, facet, covering[:, None, None] * shape[:, :, None] * shape[:, None, :])
+        values = determined(self.secondary, self._whole, [mass], self.options.excluded_nodes(self.secondary))
+        around = self.secondary.local[facet], shape
+        field = PressureField.of_points(around, (covering, area), self._rho, self.repeated(values), renewed=True)
+        return self.of_points(candidates, pairing, field, at)
 
-FORMULATION = Mortar
+
+FORMULATION = SegmentMortar

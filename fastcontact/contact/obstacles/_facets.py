@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from fastcontact.arrays import Array, Indices, Mask, Numbers
+from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.projection import facet_angles
 from fastcontact.errors import ContactError
 from fastcontact.mesh import elements
@@ -100,7 +100,10 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
     blocks = []
     for name, block in rows.items():
         element = elements.get(name)
-        nodes = _out_of_solids(mesh.cells[name][block], outer.get(name))
+        nodes = mesh.cells[name][block]
+        if name in outer:  # facets of solids are oriented outwards
+            same = same_facets(outer[name], nodes)
+            nodes = np.where((same >= 0)[:, None], outer[name][same], nodes)
         if flip:
             nodes = nodes[:, list(element.reversed)]
         blocks.append(Block(element, block + mesh.offsets[name], nodes.astype(np.intp), mesh.points[nodes]))
@@ -112,14 +115,6 @@ def _oriented_blocks(mesh: Mesh, group: str, flip: bool) -> list[Block]:
                 "one of its nodes: remove it or repair the mesh there"
             )
     return blocks
-
-
-def _out_of_solids(nodes: Numbers, outer: Numbers | None) -> Numbers:
-    """Return the facets, replaced by the matching ones of `outer` where there are any."""
-    if outer is None:
-        return nodes
-    rows = same_facets(outer, nodes)
-    return np.where((rows >= 0)[:, None], outer[rows], nodes)
 
 
 def _described(blocks: list[Block], facet: int) -> str:
@@ -198,7 +193,10 @@ def _smooth_normals(
     weight = np.concatenate([angle.ravel() for _, angle in by_block])
     at_points = np.zeros((node.max() + 1, dim))
     np.add.at(at_points, node, weight[:, None] * normal)
-    i, j = _pairs_at_nodes(node)
+    at = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
+    pairs = at @ at.T  # of facets at a common node
+    pairs.sort_indices()
+    i, j = pairs.nonzero()
     alike = np.einsum("nd,nd->n", normal[i], normal[j]) >= np.cos(np.radians(crease)) - LENGTH_ROUND_OFF
     alike |= i == j
     mean = np.zeros_like(normal)
@@ -207,11 +205,3 @@ def _smooth_normals(
     ends = np.cumsum([block.nodes.size for block in blocks])[:-1]
     means = np.split(mean, ends)
     return [values.reshape(*block.nodes.shape, dim) for values, block in zip(means, blocks, strict=True)], at_points
-
-
-def _pairs_at_nodes(node: Indices) -> tuple[Indices, Indices]:
-    """Return all pairs (i, j) of entries with the same node, including i = j."""
-    at = csr_array((np.ones(len(node)), node, np.arange(len(node) + 1)))
-    pairs = at @ at.T
-    pairs.sort_indices()
-    return pairs.nonzero()

@@ -8,8 +8,8 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
+from fastcontact.analysis.locking import SUSPICIOUS, Comparison, locking_warning
 from fastcontact.analysis.problem import prepare
-from fastcontact.analysis.volumetric_locking import SUSPICIOUS, Comparison, locking_warning
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.mesh import elements
 

@@ -10,8 +10,8 @@ import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import main
 from fastcontact.cli._results import pressure_curves
+from fastcontact.contact.contact_middle import unrolled
 from fastcontact.contact.surface import surface
-from fastcontact.contact.unrolled_line import unrolled
 from fastcontact.results.step import half_width
 
 R, E, SIZE = 10.0, 1000.0, 0.2

@@ -1,0 +1,455 @@
+r"""Equilibrium of a load step: terms, which are nodal forces that depend on the displacements, and their balance.
+
+Let :math:`f_i(u)` be the nodal forces of term i at the displacements u, :math:`f_{ext}` the external forces, B the matrix of
+the contact constraints, and :math:`\lambda` their Lagrange multipliers. A load step solves
+
+.. math:: \sum_i f_i(u) = f_{ext} + B(u)^T \lambda
+
+by Newton's method, see `newton`. `Balance` contains the reactions, and the residual with its bound; `StepEquilibrium` the
+solution. Contact is not a term: it is linearised together with its inequalities in `geometry_loop`.
+Only fluid pressure between the contact surfaces is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.sparse import bsr_array, csr_array
+
+from fastcontact._jit.norms_kernels import largest
+from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.geometry_loop import SettledContact
+from fastcontact.analysis.problem import Problem, StepLoad
+from fastcontact.analysis.state import State
+from fastcontact.arrays import Array
+from fastcontact.elasticity.constrained_system import Stiffness
+from fastcontact.elasticity.nonlinear_bodies import WHOLE, DeformedBodies
+from fastcontact.elasticity.springs import Springs, ground_force, spring_force, spring_stiffness
+from fastcontact.errors import ConvergenceError
+from fastcontact.linear.protocol import Loaded
+from fastcontact.linear.sparse_rows import sum_of_blocks
+from fastcontact.round_off import ROUND_OFF, SUM_ROUND_OFF
+
+# Elastic energy and plastic work of a term [energy].
+Energies = tuple[float, float]
+
+
+class Term(Protocol):
+    """Term of the equilibrium of a load step.
+
+    In all methods u (n_dofs,) are the displacements of all points, and then of the force-driven obstacles [length].
+    """
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """Return the nodal forces (n_dofs,) of the term at u [force], and its energies."""
+        ...
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array | csr_array | None:
+        """Return the derivative (n, n) of the nodal forces with respect to the n displacements of points [force / length].
+
+        The caller may modify the matrix. None means that the derivative is constant, and part of the matrix that `prepare`
+        passed to the linear solver. `geometric` selects how much of the geometric stiffness is included, see
+        `NonlinearBodies.at`.
+        """
+        ...
+
+    def commit(self, u: Array, state: State) -> State:
+        """Return `state` with the history variables of the term at u, the end of the load step.
+
+        By default a term has no history variables, and the state is returned as it is.
+        """
+        return state
+
+
+class LinearBodies(Term):
+    """Linear bodies and springs, with the constant stiffness matrix K (n_dofs, n_dofs) of the problem [force / length]."""
+
+    def __init__(self, K: Stiffness) -> None:
+        self._K = K
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force = self._K @ u
+        return force, (0.5 * float(u @ force), 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> None:
+        """See `Term`."""
+
+
+class Bodies(Term):
+    """Nonlinear bodies in a load step that begins with the state `start`.
+
+    Forces and tangent are computed in one loop over the cells, and cached for the last two displacement vectors.
+    """
+
+    def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
+        self._problem, self._start, self._rise = problem, start, load.rise
+        self._kept: list[tuple[Array, DeformedBodies]] = []
+        self._taken: Array | None = None
+
+    def at(self, u: Array, *, tangent: bool = True) -> DeformedBodies:
+        """Return forces, energies, history variables and tangent of the bodies at u (n_dofs,) [length].
+
+        With ``tangent=False`` the tangent is not computed in advance, because it will probably not be needed.
+
+        Raises
+        ------
+        ConvergenceError
+            If a cell is inverted.
+        """
+        for known, bodies in self._kept:
+            if known is u:
+                return bodies
+        bodies = self._problem.deformed(u, self._start, self._rise, tangent=tangent)
+        self._kept = [*self._kept[-1:], (u, bodies)]
+        return bodies
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        bodies, force = self.at(u), np.zeros_like(u)
+        force[: bodies.force.size] = bodies.force.ravel()
+        return force, (bodies.energy, bodies.plastic_work)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+        """See `Term`."""
+        if geometric < WHOLE or u is self._taken:
+            return self._problem.deformed(u, self._start, self._rise, geometric=geometric).K
+        self._taken = u
+        return self.at(u).K
+
+    def commit(self, u: Array, state: State) -> State:
+        """See `Term`."""
+        return replace(state, history=self.at(u).history)
+
+
+class SpringForces(Term):
+    """Springs in a model with nonlinear bodies; `n` is the number of displacement components of the mesh."""
+
+    def __init__(self, springs: Sequence[Springs], n: int) -> None:
+        self._springs, self._n = springs, n
+        self._K = spring_stiffness(springs, n)
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force, of_points = np.zeros_like(u), u[: self._n]
+        force[: self._n] = spring_force(self._springs, of_points)
+        return force, (0.5 * float(force[: self._n] @ of_points), 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+        """See `Term`."""
+        return self._K
+
+
+class FollowingForce(Term):
+    """Force of a pressure that follows the deformed surface, in excess of the force that is a constant elsewhere.
+
+    The external forces of the step include the forces of a load on the undeformed surface. The linearised contact problem
+    includes those of a fluid between the contact surfaces at the displacements about which it was linearised. The term
+    therefore is this force minus the force at the current displacements.
+
+    Parameters
+    ----------
+    problem : Problem
+    force, stiffness : callable
+        Functions of the displacements (n_points, dim) [length], which return the nodal forces (n_points, dim) [force] and the
+        tangent (n_dofs, n_dofs) [force / length].
+    at : ndarray (n_dofs,)
+        Displacements for which the forces are included elsewhere [length].
+    factor : float
+        Load multiplier [-].
+    """
+
+    def __init__(
+        self, problem: Problem, force: Callable[[Array], Array], stiffness: Callable[[Array], csr_array], at: Array,
+        factor: float = 1.0,
+    ) -> None:  # fmt: skip
+        self._displacement, self._force, self._stiffness, self._factor = problem.displacement, force, stiffness, factor
+        self._before = force(problem.displacement(at))
+
+    def residual(self, u: Array) -> tuple[Array, Energies]:
+        """See `Term`."""
+        force, here = np.zeros_like(u), self._force(self._displacement(u))
+        force[: here.size] = -self._factor * (here - self._before).ravel()
+        return force, (0.0, 0.0)
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> csr_array:
+        """See `Term`."""
+        return self._factor * self._stiffness(self._displacement(u))
+
+
+class Terms:
+    """The sum of the terms of a load step.
+
+    Parameters
+    ----------
+    problem : Problem
+    start : State
+        State at the beginning of the step.
+    load : StepLoad
+
+    Attributes
+    ----------
+    bodies : Bodies, optional
+        The term of the nonlinear bodies; None if all bodies are linear.
+    """
+
+    def __init__(self, problem: Problem, start: State, load: StepLoad) -> None:
+        self.bodies = None if problem.bodies is None else Bodies(problem, start, load)
+        self._parts: list[Term] = [LinearBodies(problem.system.K)]
+        if self.bodies is not None:
+            springs, n = problem.model.springs, problem.model.n_dofs
+            self._parts = [self.bodies, *([SpringForces(springs, n)] if springs else [])]
+            for (pressure, _), factor in zip(problem.following, load.following, strict=True):
+                force, tangent = (lambda u, part=part, at=pressure.at: at(u)[part] for part in (0, 1))
+                self._parts.append(FollowingForce(problem, force, tangent, np.zeros_like(start.u), factor))
+
+    def residual(self, u: Array, more: Sequence[Term] = ()) -> tuple[Array, Energies]:
+        """Return the sums of the nodal forces and of the energies of all terms, including the terms `more`; see `Term`."""
+        force, energy = self._parts[0].residual(u)
+        for term in (*self._parts[1:], *more):
+            added, stored = term.residual(u)
+            force, energy = force + added, (energy[0] + stored[0], energy[1] + stored[1])
+        return force, energy
+
+    def tangent(self, u: Array, geometric: int = WHOLE) -> bsr_array:
+        """Return the sum of the tangents; see `Term`. It may only be called if the bodies are nonlinear."""
+        assert self.bodies is not None
+        K = self.bodies.tangent(u, geometric)
+        for term in self._parts[1:]:
+            if (more := term.tangent(u)) is not None:
+                K = sum_of_blocks(K, more)
+        return K
+
+    def commit(self, u: Array, state: State) -> State:
+        """See `Term`."""
+        for term in self._parts:
+            state = term.commit(u, state)
+        return state
+
+
+# A force is significant if it exceeds this multiple of the round-off of the internal forces in other rows.
+SIGNIFICANT = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """Forces at the end of a load step.
+
+    Attributes
+    ----------
+    reaction : ndarray (n_dofs of the mesh,)
+        Forces of supports, multi-point constraints and springs to the ground on the bodies [force].
+    largest : float
+        Largest force of all steps so far [force].
+    residual : float
+        Largest residual force. If it exceeds `bound`, the round-off of its row has been subtracted [force].
+    bound : float
+        Largest admissible residual force [force].
+    relative : float
+        Largest residual force relative to the largest force of this step; zero if all forces are round-off [-].
+    noise : float
+        Level of round-off: smaller forces are not significant [force].
+    energy : (float, float)
+        Strain energy, including that of springs, and plastic work since the beginning of the analysis [energy].
+    """
+
+    reaction: Array
+    largest: float
+    residual: float
+    bound: float
+    relative: float
+    noise: float = 0.0
+    energy: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def excess(self) -> float:
+        """Ratio of the residual to its bound [-]."""
+        return self.residual / self.bound if self.bound else float(np.inf if self.residual else 0.0)
+
+    @property
+    def wanting(self) -> float:
+        """Factor by which the accuracy of linear solutions should increase [-].
+
+        If the residual exceeds the level of round-off, and this level exceeds the bound, it is unknown whether there are
+        any significant forces at all, for example after bodies have separated. The factor then only brings the residual to
+        the level of round-off, which needs far less accuracy than the bound.
+        """
+        return self.residual / self.noise if self.residual > self.noise > self.bound else self.excess
+
+    def check(self, index: int, problem: Problem, history: Sequence[dict[str, Any]]) -> None:
+        """Raise a ConvergenceError for step `index` if the residual exceeds its bound."""
+        if self.residual <= self.bound:
+            return
+        more = f", or accept it with Criteria(relative={2 * self.relative:.0e})" if 2 * self.relative <= NOTABLE else ""
+        remedy = "use the direct solver" if problem.solver.iterative else (
+            "round-off allows no less if moduli or displacements differ by many orders of magnitude. Put a rigid obstacle "
+            f"in the place of a stiff body{more}"
+        )  # fmt: skip
+        raise ConvergenceError(
+            f"step {index}: the out-of-balance force {self.residual:.3g} stays above {self.bound:.3g} "
+            f"({problem.criteria.relative:g} of the largest force): {remedy}",
+            history,
+            smaller_steps_help=False,
+        )
+
+
+def balance(
+    problem: Problem, u: Array, contact_force: Array, external: Array, largest_so_far: float,
+    internal: tuple[Array, tuple[float, float]],
+) -> Balance:  # fmt: skip
+    """Return the reactions at supports, and the residual at all other degrees of freedom.
+
+    Parameters
+    ----------
+    problem : Problem
+    u : ndarray (n_dofs,)
+        Displacements [length].
+    contact_force, external : ndarray (n_dofs,)
+        Nodal forces of contact and of loads [force].
+    largest_so_far : float
+        Largest force of the earlier steps [force].
+    internal : (ndarray (n_dofs,), (float, float))
+        Nodal forces [force] and energies [energy] of all terms, see `Terms.residual`.
+    """
+    criteria, (force_of_terms, energy) = problem.criteria, internal
+    out = force_of_terms - contact_force
+    out -= external
+    reaction, residual = problem.system.balance(out)
+    forces = (reaction, contact_force, external)
+    force = max(largest(part) for part in forces)
+    largest_so_far = max(largest_so_far, force)
+    bound = max(criteria.relative * force, criteria.absolute or 0.0)
+    off, round_off, noise = residual, 0.0, 0.0
+    if not 0.0 < residual <= bound:
+        # In stiff parts with large displacements, the round-off of internal forces may exceed the forces in soft parts. If
+        # there are no forces, the relative residual is not defined, and the round-off of internal forces is the bound. Both
+        # cases need the row sums, which cost as much as a product with K.
+        row_sums = problem.system.K.row_sums(problem.accurate_to(u))
+        residual = problem.system.balance(out, SUM_ROUND_OFF * row_sums)[1]
+        round_off, noise = _round_off(problem, row_sums, forces, largest_so_far)
+    reaction = reaction[: problem.model.mesh.points.size]
+    if problem.model.springs:
+        reaction = reaction + ground_force(problem.model.springs, u[: len(reaction)])
+    return Balance(
+        reaction,
+        largest_so_far,
+        residual,
+        max(bound, round_off),
+        float(off / force) if force > round_off else 0.0,
+        noise,
+        energy,
+    )
+
+
+def _round_off(
+    problem: Problem, row_sums: Array, forces: tuple[Array, ...], largest_force: float
+) -> tuple[float, float]:
+    """Return a bound of the residual that is due to round-off, and the level of round-off.
+
+    Forces are significant if one of them exceeds the level of round-off, and if the round-off of its row is below the
+    criterion. The bound is then small, so that the round-off of stiff parts does not hide the residual of soft ones. If no
+    force is significant, the bound is the error of the internal forces.
+
+    Parameters
+    ----------
+    problem : Problem
+    row_sums : ndarray (n_dofs,)
+        ``abs(K) @ abs(u)`` [force].
+    forces : tuple of ndarray
+        Reactions, contact forces and external forces [force].
+    largest_force : float
+        Largest force of all steps so far [force].
+
+    Returns
+    -------
+    bound, level : float
+        [force].
+    """
+    slack = ROUND_OFF * largest_force
+    noise = max(slack, SIGNIFICANT * SUM_ROUND_OFF * largest(row_sums))
+    for part in map(np.abs, forces):
+        if ((part > noise) & (part * problem.criteria.relative > SUM_ROUND_OFF * row_sums)).any():
+            return slack, noise
+    return max(max(ROUND_OFF, 10 * problem.solver.tolerance) * largest(row_sums), slack), noise
+
+
+@dataclass(frozen=True, eq=False)
+class StepEquilibrium:
+    """The equilibrium at the end of a load step.
+
+    Attributes
+    ----------
+    settled : SettledContact, optional
+        The contact solution; None without contact.
+    u : ndarray (n_dofs,)
+        Displacements of all points, and then of the force-driven obstacles [length].
+    balance : Balance
+        Reactions and residual.
+    terms : Terms
+        Terms of the equilibrium.
+    newton : list of dict
+        Convergence data of each Newton iteration; empty if all bodies are linear.
+    """
+
+    settled: SettledContact | None
+    u: Array
+    balance: Balance
+    terms: Terms
+    newton: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def bodies(self) -> DeformedBodies | None:
+        """The nonlinear bodies at the displacements u; None if bodies are linear."""
+        return None if self.terms.bodies is None else self.terms.bodies.at(self.u)
+
+    @property
+    def history(self) -> list[dict[str, Any]]:
+        """Convergence data of each pairing of the contact surfaces."""
+        return self.settled.iterate.history if self.settled is not None else []
+
+    def counts(self, linear_iterations: int) -> dict[str, Any]:
+        """Return the numbers of iterations of the step, see `StepResult.iterations`.
+
+        For nonlinear bodies the history is that of Newton's method, and the numbers are sums over all Newton iterations.
+        """
+        history, scatter = self.history, None if self.settled is None else self.settled.scatter
+        counts: dict[str, Any] = {
+            "geometry_updates": max(len(history) - 1, 0),
+            "active_set_iterations": sum(entry["active_set_iterations"] for entry in history),
+            "linear_iterations": linear_iterations,
+            "history": history,
+            **({} if scatter is None else {"scatter": asdict(scatter)}),
+        }
+        if self.terms.bodies is None:
+            return counts
+        names = {"geometry_updates": "pairings", "active_set_iterations": "active_set_iterations"}
+        of_newton = {name: sum(entry[key] for entry in self.newton) for name, key in names.items()}
+        return {**counts, **of_newton, "history": self.newton}
+
+
+def with_loads(problem: Problem, load: StepLoad) -> Loaded:
+    """Return the prepared matrix of the problem with the right-hand side of a load."""
+    return problem.solver.load(problem.system.right(load.force, load.lift))
+
+
+def solve_displacements(
+    problem: Problem, load: StepLoad, loaded: Loaded, settled: SettledContact | None, guess: Array
+) -> tuple[Array, Array]:
+    """Return all displacements (n_dofs,) [length] and the nodal contact forces (n_dofs,) [force].
+
+    `settled` is the contact solution, None without contact. Iterative solvers then begin with the displacements `guess`
+    (n_dofs,) [length].
+    """
+    system, lift = problem.system, load.lift
+    if settled is None:
+        none = csr_array((0, len(lift))), np.empty(0)
+        v = loaded.solve(*none, guess=system.unknowns(guess, lift))[0]
+        return system.displacement(v, lift), np.zeros(len(lift))
+    contact_force, rigid = settled.force, settled.iterate.rigid
+    if problem.floating_bodies is not None and rigid is not None:
+        lift = lift + problem.floating_bodies.rigid(rigid.position)
+    v = loaded.full_solution(system.reduced(contact_force), settled.solution.u)
+    return system.displacement(v, lift), contact_force
