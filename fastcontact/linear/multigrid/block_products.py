@@ -72,30 +72,6 @@ def row_times_both_ways_plain(
     return tuple(np.einsum("kmn,kn->m", blocks, x.reshape(-1, m)[columns]))
 
 
-def add_row_transposed_plain(
-    indices: Any, numbers: tuple[Any, ...], begin: int, end: int, own: int, x: Any, y: Any, at: int,
-    rows: tuple[int, ...], cols: tuple[int, ...],
-) -> None:  # fmt: skip
-    """Add the product of the transposed blocks of a row and the row's part of a vector.
-
-    Parameters
-    ----------
-    indices, numbers, begin, end
-        As in `row_times_plain`, all of different columns.
-    own : int
-        Number of the block row.
-    x : ndarray (n_rows * m,)
-    y : ndarray, at : int
-        Changed in place; block column j begins at number ``at + j n``.
-    rows, cols : tuple
-        Tuples of m and n zeros: the size of a block.
-    """
-    m, n = len(rows), len(cols)
-    blocks = sum(part[begin * m * n : end * m * n].astype(x.dtype) for part in numbers).reshape(-1, m, n)
-    places = at + n * indices[begin:end, None].astype(np.intp) + np.arange(n)
-    y[places] += np.einsum("kmn,m->kn", blocks, x[own * m : (own + 1) * m])
-
-
 def add_product_plain(
     to: Any, at: int, left: tuple[Any, ...], first: int, right: Any, second: int, sizes: Sizes
 ) -> None:
@@ -133,6 +109,5 @@ def _kernel(written: Any, plain: Any) -> Any:
 
 row_times = _kernel(block_products_llvm.row_times, row_times_plain)
 row_times_both_ways = _kernel(block_products_llvm.row_times_both_ways, row_times_both_ways_plain)
-add_row_transposed = _kernel(block_products_llvm.add_row_transposed, add_row_transposed_plain)
 add_product = _kernel(block_products_llvm.add_product, add_product_plain)
 add_transposed = _kernel(block_products_llvm.add_transposed, add_transposed_plain)

@@ -55,47 +55,6 @@ def _all_blocks(row: _Row, signature: Any, args: Any) -> Any:
     return row.context.make_tuple(row.builder, signature.return_type, row.sums())
 
 
-def add_row_transposed(
-    _context: Any,
-    indices: Any,
-    numbers: Any,
-    begin: Any,
-    end: Any,
-    own: Any,
-    x: Any,
-    y: Any,
-    at: Any,
-    rows: Any,
-    cols: Any,
-) -> Any:
-    """Return the signature and the code generator of `block_products.add_row_transposed`."""
-    from numba.core import types
-
-    def code(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        from numba.core import cgutils
-
-        write, m, n = _Writer(context, builder, x.dtype), len(rows), len(cols)
-        offset, step = args[2].type, args[2].type(1)
-        indices, vector, into = (write.start(signature.args[k], args[k]) for k in (0, 5, 6))
-        data, place = write.starts(signature.args[1], args[1]), builder.mul(args[4], offset(m))
-        own = [write.numbers([vector], place, r, 1) for r in range(m)]
-        with cgutils.for_range_slice(builder, args[2], args[3], step, offset, inc=True) as (k, _):
-            column = builder.load(builder.gep(indices, [k]))
-            column = column if column.type == offset else builder.sext(column, offset)
-            j, block = builder.add(args[7], builder.mul(column, offset(n))), builder.mul(k, offset(m * n))
-            for piece in _pieces(n):
-                total = write.zeros(piece.width)
-                for r in range(m):
-                    numbers = write.numbers(data, block, r * n + piece.column, piece.width)
-                    total = write.plus(total, numbers, write.everywhere(own[r], piece.width))
-                write.add(into, j, piece.column, piece.width, total)
-        return context.get_dummy_value()
-
-    return types.none(
-        indices, numbers, types.intp, types.intp, types.intp, x, y, types.intp, rows, cols
-    ), code  # fmt: skip
-
-
 def add_product(_context: Any, to: Any, at: Any, left: Any, first: Any, right: Any, second: Any, sizes: Any) -> Any:
     """Return the signature and the code generator of `block_products.add_product`."""
     return _added(lambda r, t, _m, k: r * k + t, to, left, right, sizes)

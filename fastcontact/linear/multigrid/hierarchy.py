@@ -25,7 +25,6 @@ from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import COARSEST, Coarse
 from fastcontact.linear.multigrid.level import Level
 from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointers, widest_row
-from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 
@@ -59,8 +58,7 @@ class Hierarchy:
             coarser = self._coarsened(A, level, modes) if level.n > COARSEST else None
             if coarser is None:
                 break
-            level.P, A, modes = coarser
-            level.R = Restriction(level.P)
+            level.P, level.R, A, modes = coarser
             del coarser
         self.coarse = Coarse(A.to_scipy().tocsc())
         self._free_bounds = [level.bound for level in self.levels]
@@ -95,8 +93,10 @@ class Hierarchy:
             level.bound = SAFETY * largest_eigenvalue(level)
         return level
 
-    def _coarsened(self, A: BlockMatrix, level: Level, modes: Array) -> tuple[BlockMatrix, BlockMatrix, Array] | None:
-        """Return the prolongator, the coarse matrix and its rigid-body modes; None if aggregation stagnates (STAGNANT)."""
+    def _coarsened(
+        self, A: BlockMatrix, level: Level, modes: Array
+    ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
+        """Return the prolongator, its transpose, the coarse matrix and its rigid-body modes; None if aggregation stagnates."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 
@@ -136,7 +136,8 @@ class Hierarchy:
         )  # fmt: skip
         del tentative
         P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
-        return P, product(A, P, by_columns(P, n_coarse)), coarse_modes
+        index = by_columns(P, n_coarse)
+        return P, transposed(P, index), product(A, P, index), coarse_modes
 
     def __repr__(self) -> str:
         sizes = " -> ".join(str(level.n) for level in self.levels)
@@ -228,6 +229,12 @@ def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
     numbers = np.arange(len(P.indices), dtype=np.int32)
     columns = csr_matrix((numbers, P.indices, P.indptr), shape=(len(P.indptr) - 1, n)).tocsc()
     return columns.indptr, columns.indices, columns.data
+
+
+def transposed(P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:
+    """Return the transpose of P; `index` is ``by_columns(P, n)``."""
+    blocks = P.data.reshape(-1, len(P.rows), len(P.cols))[index[2]].transpose(0, 2, 1)
+    return BlockMatrix(*index[:2], blocks.ravel(), P.cols, P.rows)
 
 
 def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbers]) -> BlockMatrix:

@@ -11,7 +11,6 @@ from fastcontact.arrays import AnyArray
 from fastcontact.linear.elimination.elimination import Elimination
 from fastcontact.linear.multigrid import cycle_kernels
 from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix
-from fastcontact.linear.multigrid.restriction import Restriction
 from fastcontact.linear.multigrid.stiffened_nodes import FreeMotions
 from fastcontact.linear.springs import Springs
 
@@ -30,7 +29,7 @@ class Level:
         Upper bound of the eigenvalues of ``D^-1 A`` [-].
     P : BlockMatrix or None
         Prolongator from the next coarser level; None on the coarsest level.
-    R : Restriction or None
+    R : BlockMatrix or None
         The transpose of P.
     eliminated : Elimination or None
         Eliminated equations, only on the finest level. The weights are stored in the precision of the cycle.
@@ -53,7 +52,7 @@ class Level:
     inverse: AnyArray
     bound: float
     P: BlockMatrix | None = None
-    R: Restriction | None = None
+    R: BlockMatrix | None = None
     eliminated: Elimination | None = None
     change: tuple[AnyArray, ...] | None = None
     springs: Springs | None = None

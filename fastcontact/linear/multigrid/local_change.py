@@ -52,9 +52,7 @@ class LocalChange:
 
     def coarser(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
-        rows = block_rows(P, self.nodes, (int(P.indices.max()) + 1) * len(P.cols))
-        coarse_nodes, columns = np.unique(rows.indices, return_inverse=True)
-        rows = bsr_array((rows.data, columns, rows.indptr), shape=(rows.shape[0], len(coarse_nodes) * len(P.cols)))
+        coarse_nodes, rows = restriction(P, self.nodes)
         product = bsr_array(rows.T @ self.blocks @ rows)
         product.sort_indices()
         return LocalChange(coarse_nodes, product)
@@ -85,11 +83,12 @@ def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
     return change
 
 
-def block_rows(A: BlockMatrix, nodes: Indices, n: int) -> bsr_array:
-    """Return the block rows `nodes` (k,) of a matrix A with n columns, in double precision."""
-    rows, cols = len(A.rows), len(A.cols)
-    count = np.diff(A.indptr)[nodes]
+def restriction(P: BlockMatrix, nodes: Indices) -> tuple[Indices, bsr_array]:
+    """Return the coarse nodes (l,) that a prolongator P connects with `nodes` (k,), and P between them, in double precision."""
+    rows, cols = len(P.rows), len(P.cols)
+    count = np.diff(P.indptr)[nodes]
     indptr = np.concatenate([[0], np.cumsum(count)])
-    blocks = np.repeat(A.indptr[nodes] - indptr[:-1], count) + np.arange(indptr[-1])
-    data = sum(values.reshape(-1, rows, cols)[blocks].astype(float) for values in A.exact)
-    return bsr_array((data, A.indices[blocks], indptr), shape=(len(nodes) * rows, n))
+    blocks = np.repeat(P.indptr[nodes] - indptr[:-1], count) + np.arange(indptr[-1])
+    coarse_nodes, columns = np.unique(P.indices[blocks], return_inverse=True)
+    data = P.data.reshape(-1, rows, cols)[blocks].astype(float)
+    return coarse_nodes, bsr_array((data, columns, indptr), shape=(len(nodes) * rows, len(coarse_nodes) * cols))

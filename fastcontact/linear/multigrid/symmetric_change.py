@@ -13,11 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import bsr_array, csc_array, csr_array
 
-from fastcontact._jit.parallel import spread
-from fastcontact.arrays import Array, Indices, Numbers
-from fastcontact.linear.multigrid import symmetric_change_kernels
-from fastcontact.linear.multigrid.local_change import LocalChange
-from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointers
+from fastcontact.arrays import Indices
+from fastcontact.linear.multigrid.local_change import LocalChange, restriction
+from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.sparse_rows import scaled
 from fastcontact.linear.springs import Springs
 
@@ -43,9 +41,7 @@ class SymmetricChange:
         m = len(pivots)
         D = csr_array(weights + csr_array((np.full(m, -1.0), pivots, np.arange(m + 1)), shape=weights.shape))
         rows = A.rows_of(pivots)
-        G = csr_array(rows + 0.5 * (rows[:, pivots] @ D))
-        pattern = G.indices.astype(np.int32), G.indptr.astype(np.int32)
-        return cls(D, csr_array((G.data, *pattern), shape=G.shape), len(A.rows))
+        return cls(D, csr_array(rows + 0.5 * (rows[:, pivots] @ D)), len(A.rows))
 
     @classmethod
     def of_springs(cls, springs: Springs, size: int) -> SymmetricChange:
@@ -54,15 +50,20 @@ class SymmetricChange:
 
     def diagonal(self) -> LocalChange:
         """Return the diagonal blocks of the change."""
-        D, G, size = self.D, self.G, self.size
-        nodes = np.unique(D.indices // size)
-        row_of_node = np.full(D.shape[1] // size, -1, np.int32)
-        row_of_node[nodes] = np.arange(len(nodes))
-        blocks = np.zeros(len(nodes) * size * size)
-        symmetric_change_kernels.diagonal(
-            D.indptr, D.indices, D.data, G.indptr, G.indices, G.data, row_of_node, size, blocks
-        )
-        return LocalChange.of_diagonal(nodes, blocks.reshape(-1, size, size))
+        D, G = (rows.tobsr((1, self.size)) for rows in (self.D, self.G))
+        of_D, of_G = (self._numbers(rows) for rows in (D, G))
+        _, one, other = np.intersect1d(of_D, of_G, return_indices=True)
+        half = np.einsum("ka,kb->kab", D.data[one, 0], G.data[other, 0])
+        nodes, slot = np.unique(D.indices, return_inverse=True)
+        blocks = np.zeros((len(nodes), self.size, self.size))
+        np.add.at(blocks, slot[one], half + half.transpose(0, 2, 1))
+        return LocalChange.of_diagonal(nodes, blocks)
+
+    @staticmethod
+    def _numbers(rows: bsr_array) -> Indices:
+        """Return a number for each stored block of `rows` (m, n), by its row and its column."""
+        row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
+        return np.asarray(row * rows.shape[1] + rows.indices, np.intp)
 
     def on_finest(self) -> csc_array:
         """Return the change as a matrix (n, n)."""
@@ -71,63 +72,11 @@ class SymmetricChange:
 
     def on_coarse(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T (D.T G + G.T D) P`` with the prolongator P."""
-        E, H = _restricted(self.D, P), _restricted(self.G, P)
-        return _symmetric_product(E, H, P.cols)
-
-
-@dataclass(frozen=True, eq=False)
-class _Restricted:
-    """Sparse rows whose entries come in blocks of the unknowns of coarse nodes.
-
-    Attributes
-    ----------
-    indptr : ndarray of int (m + 1,)
-        Offsets of the rows.
-    nodes : ndarray of int (n_blocks,)
-        Coarse node of each block.
-    numbers : ndarray (n_blocks * size,)
-        Entries of the blocks, for `size` unknowns per coarse node.
-    """
-
-    indptr: Numbers
-    nodes: Numbers
-    numbers: Array
-
-
-def _restricted(rows: csr_array, P: BlockMatrix) -> _Restricted:
-    """Return the product ``rows @ P`` of rows (m, n) and the prolongator."""
-    size, n_coarse, count = len(P.rows), int(P.indices.max()) + 1, np.empty(rows.shape[0], np.int32)
-    through = P.indptr, P.indices
-    spread(
-        symmetric_change_kernels.count_restricted, len(count), WORK_OF_ROW, rows.indptr, rows.indices, *through, size,
-        n_coarse, count,
-    )  # fmt: skip
-    into = pointers(count)
-    nodes, numbers = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * len(P.cols))
-    spread(
-        symmetric_change_kernels.restrict, len(count), WORK_OF_ROW, rows.indptr, rows.indices, rows.data, *through, P.data,
-        size, n_coarse, into, nodes, numbers, P.cols,
-    )  # fmt: skip
-    return _Restricted(into, nodes, numbers)
-
-
-def _symmetric_product(E: _Restricted, H: _Restricted, cols: tuple[int, ...]) -> LocalChange:
-    """Return ``E.T H + H.T E`` as a change of the coarse matrix; `cols` is a tuple of the number of unknowns per node."""
-    nodes = np.unique(np.concatenate([E.nodes, H.nodes]))
-    row_of_node = np.empty(nodes[-1] + 1, np.int32)
-    row_of_node[nodes] = np.arange(len(nodes))
-    k, size, slots = len(nodes), len(cols), np.arange(len(E.nodes), dtype=np.int32)
-    by_column = csr_array((slots, row_of_node[E.nodes], E.indptr), shape=(len(E.indptr) - 1, k)).tocsc()
-    rows, pattern = (by_column.indptr, by_column.indices), (H.indptr, row_of_node[H.nodes])
-    count = np.empty(k, np.int32)
-    spread(symmetric_change_kernels.count_products, k, WORK_OF_ROW, *rows, *pattern, k, count)
-    into = pointers(count)
-    columns, blocks = np.empty(into[-1], np.int32), np.zeros(int(into[-1]) * size * size)
-    spread(
-        symmetric_change_kernels.products, k, WORK_OF_ROW, *rows, by_column.data, E.numbers, *pattern, H.numbers, k, into,
-        columns, blocks, cols,
-    )  # fmt: skip
-    half = bsr_array((blocks.reshape(-1, size, size), columns, into), shape=(k * size, k * size))
-    total = bsr_array(half + half.T)
-    total.sort_indices()
-    return LocalChange(nodes, total)
+        nodes = np.unique(np.concatenate([self.D.indices, self.G.indices]) // self.size)
+        coarse_nodes, R = restriction(P, nodes)
+        dofs = (nodes[:, None] * self.size + np.arange(self.size)).ravel()
+        E, H = (rows[:, dofs].tobsr((1, self.size)) @ R for rows in (self.D, self.G))
+        half = bsr_array(E.T @ H)
+        total = bsr_array(half + half.T)
+        total.sort_indices()
+        return LocalChange(coarse_nodes, total)

@@ -23,11 +23,6 @@ def row_times_both_ways(indices, numbers, x, begin, end, own, factor, y, rows):
 
 
 @kernel
-def add_row_transposed(indices, numbers, begin, end, own, x, y, at, rows, cols):
-    block_products.add_row_transposed(indices, numbers, begin, end, own, x, y, at, rows, cols)
-
-
-@kernel
 def add_product(to, at, left, first, right, second, sizes):
     block_products.add_product(to, at, left, first, right, second, sizes)
 
@@ -94,29 +89,6 @@ def test_a_row_and_its_transpose_times_a_vector(m, precision, split):
             "kmn,m->kn", blocks, -0.75 * x.astype(float)[own * m : (own + 1) * m]
         )
         np.testing.assert_allclose(found, exact, rtol=0, atol=bound)
-
-
-@pytest.mark.parametrize("precision", [np.float32, np.float64])
-@pytest.mark.parametrize(("m", "n"), SIZES)
-def test_a_transposed_row_times_its_part_of_a_vector(m, n, precision):
-    rng, rows, cols = np.random.default_rng(m + 10 * n), (0,) * m, (0,) * n
-    indices = (20 + rng.permutation(9)).astype(np.int32)
-    x, y = rng.normal(size=4 * m).astype(precision), rng.normal(size=9 * n + 2).astype(precision)
-    numbers = rng.normal(size=9 * m * n).astype(precision)
-    at = 1 - 20 * n  # columns 20 to 28 lie in y behind its first number
-    for begin, end in ((0, 9), (8, 9), (3, 7), (4, 4)):
-        given = (surrounded(numbers, begin * m * n, end * m * n),)
-        places = 1 + n * (indices[begin:end, None] - 20) + np.arange(n)
-        into = np.full(len(y), np.nan, precision)
-        into[places] = y[places]
-        found, expected, exact = into.copy(), into.copy(), into.astype(float)
-        met = surrounded(x, 2 * m, 3 * m)
-        add_row_transposed(indices, given, begin, end, 2, met, found, at, rows, cols)
-        block_products.add_row_transposed_plain(indices, given, begin, end, 2, met, expected, at, rows, cols)
-        blocks = numbers.astype(float).reshape(9, m, n)[begin:end]
-        exact[places] += np.einsum("kmn,m->kn", blocks, x.astype(float)[2 * m : 3 * m])
-        for other in (expected, exact):
-            np.testing.assert_allclose(found, other, rtol=0, atol=np.finfo(precision).eps * 30 * m)
 
 
 @pytest.mark.parametrize("split", [False, True])

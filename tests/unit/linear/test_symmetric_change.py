@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.sparse import bsr_array, csr_array
 
-from fastcontact._jit import parallel
-from fastcontact._jit.decorators import set_threads, threads
 from fastcontact.linear.elimination.elimination import Elimination
+from fastcontact.linear.multigrid.hierarchy import by_columns, transposed
 from fastcontact.linear.multigrid.matrix import BlockMatrix
 from fastcontact.linear.multigrid.symmetric_change import SymmetricChange
 from fastcontact.linear.sparse_rows import scaled, taken
@@ -84,16 +83,14 @@ def test_changes_on_the_finest_and_the_next_coarser_level(size, width, number):
     assert not expected.reshape(N_NODES, size, N_NODES, size)[beyond, :, beyond].any()
 
 
-def test_coarse_changes_have_the_same_bits_for_any_number_of_threads(monkeypatch):
-    monkeypatch.setattr(parallel, "WORTHWHILE", 100)
-    before, found = threads(), []
-    for count in (1, 2):
-        set_threads(count)
-        rng = np.random.default_rng(1)
-        (change, _), _ = changes(3, rng)
-        found.append(change.on_coarse(prolongator(3, 6, rng)[0]).blocks.data)
-    set_threads(before)
-    assert np.array_equal(*found)
+@pytest.mark.parametrize(("size", "width"), [(3, 6), (2, 3), (6, 6)])
+def test_products_with_the_transpose_of_a_prolongator(size, width):
+    rng = np.random.default_rng(width)
+    P, dense = prolongator(size, width, rng)
+    x, y = rng.normal(size=N_NODES * size).astype(np.float32), np.full(N_COARSE * width, np.nan, np.float32)
+    transposed(P, by_columns(P, N_COARSE)).multiply(x, y)
+    bound = np.finfo(np.float32).eps * N_NODES * (np.abs(dense.T) @ np.abs(x))
+    assert (np.abs(y - dense.T @ x) <= bound).all()
 
 
 def test_rows_scaled_and_taken():
