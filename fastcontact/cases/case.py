@@ -11,11 +11,10 @@ from fastcontact import analytic
 from fastcontact._tools import toml_text
 from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.cases.case_files import case_path, files_named, shipped_cases
 from fastcontact.cases.checks import CHECK, Check, read_check
-from fastcontact.cases.input_files import files_named
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
-from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.linear.protocol import TOLERANCE

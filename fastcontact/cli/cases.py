@@ -22,7 +22,7 @@ ARGUMENTS: Arguments = {
 
 def run(options: argparse.Namespace) -> int:
     """List the ready-made cases, or print or copy one of them."""
-    from fastcontact.cases.shipped import shipped_case, shipped_cases
+    from fastcontact.cases.case_files import shipped_case, shipped_cases
 
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")

@@ -8,8 +8,7 @@ from functools import partial
 
 from fastcontact.cli import _study
 from fastcontact.cli._arguments import Arguments
-from fastcontact.cli._terminal import somebody_watches
-from fastcontact.cli._warnings import warnings_shown
+from fastcontact.cli._terminal import somebody_watches, warnings_shown
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error and mesh error"

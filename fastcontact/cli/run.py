@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
-from fastcontact.cli._terminal import say, somebody_watches
-from fastcontact.cli._warnings import warnings_shown
+from fastcontact.cli._terminal import say, somebody_watches, warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     """Solve the case, write the files of the options and print the summary."""
     from fastcontact.cases import summary
     from fastcontact.cases.case import files_of_case, read_case
-    from fastcontact.cases.shipped import case_path
+    from fastcontact.cases.case_files import case_path
 
     started = time.perf_counter()
     if options.threads is not None:

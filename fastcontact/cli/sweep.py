@@ -54,7 +54,7 @@ def values(text: str) -> tuple[str, list[Any]]:
 
 
 def _range(text: str, fields: list[str]) -> list[float]:
-    from fastcontact.studies.affordable import check_runs
+    from fastcontact.studies.checks import check_runs
 
     logarithmic = fields[-1] == "log"
     try:

@@ -33,9 +33,8 @@ from fastcontact.results import journal, layout, write_arrays
 from fastcontact.results.background import Background
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
-from fastcontact.results.reader import Results
+from fastcontact.results.reader import Results, StoredSteps
 from fastcontact.results.step import StepResult
-from fastcontact.results.stored_steps import StoredSteps
 from fastcontact.results.texts import read_text
 
 # Time after which each step is synchronised with the disk [s]; a shorter run is quickly repeated after a power loss.

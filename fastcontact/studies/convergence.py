@@ -14,7 +14,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, read_case
 from fastcontact.errors import CaseError, check_known, warn
 from fastcontact.studies import function_runs as functions
-from fastcontact.studies.affordable import check_levels, check_runs
+from fastcontact.studies.checks import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.fit import Limit, fit_limit

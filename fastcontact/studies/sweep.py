@@ -15,18 +15,17 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, described, read_case
 from fastcontact.errors import CaseError, FastcontactError
 from fastcontact.studies import function_runs as functions
-from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.checks import check_runs
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.quantities import check_names, of_theory
 from fastcontact.studies.report import of_case
+from fastcontact.studies.series import Point, TheoryCurve, Value
 from fastcontact.studies.settings import data_of, one_combination, settings
-from fastcontact.studies.sweep_figures import label_of
-from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
-from fastcontact.studies.sweep_report import Sweep
+from fastcontact.studies.sweep_report import Sweep, label_of
 
 # Default refinement level of the meshes, on which mesh errors are smaller than the trends of interest.
 LEVEL = 2

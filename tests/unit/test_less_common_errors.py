@@ -18,10 +18,11 @@ from fastcontact._tools import paths
 from fastcontact._tools.argument_types import check_type, fits, words
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
-from fastcontact.cli._executor import _failing_threads_interrupt
+from fastcontact.cli._study import _failing_threads_interrupt
 from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
-from fastcontact.studies import affordable, execute
+from fastcontact.studies import checks as affordable
+from fastcontact.studies import execute
 from fastcontact.studies.levels import _default_element
 
 SQUARE = fc.generate.block()

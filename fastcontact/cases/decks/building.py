@@ -18,7 +18,7 @@ from fastcontact.cases.decks.content import Content, Material, Pair, Section, St
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.histories import ByShape, Histories
-from fastcontact.cases.decks.initial_stresses import add_initial_stresses
+from fastcontact.cases.decks.initial_fields import add_initial_stresses, add_temperatures
 from fastcontact.cases.decks.interactions import (
     cohesion_of,
     conductance_of,
@@ -33,7 +33,6 @@ from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.cases.decks.targets import Target
-from fastcontact.cases.decks.temperatures import add_temperatures
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint

@@ -10,12 +10,12 @@ from fastcontact.cases.decks.blocks import Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
 from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.initial_fields import give as give_temperatures
+from fastcontact.cases.decks.initial_fields import initial_temperatures
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
 from fastcontact.cases.decks.targets import Target, targets
-from fastcontact.cases.decks.temperatures import give as give_temperatures
-from fastcontact.cases.decks.temperatures import initial_temperatures
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}

@@ -14,8 +14,7 @@ from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.recovery import von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, unknown
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import contact_slip
-from fastcontact.results.separated import cells_by_element, separated
+from fastcontact.results.layout import cells_by_element, contact_slip, separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import valued

@@ -12,8 +12,7 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli import _study, main, sweep
-from fastcontact.studies.execute import Progress
-from fastcontact.studies.progress import Runs, reporting
+from fastcontact.studies.execute import Progress, Runs, reporting
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from fastcontact.cases.case import read_case
 from fastcontact.studies import job
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.levels import recipe
-from fastcontact.studies.render.table import percent
+from fastcontact.studies.render import percent
 from fastcontact.studies.settings import Combination, combinations, settings
 
 
