@@ -76,7 +76,8 @@ SCHEMA = 4
 # Oldest version that can be resumed.
 RESUMABLE = 2
 
-# Point data by name, with the number of components that viewers expect. Stress is a symmetric tensor.
+# Point data by name, with the number of components that viewers expect: 3 for vectors and 6 for symmetric tensors, of which
+# plane models have 2 and 4.
 POINT_FIELDS = {
     "displacement": 3,
     "stress": 6,
@@ -232,10 +233,16 @@ def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
     return slip
 
 
+def step_shapes(mesh: Mesh) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each nodal array of a `StepResult`, by name."""
+    tails = {1: (), 3: (mesh.dim,), 6: (4 if mesh.dim == 2 else 6,)}  # type: dict[int, tuple[int, ...]]
+    widths = {**POINT_FIELDS, **HEAT_FIELDS}.items()
+    return {name: (mesh.n_points, *tails[width]) for name, width in widths if not name.startswith("contact_")}
+
+
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
-    values = {name: getattr(step, name) for name in POINT_FIELDS if not name.startswith("contact_")}
-    values |= {name: getattr(step, name) for name in HEAT_FIELDS if getattr(step, name) is not None}
+    values = {name: getattr(step, name) for name in step_shapes(mesh) if getattr(step, name) is not None}
     values["contact_pressure"] = contact_pressure(mesh, step)
     values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
     return {
@@ -285,9 +292,7 @@ def _flags(members: dict[str, AnyArray], count: int) -> dict[str, Flags]:
 
 def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None:
     """Raise FileError if an array of a step does not match the mesh, or a declared cell field is missing."""
-    n, dim = mesh.n_points, mesh.dim
-    expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
-    for name, shape in {**expected, **dict.fromkeys(("von_mises", "von_mises_signed", *HEAT_FIELDS), (n,))}.items():
+    for name, shape in step_shapes(mesh).items():
         field = getattr(step, name)
         if field is None and name in HEAT_FIELDS:
             continue

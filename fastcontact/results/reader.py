@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,7 +115,7 @@ class Results(StepSequence):
         try:
             writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
-                self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
+                self._raw = journal.Repeated(self._raw, writes)
             with self._explained():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked())
@@ -196,9 +194,7 @@ class Results(StepSequence):
     def __enter__(self) -> Results:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -296,15 +292,10 @@ class Results(StepSequence):
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
         with self._explained():
-            notes = self._notes(number)
+            notes, known = self._notes(number), self.point_field_names
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
-                displacement=self._field("displacement", number, self.mesh.dim),
-                stress=self._field("stress", number, 4 if self.mesh.dim == 2 else 6),
-                von_mises=self._field("von_mises", number),
-                von_mises_signed=self._field("von_mises_signed", number),
-                reaction=self._field("reaction", number, self.mesh.dim),
                 contact=self._contact(number, dict(notes["contact"])),
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
@@ -312,7 +303,7 @@ class Results(StepSequence):
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
                 units=self.units,
-                **{name: self._field(name, number) for name in layout.HEAT_FIELDS if name in self.point_field_names},
+                **{k: self._field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in known},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -363,11 +354,11 @@ class Results(StepSequence):
                 raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return fields
 
-    def _field(self, name: str, number: int, width: int | None = None) -> Array:
+    def _field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
         n = self.mesh.n_points
-        data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
-        values = data[rows] if width is None else data[rows, :width]
-        if values.shape != ((n,) if width is None else (n, width)) or values.dtype.kind != "f":
+        rows = slice(number * n, (number + 1) * n)
+        values = self._file["VTKHDF/PointData"][name][(rows, *map(slice, shape[1:]))]
+        if values.shape != shape or values.dtype.kind != "f":
             raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return values
 

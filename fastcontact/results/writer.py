@@ -15,9 +15,8 @@ import os
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -30,7 +29,6 @@ from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import journal, layout, write_arrays
-from fastcontact.results.background import Background
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
 from fastcontact.results.reader import Results, StoredSteps
@@ -137,7 +135,8 @@ class ResultWriter:
         self._file: Any = None
         self._committed: Any = None
         self._closed = self._ended = False
-        self._background = Background() if background else None
+        self._background = ThreadPoolExecutor(1, "fastcontact-writer") if background else None
+        self._writing: Future[None] | None = None
         self._turn = threading.RLock()
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # notes of the next step: the case file, if another one is resumed
@@ -166,9 +165,7 @@ class ResultWriter:
     def __enter__(self) -> ResultWriter:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.close()
             return
@@ -211,7 +208,7 @@ class ResultWriter:
             if self._background is None:
                 self._append(step)
             else:
-                self._background.start(partial(self._append, copy.deepcopy(step)))
+                self._writing = self._background.submit(self._append, copy.deepcopy(step))
 
     def wait(self) -> None:
         """Wait until all steps given to `write` are complete.
@@ -222,8 +219,10 @@ class ResultWriter:
             If the disk was full or failed.
         """
         if self._background is not None:
-            with self._turn:
-                self._background.wait()
+            with self._turn, uninterrupted():
+                writing, self._writing = self._writing, None
+                if writing is not None:
+                    writing.result()
 
     def _append(self, step: StepResult) -> None:
         with self._explained(f"written at step {step.index}"):
@@ -279,34 +278,24 @@ class ResultWriter:
         self._finish({"log": log, "warnings": [str(warning) for warning in warnings]})
 
     def _finish(self, run: dict[str, Any]) -> None:
-        with self._turn:
-            if not self._closed:
-                self._finish_once(run)
-
-    def _finish_once(self, run: dict[str, Any]) -> None:
-        if self._file is None and self._ended and "error" not in run:
-            self._give_up()  # a complete file is not changed
-            return
-        self._release_done()
-        try:
-            with self._explained("closed"):
-                self._open()
-                try:
-                    self._check_ours()
-                    if self._committed.writable:
-                        self._reserve(len(write_arrays.as_json(run)))
-                        write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
-                finally:
-                    try:
-                        self._file.close()
-                    finally:
-                        self._committed.close()
-        finally:
-            self._file = None
-            self._give_up()
+        with self._turn, contextlib.ExitStack() as closing:
+            closing.callback(self._give_up)
+            if self._closed or (self._file is None and self._ended and "error" not in run):
+                return  # a complete file is not changed
+            self._release_done()
+            closing.enter_context(self._explained("closed"))
+            self._open()
+            closing.callback(self._committed.close)
+            closing.callback(self._file.close)
+            self._check_ours()
+            if self._committed.writable:
+                self._reserve(len(write_arrays.as_json(run)))
+                write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
 
     def _give_up(self) -> None:
-        self._closed = True
+        self._closed, self._file = True, None
+        if self._background is not None:
+            self._background.shutdown(wait=False)
         self._release_done()
         self._lock.release()
 
