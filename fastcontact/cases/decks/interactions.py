@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, defined, refusing, registered
-from fastcontact.cases.decks.content import Content, Interaction
+from fastcontact.cases.decks.content import Content, Interaction, Step
 from fastcontact.cases.decks.histories import JUMP
 from fastcontact.contact.cohesion import ELASTIC
 from fastcontact.contact.conductance import Conductance
@@ -35,7 +35,7 @@ def interaction(content: Content, block: Block) -> Interaction:
     return properties
 
 
-def changed_interaction(content: Content, block: Block) -> Interaction:
+def changed_interaction(content: Content, step: Step, block: Block) -> Interaction:
     """Read *CHANGE FRICTION; a *FRICTION below it sets the friction from the start of the current step."""
     name = block.required("INTERACTION")
     before = defined("surface interaction", name, content.interactions, block)

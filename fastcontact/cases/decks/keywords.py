@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from fastcontact.cases.decks import (
     connections,
@@ -13,12 +13,12 @@ from fastcontact.cases.decks import (
     gaps,
     geometry,
     heat,
+    initial_fields,
     interactions,
     local_axes,
     materials,
     pretension,
     stepping,
-    temperatures,
 )
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
@@ -31,14 +31,16 @@ ANYTHING = "*"
 class Keyword:
     """Properties of a keyword.
 
-    `place` is the context of the keyword and `read` the function that reads it, None for keywords that `Reader` handles.
-    `used` and `harmless` list the parameters that have an effect and those that are accepted without effect.
+    `place` is the context of the keyword and `read` the function that reads it. `used` and `harmless` list the parameters
+    that have an effect and those that are accepted without effect. `opens` is the attribute of `Reader` that `read` returns:
+    the object to which the next keywords belong, or None at its end.
     """
 
-    place: Literal["deck", "part", "material", "interaction", "model", "step", "procedure"]
-    read: Callable[..., None] | None = None
+    place: Literal["deck", "part", "material", "interaction", "coupling", "property", "model", "step", "procedure"]
+    read: Callable[..., Any]
     used: str = ""
     harmless: str = ""
+    opens: str = ""
 
     @property
     def parameters(self) -> set[str]:
@@ -46,21 +48,41 @@ class Keyword:
         return {*self.used.split("; "), *self.harmless.split("; ")} - {""}
 
 
+def heading(content: Content, block: Block) -> None:
+    """Read *HEADING: the title, of which the first line is used."""
+    content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
+
+
+def end(content: Content, block: Block) -> None:
+    """Read the end of a part, an instance or the assembly."""
+
+
 # Parameters that control the solution of steps.
 STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
 # Supported keywords.
 TRANSLATED = {
-    # Keywords that methods of `Reader` handle.
-    **dict.fromkeys(("ASSEMBLY", "MATERIAL", "PART", "SURFACE INTERACTION"), Keyword("deck", None, "NAME")),
-    **dict.fromkeys(("END ASSEMBLY", "END INSTANCE", "END PART", "END STEP"), Keyword("deck")),
-    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("deck")),
-    "CHANGE FRICTION": Keyword("deck", None, "INTERACTION"),
-    "COUPLING": Keyword("deck", None, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
-    "HEADING": Keyword("deck", None, ANYTHING),
-    "INSTANCE": Keyword("deck", None, "NAME; PART"),
-    "STEP": Keyword(
-        "deck", None, "NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
+    # Keywords that open or close an object to which others belong.
+    "ASSEMBLY": Keyword("deck", end, "NAME", opens="part"),
+    **dict.fromkeys(("END ASSEMBLY", "END PART"), Keyword("deck", end, opens="part")),
+    "END INSTANCE": Keyword("deck", end, opens="instance"),
+    "PART": Keyword("deck", geometry.new_part, "NAME", opens="part"),
+    "INSTANCE": Keyword("deck", geometry.instance, "NAME; PART", opens="instance"),
+    "MATERIAL": Keyword("property", materials.material, "NAME", opens="material"),
+    "SURFACE INTERACTION": Keyword("property", interactions.interaction, "NAME", opens="interaction"),
+    "CHANGE FRICTION": Keyword("procedure", interactions.changed_interaction, "INTERACTION", opens="interaction"),
+    "COUPLING": Keyword(
+        "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
+    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", connections.coupling, opens="coupling")),
+    "STEP": Keyword(
+        "step",
+        stepping.new_step,
+        "NLGEOM; AMPLITUDE",
+        "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER",
+        "step",
+    ),
+    "END STEP": Keyword("step", stepping.end_step, opens="step"),
+    "HEADING": Keyword("deck", heading, ANYTHING),
     # In parts, or in decks without parts.
     "DISTRIBUTION": Keyword("part", local_axes.distribution, "NAME; LOCATION", "TABLE"),
     "DISTRIBUTION TABLE": Keyword("part", local_axes.distribution_table, ANYTHING),
@@ -97,7 +119,7 @@ TRANSLATED = {
     "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
     "EQUATION": Keyword("model", connections.equation),
     "GAP": Keyword("model", gaps.gap, "ELSET"),
-    "INITIAL CONDITIONS": Keyword("model", temperatures.initial_conditions, "TYPE"),
+    "INITIAL CONDITIONS": Keyword("model", initial_fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", connections.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
@@ -186,10 +208,11 @@ def checked(block: Block, about: str) -> Keyword:
     return known
 
 
-# Contexts that need an open material, interaction or step, with the message if there is none.
+# Contexts that need an open material, interaction, coupling or step, with the message if there is none.
 OWNERS = {
     "material": "belongs below *MATERIAL",
     "interaction": "belongs below *SURFACE INTERACTION",
+    "coupling": "belongs below *COUPLING",
     "procedure": "belongs in a step",
 }
 # Damage keywords, which are supported for cohesive layers only.
@@ -222,7 +245,7 @@ class Reader:
             raise block.refuse(f"material '{name}': damage is supported for cohesive layers only, not in bodies")
         owner = {
             "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
-            "procedure": self.step, "step": self.step,
+            "coupling": self.coupling, "procedure": self.step, "step": self.step,
         }.get(known.place)  # fmt: skip
         if owner is None and known.place in OWNERS:
             raise block.refuse(OWNERS[known.place])
@@ -230,78 +253,15 @@ class Reader:
             self.material = None
         if known.place not in ("material", "interaction"):
             self.interaction = None
-        if known.place in ("part", "model") and keyword != "AMPLITUDE":
-            self._not_in_step(block)
-        if known.place in ("model", "step"):
-            self._not_in_part(block)
+        if known.place in ("part", "property", "model") and keyword != "AMPLITUDE" and self.step is not None:
+            raise block.refuse("cannot be inside a step")
+        if known.place in ("model", "step") and not (self.part is None and self.instance is None):
+            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
         if known.place == "part" and self.instance is not None:
             raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
-        if known.read is None:
-            getattr(self, "_" + keyword.lower().replace(" ", "_"))(block)
-        else:
-            known.read(content, *([] if known.place == "model" else [owner]), block)
-
-    def _not_in_step(self, block: Block) -> None:
-        if self.step is not None:
-            raise block.refuse("cannot be inside a step")
-
-    def _not_in_part(self, block: Block) -> None:
-        if self.part is not None or self.instance is not None:
-            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
-
-    def _heading(self, block: Block) -> None:
-        self.content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
-
-    def _assembly(self, block: Block) -> None:
-        self.part = None
-
-    _end_part = _end_assembly = _assembly
-
-    def _part(self, block: Block) -> None:
-        self.part = geometry.new_part(self.content, block)
-
-    def _instance(self, block: Block) -> None:
-        self.instance = geometry.instance(self.content, block)
-
-    def _end_instance(self, block: Block) -> None:
-        self.instance = None
-
-    def _material(self, block: Block) -> None:
-        self._not_in_step(block)
-        self.material = materials.material(self.content, block)
-
-    def _surface_interaction(self, block: Block) -> None:
-        self._not_in_step(block)
-        self.interaction = interactions.interaction(self.content, block)
-
-    def _change_friction(self, block: Block) -> None:
-        if self.step is None:
-            raise block.refuse("belongs in a step")
-        self.interaction = interactions.changed_interaction(self.content, block)
-
-    def _coupling(self, block: Block) -> None:
-        self._not_in_step(block)
-        self.coupling = block
-
-    def _kinematic(self, block: Block) -> None:
-        if self.coupling is None:
-            raise block.refuse("belongs below *COUPLING")
-        connections.coupling(self.content, self.coupling, block)
-        self.coupling = None
-
-    _distributing = _kinematic
-
-    def _step(self, block: Block) -> None:
-        if self.step is not None:
-            raise block.refuse("the previous step has no *END STEP")
-        self._not_in_part(block)
-        self.step = stepping.new_step(self.content, block)
-
-    def _end_step(self, block: Block) -> None:
-        if self.step is None:
-            raise block.refuse("there is no step to end")
-        stepping.end_step(self.content, self.step)
-        self.step = None
+        read = known.read(content, *([] if known.place in ("deck", "property", "model") else [owner]), block)
+        if known.opens:
+            setattr(self, known.opens, read)
 
 
 def read_content(blocks: Iterable[Block]) -> Content:

@@ -11,8 +11,10 @@ from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 MOST_PARTS = 20
 
 
-def new_step(content: Content, block: Block) -> Step:
+def new_step(content: Content, step: Step | None, block: Block) -> Step:
     """Read *STEP and return the new step."""
+    if step is not None:
+        raise block.refuse("the previous step has no *END STEP")
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
     if content.modes is not None:
         raise block.refuse("follows a step with *FREQUENCY, which must be the last step")
@@ -61,8 +63,10 @@ def frequency(content: Content, step: Step, block: Block) -> None:
     step.modes = number
 
 
-def end_step(content: Content, step: Step) -> None:
+def end_step(content: Content, step: Step | None, block: Block) -> None:
     """Read *END STEP; a step with *FREQUENCY becomes a request for modes instead of a load step."""
+    if step is None:
+        raise block.refuse("there is no step to end")
     if not step.modes:
         if not step.static:
             raise step.refuse("the step has no *STATIC or other procedure")
