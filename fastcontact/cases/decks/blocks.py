@@ -86,9 +86,9 @@ class Row(Item):
             raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
-    def positive(self, index: int, quantity: str) -> float:
+    def positive(self, index: int, quantity: str, default: float | None = None) -> float:
         """Return an entry as a positive number; otherwise raise CaseError with the name of the `quantity`."""
-        value = self.number(index)
+        value = self.number(index, default)
         if not value > 0:
             raise self.refuse(f"the {quantity} {value:g} must be positive")
         return value
@@ -106,7 +106,11 @@ class Lines:
     def __iter__(self) -> Iterator[Row]:
         for line in _lines(self.contents, self.begin, self.end, self.location.line):
             if not line.text.startswith("**"):
-                yield _row(Location(self.location.file, line.number, self.location.keyword), line.text)
+                location, goes_on = (
+                    Location(self.location.file, line.number, self.location.keyword),
+                    line.text.endswith(","),
+                )
+                yield Row(location, tuple(_parts(line.text[:-1] if goes_on else line.text)), goes_on)
 
 
 @dataclass(frozen=True, slots=True)
@@ -334,11 +338,6 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
         if key:
             parameters[key] = unquoted(value.strip()) if equal else None
     return parameters
-
-
-def _row(location: Location, line: str) -> Row:
-    goes_on = line.endswith(",")
-    return Row(location, tuple(_parts(line[:-1] if goes_on else line)), goes_on)
 
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:

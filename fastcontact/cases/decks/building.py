@@ -236,7 +236,8 @@ class Building:
                 if point in alone:
                     self.driven[point, axis] = table
                 elif local:
-                    self._local_support(conditions, name, table)
+                    label = f"the support of {conditions.named(name)} on local axes"
+                    self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
                 else:
                     alike.add(axis, table, [point])
         for axis, points, value, table in alike:
@@ -261,10 +262,6 @@ class Building:
             self._relate_support(
                 TemporaryConstraint(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
             )
-
-    def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
-        label = f"the support of {conditions.named(name)} on local axes"
-        self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
 
     def _relate_support(self, constraint: MultiPointConstraint) -> None:
         self.local_supports.append(constraint)

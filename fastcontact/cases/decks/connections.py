@@ -78,15 +78,12 @@ def equation(content: Content, block: Block) -> None:
         while len(terms) < count:
             row = next(rows, None)
             if row is None:
-                raise head.refuse(f"the equation has {len(terms)} terms, {count} are announced")
-            terms += [_term(row, start) for start in range(0, len(row.entries), 3) if row.text(start)]
-        if len(terms) > count:
+                break
+            starts = (start for start in range(0, len(row.entries), 3) if row.text(start))
+            terms += [(row.text(start), row.whole(start + 1), row.number(start + 2)) for start in starts]
+        if len(terms) != count:
             raise head.refuse(f"the equation has {len(terms)} terms, {count} are announced")
         content.equations.append(Equation(head.location, tuple(terms)))
-
-
-def _term(row: Row, start: int) -> tuple[str, int, float]:
-    return row.text(start), row.whole(start + 1), row.number(start + 2)
 
 
 def multi_point(content: Content, block: Block) -> None:

@@ -236,7 +236,7 @@ class Axes(Item):
     by two points of the axis of the cylinder.
     """
 
-    nodes: str
+    name: str  # of an *ORIENTATION, or of the node set of a *TRANSFORM
     cylindrical: bool
     points: tuple[float, ...]
     distribution: str = ""  # name of a distribution of material axes by element, used instead of points
@@ -248,6 +248,7 @@ class Amplitude:
     """Times and values of an amplitude, in step time or in total time."""
 
     location: Location
+    name: str
     times: tuple[float, ...]
     values: tuple[float, ...]
     total: bool

@@ -27,9 +27,8 @@ def cyclic_symmetry_model(content: Content, block: Block) -> None:
     text = block.required("N")
     if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
         raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
-    if len(block.rows) != 1:
-        raise block.refuse("one data line with two points of the axis is needed")
-    points = tuple(block.rows[0].number(i) for i in range(6))
+    row = block.only()
+    points = tuple(row.number(i) for i in range(6))
     if points[:3] == points[3:]:
         raise block.refuse("the two points of the axis are the same")
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.cases.decks.blocks import Location, folded
-from fastcontact.cases.decks.content import Amplitude, Content, Step
+from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
@@ -110,6 +110,11 @@ class Values(Generic[Name]):
         return np.asarray(self.values, float)[rows], [self.blocks[origin][0] for origin in origins.tolist()]
 
 
+def all_of_them(name: object) -> bool:
+    """Return True."""
+    return True
+
+
 @dataclass
 class Histories(Generic[Name]):
     """Histories of loads or supports by name.
@@ -155,6 +160,15 @@ class Histories(Generic[Name]):
         self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
 
+    def take(
+        self, given: Given, entries: Iterable[tuple[Name, float, Location]], which: Callable[[Name], bool] = all_of_them
+    ) -> None:
+        """Set the values of the lines of a block; OP=NEW removes the values of earlier steps that satisfy `which`."""
+        if given.new:
+            self.forget(which)
+        for name, value, location in entries:
+            self.give(name, value, given.amplitude, location)
+
     def hold(self, name: Name, location: Location) -> None:
         """Hold the value that was reached at the end of the latest step."""
         if name in self.tracks:
@@ -171,7 +185,7 @@ class Histories(Generic[Name]):
             self.tracks.update((name, track) for name in names)
         self.first, self.changing = self.changing, Values()
 
-    def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
+    def forget(self, which: Callable[[Name], bool] = all_of_them) -> None:
         """Remove the values of earlier steps whose names satisfy `which`."""
         self.first = Values()
         for name, track in self.tracks.items():

@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly
 from fastcontact.cases.decks.blocks import Block, Location
-from fastcontact.cases.decks.content import Content, Given
+from fastcontact.cases.decks.content import Content
 from fastcontact.cases.decks.histories import ByShape, Histories
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.mesh.mesh import starts_of
@@ -28,18 +28,10 @@ def initial_conditions(content: Content, block: Block) -> None:
 
 def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[int, float]:
     """Return the initial temperatures by point; the last of several values at a point is used."""
-    return {point: value for block in blocks for point, value, _ in _by_point(assembly, block)}
+    return {point: value for block in blocks for point, value, _ in by_point(assembly, block)}
 
 
-def give(assembly: Assembly, histories: Histories[int], given: Given) -> None:
-    """Set the temperatures of a *TEMPERATURE for the current step."""
-    if given.new:
-        histories.forget()
-    for point, value, location in _by_point(assembly, given.block):
-        histories.give(point, value, given.amplitude, location)
-
-
-def _by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
+def by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
     """Yield the points of a block with their temperatures and the locations of the lines."""
     for row in block.each():
         if any(row.entries[2:]):

@@ -59,6 +59,7 @@ def end(content: Content, block: Block) -> None:
 
 # Parameters that control the solution of steps.
 STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
+UNUSED_OF_STEPS = "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
 # Supported keywords.
 TRANSLATED = {
     # Keywords that open or close an object to which others belong.
@@ -74,22 +75,16 @@ TRANSLATED = {
         "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
     **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", connections.coupling, opens="coupling")),
-    "STEP": Keyword(
-        "step",
-        stepping.new_step,
-        "NLGEOM; AMPLITUDE",
-        "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER",
-        "step",
-    ),
+    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE", UNUSED_OF_STEPS, "step"),
     "END STEP": Keyword("step", stepping.end_step, opens="step"),
     "HEADING": Keyword("deck", heading, ANYTHING),
     # In parts, or in decks without parts.
     "DISTRIBUTION": Keyword("part", local_axes.distribution, "NAME; LOCATION", "TABLE"),
     "DISTRIBUTION TABLE": Keyword("part", local_axes.distribution_table, ANYTHING),
     "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
-    "ELSET": Keyword("part", geometry.element_set, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
+    "ELSET": Keyword("part", geometry.group, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "NODE": Keyword("part", geometry.nodes, "NSET; SYSTEM"),
-    "NSET": Keyword("part", geometry.node_set, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
+    "NSET": Keyword("part", geometry.group, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
     "ORIENTATION": Keyword("part", local_axes.orientation, "NAME; SYSTEM; DEFINITION"),
     "SOLID SECTION": Keyword("part", geometry.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
     "SURFACE": Keyword("part", geometry.surface, "NAME; TYPE", "INTERNAL"),
