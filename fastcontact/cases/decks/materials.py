@@ -152,7 +152,8 @@ def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> 
         return NeoHookean(E=9.0 * bulk * mu / (3.0 * bulk + mu), nu=(3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
     if kind == "OGDEN":
         return Ogden(constants[::2], constants[1::2], bulk=bulk)
-    return (MooneyRivlin if kind == "MOONEY-RIVLIN" else Yeoh)(*constants, bulk)
+    law: Any = MooneyRivlin if kind == "MOONEY-RIVLIN" else Yeoh
+    return law(*constants, bulk)
 
 
 def conductivity(content: Content, current: Material, block: Block) -> None:
