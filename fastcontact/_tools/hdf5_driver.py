@@ -55,28 +55,21 @@ class DriverFile:
     def _size(self) -> int:
         return os.fstat(self.fileno()).st_size
 
-    def readinto(self, buffer: memoryview) -> int:
-        """Fill a buffer from the position on, with zeros beyond the end of the file."""
-        data = bytearray(len(buffer))
+    def read(self, size: int) -> bytes:
+        """Return `size` bytes from the position on, zeros beyond the end of the file."""
+        data = bytearray(size)
         try:
             self._get(self._position, data)
         except BaseException as error:
             self._fail(error)
-        buffer[:] = data
-        self._position += len(buffer)
-        return len(buffer)
+        self._position += size
+        return bytes(data)
 
     def _get(self, start: int, data: bytearray) -> None:
         self._file.seek(start)
         view = memoryview(data)
         while view and (count := self._file.readinto(view)):
             view = view[count:]
-
-    def read(self, size: int) -> bytes:
-        """Return `size` bytes; see `readinto`."""
-        buffer = bytearray(size)
-        self.readinto(memoryview(buffer))
-        return bytes(buffer)
 
     def write(self, data: bytes) -> int:
         """Write at the position, unless something has failed."""

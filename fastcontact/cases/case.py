@@ -353,22 +353,16 @@ def _theories(
         if not isinstance(entry, dict):
             raise CaseError(f"'theory.{pair}' must be a table with the key 'kind', not {entry!r:.80}")
         constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
-        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": _share(f"theory.{pair}", entry)}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": entry.get("share", 1.0)}
+        check_keys(f"theory.{pair}", {"share": theories[pair]["share"]}, {"share": NUMBER})
+        if not 0.0 < theories[pair]["share"] <= 1.0:
+            text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
+            raise CaseError(f"theory.{pair}.share = {entry['share']:g} {text}")
         if "mesh_converged" in entry:
             theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
         if "approach" in constants:
             approach[pair] = float(constants["approach"])
     return theories, approach
-
-
-def _share(where: str, data: dict[str, Any]) -> float:
-    """Return the fraction of the theory's contact that the model represents [-], 1 by default."""
-    check_keys(where, {"share": data.get("share", 1.0)}, {"share": NUMBER})
-    share = float(data.get("share", 1.0))
-    if not 0.0 < share <= 1.0:
-        text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
-        raise CaseError(f"{where}.share = {share:g} {text}")
-    return share
 
 
 def _theory(where: str, data: dict[str, Any]) -> Any:

@@ -166,7 +166,7 @@ class Assembly:
         items = self._items_of(kind, scope)
         for number in entry.numbers:
             item = items.get(number)
-            yield self._existing(kind, scope, number, entry.place_of(number)) if item is None else item
+            yield self._existing(kind, scope, number, entry.location) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):

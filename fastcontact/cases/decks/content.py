@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from array import array
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,25 +30,12 @@ class Cell(Located):
 class Members(Item):
     """Entries of a set: numbers, or the name of another set.
 
-    They refer to an instance, or to the instance of the definition if `instance` is empty. The numbers may come from several
-    lines: `lines` contains, for each line after the first, the index of its first number and its line number.
+    They refer to an instance, or to the instance of the definition if `instance` is empty.
     """
 
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
-    lines: array[int] = field(default_factory=lambda: array("q"))
-
-    def add(self, numbers: array[int], line: int) -> None:
-        """Add the numbers of another line."""
-        assert isinstance(self.numbers, array)
-        self.lines.extend((len(self.numbers), line))
-        self.numbers.extend(numbers)
-
-    def place_of(self, number: int) -> Location:
-        """Return the location of the line with a number."""
-        row = bisect_right(self.lines[::2], self.numbers.index(number))
-        return replace(self.location, line=self.lines[2 * row - 1]) if row else self.location
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,11 +95,7 @@ def group(content: Content, part: Part, block: Block) -> None:
             continue
         for numbers, members_named in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
-                members = array("q", map(int, members_named))
-                if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
-                    entries[-1].add(members, row.location.line)  # consecutive lines become one entry
-                else:
-                    entries.append(Members(row.location, members, instance=instance))
+                entries.append(Members(row.location, array("q", map(int, members_named)), instance=instance))
             else:
                 entries += [Members(row.location, name=entry, instance=instance) for entry in members_named if entry]
     part.add("node" if block.keyword == "NSET" else "element", name, entries)

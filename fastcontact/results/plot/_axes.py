@@ -51,12 +51,6 @@ def png(figure: Any) -> bytes:
     return buffer.getvalue()
 
 
-def displayed(figure: Any) -> None:
-    """Add a representation for notebooks to a figure and its axes."""
-    for artist in (figure, *figure.axes):
-        artist._repr_png_ = partial(png, figure)
-
-
 class Panels(tuple[Any, ...]):
     """The axes of a figure with several panels, which are displayed as the figure in notebooks."""
 
@@ -66,18 +60,15 @@ class Panels(tuple[Any, ...]):
         return png(self[0].figure)
 
 
-def drawable(ax: Any) -> Any:
-    """Return `ax`; FastcontactError unless it is an axes object of Matplotlib."""
+def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
+    """Return `ax` or, if it is None, the axes of a new figure; ``projection="3d"`` gives axes in space."""
+    if ax is None:
+        return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0]
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
             f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
         )
     return ax
-
-
-def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax` or, if it is None, the axes of a new figure; ``projection="3d"`` gives axes in space."""
-    return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0] if ax is None else drawable(ax)
 
 
 def without_matplotlib(error: Exception) -> FastcontactError:
@@ -100,7 +91,8 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
     figure = Figure(figsize=size, layout="constrained", dpi=dpi)
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
-    displayed(figure)
+    for artist in (figure, *figure.axes):  # notebooks show any of them as the figure
+        artist._repr_png_ = partial(png, figure)
     return panels
 
 

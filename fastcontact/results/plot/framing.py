@@ -37,26 +37,16 @@ def framed(
     `points` (n, 2) [length] are the points of a body in the plane, and None for axes in space. `alone` is whether the figure
     has no other axes.
     """
-    caption, flat = labelled(shown.caption, units, shown.quantity), points is not None
+    caption, length, below = labelled(shown.caption, units, shown.quantity), 0.6, 0.02
     if points is not None:
+        width, height = np.ptp(points, axis=0)
         caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER))
-    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=0.6 if points is None else _bar_length(points))
-    if flat:
+        length = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
+        half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
+        below = half_inch if alone else -0.09
         axes.set_aspect("equal")
-    axes.set_title(heading, fontsize="medium", pad=None if flat else 18)
+    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=length)
+    axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
     axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
-    below = 0.02 if points is None else _legend_height(points) if alone else -0.09
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes
-
-
-def _legend_height(points: Array) -> float:
-    """Return the position of the legend in units of the height of the axes, half an inch below them."""
-    width, height = np.ptp(points, axis=0)
-    return -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
-
-
-def _bar_length(points: Array) -> float:
-    """Return the length of the colour bar relative to the axes; it is shorter for flat bodies."""
-    width, height = np.ptp(points, axis=0)
-    return float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))
