@@ -79,7 +79,7 @@ def _plane(text: str) -> tuple[int, float]:
 
 def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
     from fastcontact.results import plot
-    from fastcontact.results.phases import phases
+    from fastcontact.results.steps import phases
 
     shown = list(results) if options.phases is None else phases(step, options.phases)
     plot.animate(

@@ -31,9 +31,8 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import journal, layout, write_arrays
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
-from fastcontact.results.reader import Results, StoredSteps
+from fastcontact.results.reader import Results, StoredSteps, read_text
 from fastcontact.results.step import StepResult
-from fastcontact.results.texts import read_text
 
 # Time after which each step is synchronised with the disk [s]; a shorter run is quickly repeated after a power loss.
 SHORT = 10.0
@@ -145,22 +144,18 @@ class ResultWriter:
             self._lock = PathLock(self.path)
             try:
                 if resume:
-                    self._take_up(str(kinematics), case_text)
-                if not self.done:
+                    left = left_at(self.path)
+                    self.done, self._ended, old = _steps_to_resume(self.path, mesh, str(kinematics), self._cell_fields)
+                if self.done:
+                    self._left, self.n_steps = left, len(self.done)
+                    self._last = self.done[-1].index, _case_of(self.done[-1])
+                    self._notes = {"case": case_text} if case_text not in ("", old) else {}
+                else:
                     _check_replaceable(self.path, overwrite or resume)
                     self._begin(str(kinematics), case_text)
             except BaseException:
                 self._lock.release()
                 raise
-
-    def _take_up(self, kinematics: str, case_text: str) -> None:
-        """Check whether the file contains steps, and prepare to append to them."""
-        left = left_at(self.path)
-        self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
-        self.n_steps = len(self.done)
-        if self.done:
-            self._left, self._last = left, (self.done[-1].index, _case_of(self.done[-1]))
-            self._notes = {"case": case_text} if case_text not in ("", old_case) else {}
 
     def __enter__(self) -> ResultWriter:
         return self
@@ -228,7 +223,8 @@ class ResultWriter:
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
-            self._committed.synchronised = self._is_synchronised()
+            late = time.monotonic() - self._started > SHORT
+            self._committed.synchronised = late if self._synchronise is None else self._synchronise
             restart = packed({"step": self.n_steps, "restart": step.restart})
             room = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * room if self._committed.synchronised else room)
@@ -314,7 +310,11 @@ class ResultWriter:
             self._committed = CommittedFile(self.path)
             try:
                 self._file = h5py.File(self._committed, "r+")
-                _limit_index_memory(self._file)
+                # The cache for index nodes grows with the steps and takes ten times the size in the file.
+                settings = self._file.id.get_mdc_config()
+                settings.set_initial_size = True
+                settings.initial_size = settings.min_size = settings.max_size = INDICES
+                self._file.id.set_mdc_config(settings)
             except BaseException:
                 self._committed.close()
                 raise
@@ -348,11 +348,6 @@ class ResultWriter:
     def _flush(self) -> None:
         self._file.flush()
         self._committed.check()
-
-    def _is_synchronised(self) -> bool:
-        if self._synchronise is None:
-            return time.monotonic() - self._started > SHORT
-        return self._synchronise
 
     def _reserve(self, size: int) -> None:
         reserve(self._committed.fileno(), self.path.parent, self._committed.end, size + MARGIN)
@@ -389,14 +384,6 @@ class ResultWriter:
                 write_arrays.write_own(file, self._mesh, kinematics, case_text, self._units)
         # The file is closed in between, because Windows does not rename open files; without locks viewers can read it.
         self._open()
-
-
-def _limit_index_memory(file: Any) -> None:
-    """Limit the cache of HDF5 for index nodes, which grows with the steps and takes ten times the size in the file."""
-    settings = file.id.get_mdc_config()
-    settings.set_initial_size = True
-    settings.initial_size = settings.min_size = settings.max_size = INDICES
-    file.id.set_mdc_config(settings)
 
 
 def _materials_that_meet(model: Any) -> Any:

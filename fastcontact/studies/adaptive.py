@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.adaptive_report import AdaptiveStudy, Round
-from fastcontact.studies.error_estimate import ErrorEstimate, estimate_error
+from fastcontact.studies.error_norms import ErrorEstimate, estimate_error
 from fastcontact.studies.job import case_data, last_step
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.report import of_case

@@ -49,19 +49,6 @@ class Runs(StatusLine):
         self.draw(f"{progress.done}/{progress.total} {progress.label} {outcome}{left}")
 
 
-@contextlib.contextmanager
-def reporting(on_progress: Callable[[Any], None] | None, show: bool) -> Iterator[Callable[[Any], None]]:
-    """Yield a function to call after each run, which calls `on_progress` and, if `show` is true, redraws a status line."""
-    with Runs(show) as line:
-
-        def ended(progress: Any) -> None:
-            line(progress)
-            if on_progress is not None:
-                on_progress(progress)
-
-        yield ended
-
-
 Result = dict[str, Any]
 # NumPy and Numba read these variables when they are imported, so they must be set before a worker process starts.
 _ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -138,8 +125,14 @@ def run_study(
 
     If all runs fail, the first error is raised again with `name` before its message.
     """
-    with reporting(on_progress, progress) as report:
-        results = run_all(jobs, on_progress=report, **options)
+    with Runs(progress) as line:
+
+        def ended(progress: Progress) -> None:
+            line(progress)
+            if on_progress is not None:
+                on_progress(progress)
+
+        results = run_all(jobs, on_progress=ended, **options)
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
         raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")

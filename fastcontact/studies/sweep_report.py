@@ -153,9 +153,9 @@ class Drawing:
         return curves
 
 
-def label_of(parameters: Mapping[str, Value], others: Sequence[str]) -> str:
-    """Return the label of a curve with the values of the parameters `others`."""
-    values = ((name, parameters[name]) for name in others)
+def label_of(parameters: Mapping[str, Value], others: Sequence[str] | None = None) -> str:
+    """Return the label of a point with the values of the parameters `others`, by default of all parameters."""
+    values = ((name, parameters[name]) for name in (parameters if others is None else others))
     return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from fastcontact.cases.decks import (
-    connections,
     cyclic_symmetry,
     gaps,
     geometry,
@@ -18,6 +17,7 @@ from fastcontact.cases.decks import (
     local_axes,
     materials,
     pretension,
+    relating,
     stepping,
 )
 from fastcontact.cases.decks.blocks import Block
@@ -74,7 +74,7 @@ TRANSLATED = {
     "COUPLING": Keyword(
         "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
-    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", connections.coupling, opens="coupling")),
+    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", relating.coupling, opens="coupling")),
     "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE", UNUSED_OF_STEPS, "step"),
     "END STEP": Keyword("step", stepping.end_step, opens="step"),
     "HEADING": Keyword("deck", heading, ANYTHING),
@@ -109,18 +109,18 @@ TRANSLATED = {
     "SURFACE BEHAVIOR": Keyword("interaction", interactions.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
     # In the whole model.
     "AMPLITUDE": Keyword("model", stepping.amplitude, "NAME; TIME; DEFINITION; VALUE"),
-    "CLEARANCE": Keyword("model", connections.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
-    "CONTACT PAIR": Keyword("model", connections.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
+    "CLEARANCE": Keyword("model", relating.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
+    "CONTACT PAIR": Keyword("model", relating.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
-    "EQUATION": Keyword("model", connections.equation),
+    "EQUATION": Keyword("model", relating.equation),
     "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", initial_fields.initial_conditions, "TYPE"),
-    "MPC": Keyword("model", connections.multi_point),
+    "MPC": Keyword("model", relating.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
-    "RIGID BODY": Keyword("model", connections.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
+    "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
-    "TIE": Keyword("model", connections.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
+    "TIE": Keyword("model", relating.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
     "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),

@@ -12,9 +12,8 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, mark, new_axes, placed
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, framed, mark, new_axes, part_shown, placed, size_around
 from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.framing import framed, part_shown, size_around
 from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import shaded
 from fastcontact.results.plot.shape import scale_of, scaled
