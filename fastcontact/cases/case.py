@@ -12,7 +12,7 @@ from fastcontact._tools import toml_text
 from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.case_files import case_path, files_named, shipped_cases
-from fastcontact.cases.checks import CHECK, Check, read_check
+from fastcontact.cases.checks import Check, read_check
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
 from fastcontact.errors import CaseError, check_known, in_file, unknown
@@ -243,7 +243,10 @@ def build_case(
         linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
-        checks=_checks(data, probes, pairs, theories),
+        checks=[
+            read_check(f"check[{i}]", entry, probes, pairs, theories, str(data["kinematics"]))
+            for i, entry in enumerate(tables("check", data.get("check", [])))
+        ],
         units=known_units(model.units),
         approach=approach,
         folder=Path(folder).resolve(),
@@ -265,16 +268,6 @@ def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
     named = data.get("contact", {})
     named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
     return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
-
-
-def _checks(
-    data: dict[str, Any], probes: Mapping[str, int], pairs: Mapping[str, Any], theories: Mapping[str, Any]
-) -> list[Check]:
-    checks = []
-    for i, entry in enumerate(tables("check", data.get("check", []))):
-        check_keys(f"check[{i}]", entry, CHECK)
-        checks.append(read_check(f"check[{i}]", entry, probes, pairs, theories, str(data["kinematics"])))
-    return checks
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.contact_resultants import contact_moment
-from fastcontact.cases.keys import NUMBER, keys_of
+from fastcontact.cases.keys import NUMBER, check_keys, keys_of
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -152,7 +152,8 @@ def read_check(
     theories: Mapping[str, Any],
     kinematics: str = "3d",
 ) -> Check:
-    """Return the check that an entry of a case file describes, whose keys are known; CaseError if a value is invalid."""
+    """Return the check that an entry of a case file describes; CaseError if a key or a value is invalid."""
+    check_keys(where, entry, CHECK)
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")

@@ -47,10 +47,8 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
     name, *others = step.contact
     if others and not options.quiet:
         listed = ", ".join(f"'{other}'" for other in others)
-        say(
-            f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)",
-            error=True,
-        )
+        text = f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)"
+        say(text, error=True)
     return str(name)
 
 

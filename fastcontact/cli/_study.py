@@ -130,16 +130,12 @@ def finished(options: argparse.Namespace, study: Callable[..., Any]) -> Any:
         with executor(options.executor) as where:
             return study(executor=where, workers=options.workers, store=options.store, on_progress=progress)
     except KeyboardInterrupt:
-        raise FastcontactError(stopped(options)) from None
+        text = "stopped; with --store DIR the same command would continue where it stopped"
+        if options.store:
+            text = f"stopped; the same command continues where it stopped, with the runs in {options.store}"
+        raise FastcontactError(text) from None
     finally:
         progress.close()
-
-
-def stopped(options: argparse.Namespace) -> str:
-    """Return the message after an interruption."""
-    if options.store:
-        return f"stopped; the same command continues where it stopped, with the runs in {options.store}"
-    return "stopped; with --store DIR the same command would continue where it stopped"
 
 
 def report(

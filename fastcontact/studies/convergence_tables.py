@@ -35,11 +35,7 @@ def _about_quantity(series: Series, quantity: str) -> list[str]:
         off = percent(series.errors(quantity)[-1])
         text = f"{series.combination}: the mesh error of the {name} is {off} on the finest mesh."
         return [text, *_about_settling(series, quantity, name)]
-    start = (
-        f"{series.combination}: the {name}"
-        if series.exact_theory
-        else f"{series.combination}: {series.compared} the {name}"
-    )
+    start = f"{series.combination}: " + ("" if series.exact_theory else f"{series.compared} ") + f"the {name}"
     finest = f"({series.finest.n_dofs} degrees of freedom)"
     bar = f"{100 * split.uncertainty:.2g} %"
     if series.converges_to_theory(quantity) is False:

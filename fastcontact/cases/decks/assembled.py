@@ -86,9 +86,7 @@ class Assembly:
     @cached_property
     def solids(self) -> list[Element]:
         """All solids."""
-        return [
-            element for elements in self.elements.values() for element in elements.values() if element.type is not None
-        ]
+        return [element for elements in self.elements.values() for element in elements.values() if element.type]
 
     @cached_property
     def of_solids(self) -> set[int]:
@@ -151,22 +149,15 @@ class Assembly:
             defined("instance", scope, self.content.instances, entry)
         if entry.name:
             return self._named(kind, scope, entry)
-        numbers = entry.numbers
+        items, numbers = self._items_of(kind, scope), entry.numbers
         if not isinstance(numbers, range):
-            return self._all_existing(kind, scope, entry)
-        items = self._items_of(kind, scope)
+            return (items[n] if n in items else self._existing(kind, scope, n, entry.location) for n in numbers)
         candidates = numbers if len(numbers) <= len(items) else sorted(items)
         known = [n for n in candidates if n in items and n in numbers]
         if len(known) < len(numbers):
             absent = f"{len(numbers) - len(known)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry, f"{absent} are not {kind}s and are ignored")
         return (items[n] for n in known)
-
-    def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
-        items = self._items_of(kind, scope)
-        for number in entry.numbers:
-            item = items.get(number)
-            yield self._existing(kind, scope, number, entry.location) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):

@@ -195,19 +195,16 @@ class HeatConditions:
                     blown.setdefault((table, film.numbers[0], span), []).append(film.face)
         for (table, coefficient, span), faces in blown.items():
             group = assembly.add_facets(f"film {len(adders)}", faces)
-            adders.append(partial(self._film(group, coefficient, table), **_between(span)))
+            rise = self._risen(table)
+            size = max((value for _, value in rise), key=abs)
+            ramp = tuple((time, value / size) for time, value in rise) if size else None
+            blowing: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_between(span)}
+            adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **blowing))
         return adders
 
     def _risen(self, table: Table) -> Table:
         """Return a temperature history relative to the reference temperature."""
         return tuple((time, value - self.reference) for time, value in table)
-
-    def _film(self, group: str, coefficient: float, table: Table) -> Callable[[Model], None]:
-        rise = self._risen(table)
-        size = max((value for _, value in rise), key=abs)
-        ramp = tuple((time, value / size) for time, value in rise) if size else None
-        ambient = self.reference + size
-        return partial(Model.add_film, group=group, coefficient=coefficient, ambient=ambient, ramp=ramp)
 
 
 def _between(span: tuple[float, float]) -> dict[str, float]:

@@ -45,7 +45,10 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
 
     There is a field for each shape of history or a field for each time with a corner of a history, whichever are fewer.
     """
-    fields = list(ByShape.of((_rise(table), points) for table, points in histories.alike()))
+    rises_of = (
+        (tuple((time, value - table[0][1]) for time, value in table), points) for table, points in histories.alike()
+    )
+    fields = list(ByShape.of(rises_of))
     times = sorted({time for *_, table in fields for time, _ in table})
     if len(fields) <= len(times):
         for _, points, sizes, table in fields:
@@ -61,10 +64,6 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
             factor = np.interp(time, instants, factors)
             rises[points] = factor * (sizes(points) if callable(sizes) else sizes)
         _add(model, rises, tuple((other, float(other == time)) for other in around))
-
-
-def _rise(table: Table) -> Table:
-    return tuple((time, value - table[0][1]) for time, value in table)
 
 
 def _add(model: Model, rises: Array, ramp: Table) -> None:

@@ -162,16 +162,10 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     given = {"strength": strength, "shear_strength": shear, "initiation": criterion}
     given.update(_evolution(evolution, given, stiffness))
     if stiffness is None:
-        content.note(
-            behaviour,
-            f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which the layer fails",
-        )
+        content.note(behaviour, f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which it fails")
     else:
         given["stiffness"] = stiffness
-    content.note(
-        behaviour,
-        "sides that are pressed together have the stiffness of the layer, also where it is broken",
-    )
+    content.note(behaviour, "sides that are pressed together have the stiffness of the layer, also where it is broken")
     return {"cohesion": given}
 
 

@@ -49,7 +49,12 @@ def test_nothing_is_drawn_where_nobody_looks(capsys):
 
 @pytest.mark.parametrize(("store", "told"), [("runs", "with the runs in runs"), (None, "with --store DIR")])
 def test_an_interrupted_study_says_how_to_go_on(store, told):
-    assert told in _study.stopped(argparse.Namespace(store=store))
+    def interrupted(**options):
+        raise KeyboardInterrupt
+
+    options = argparse.Namespace(store=store, quiet=True, executor="processes", workers=1)
+    with pytest.raises(fc.FastcontactError, match=told):
+        _study.finished(options, interrupted)
 
 
 @pytest.mark.parametrize(
