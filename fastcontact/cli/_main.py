@@ -20,9 +20,9 @@ from typing import Any
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
-from fastcontact.cli._arguments import declare
+from fastcontact.cli._arguments import add_loudness, declare
 from fastcontact.cli._interrupts import CODES, forget, interruptible, meant
-from fastcontact.cli._terminal import add_loudness, encodable, say, somebody_watches, warnings_shown
+from fastcontact.cli._terminal import encodable, say, somebody_watches, warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
 
 SHELLS = ("bash", "zsh", "tcsh")

@@ -10,7 +10,6 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._interrupts import to_main_thread
 from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._terminal import say, somebody_watches
@@ -91,7 +90,7 @@ def _failing_threads_interrupt() -> Iterator[list[BaseException]]:
 
 
 # Arguments for output files and execution.
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "--json FILE": "write all numbers",
     "--csv FILE": "write the table",
     "--png FILE": "write a picture",

@@ -7,26 +7,15 @@ the encoding of the terminal lacks are escaped as well.
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import logging
 import os
 import sys
 import warnings
 from collections.abc import Iterator
-from typing import Any, TextIO
+from typing import TextIO
 
-from fastcontact.cli._arguments import declare
 from fastcontact.errors import FastcontactWarning, FileError, printable
-
-
-def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
-    """Add the verbosity options, which all commands have, with the default value `default`."""
-    table = {
-        "-v --verbose": "report what is being done and why",
-        "-q --quiet": "print nothing but errors and warnings",
-    }
-    declare(parser.add_mutually_exclusive_group(), table, default=default)
 
 
 def somebody_watches() -> bool:

@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
 HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "file": "mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)",
     "--contacts": "show the surfaces of bodies that face each other instead",
     "--distance LENGTH": (float, "largest gap for --contacts (default: the size of facets)"),

@@ -6,14 +6,13 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
 # Options that draw a contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     **_results.ARGUMENTS,
     "--png FILE": "write the picture to this file",
     "": {

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say, somebody_watches, warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
@@ -26,7 +25,7 @@ HELP = "solve a case file or an input deck (.inp) and write the results of all s
 ERROR_FIELD = "error"
 # Smallest number of mesh points for which steps are written in the background while the next step is solved.
 LARGE = 30_000
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
     "-o --output OUTPUT": "result file (default: the case's name with .vtkhdf, here)",
     "--resume": "continue after the last complete step of the result file, if there is one",

@@ -192,8 +192,9 @@ def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[t
 
     If a worker process dies, each remaining job runs again in a separate process.
     """
-    if _imports_its_script():
-        # The script calls the study outside "if __name__ == '__main__'"; the parent process reports the error.
+    if sys.modules.get("__mp_main__") not in (None, sys.modules["__main__"]):
+        # This process is a worker that imports the script of its parent, which calls the study outside
+        # "if __name__ == '__main__'"; the parent process reports the error.
         raise SystemExit(1)
     left = list(rest)
     try:
@@ -269,12 +270,6 @@ def started_pool(count: int) -> Iterator[Workers]:
         raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _imports_its_script() -> bool:
-    """Return whether this process is a worker that is importing the script of its parent process."""
-    script = sys.modules.get("__mp_main__")
-    return script not in (None, sys.modules["__main__"])  # after its import, the script is __main__
 
 
 def _alone(job: Run) -> Result:

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Element
+from fastcontact.cases.decks.assembled import Element, Target
 from fastcontact.cases.decks.blocks import defined, folded, refusing
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
@@ -32,7 +32,6 @@ from fastcontact.cases.decks.meshing import begun, group_of_surface, secondary_g
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
-from fastcontact.cases.decks.targets import Target
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fastcontact.cases.decks.assembled import Target, targets
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
@@ -15,7 +16,6 @@ from fastcontact.cases.decks.initial_fields import by_point, initial_temperature
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
-from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}

@@ -9,12 +9,11 @@ from typing import Any, Generic
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembly, Face
+from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
 from fastcontact.cases.decks.blocks import Block, Row
 from fastcontact.cases.decks.content import Content, Given, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
-from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
