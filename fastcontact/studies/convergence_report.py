@@ -246,8 +246,9 @@ class Study(Report):
     def figure(self) -> Any:
         """Return a Matplotlib figure with errors, the pressure over the radius, and differences from theory."""
         of_case = not isinstance(self.best.combination, Named)
+        names = COMPARED if of_case else self.best.shown(COMPARED) or self.best.quantities[:2]
         of_all: dict[str, Any] = {"all_series": self.series, "units": self.units}
-        drawn: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **of_all) for name in self._drawn()]
+        drawn: list[Callable[[Any], None]] = [partial(draw_errors, quantity=name, **of_all) for name in names]
         if of_case or self.best.finest.profile:
             drawn.append(partial(draw_pressure, series=self.best, theory=self.theory, units=self.units))
         if of_case:
@@ -257,8 +258,3 @@ class Study(Report):
         for ax, draw in zip_longest(axes.flat, drawn, fillvalue=partial(message, text="")):
             draw(ax)
         return axes[0, 0].figure
-
-    def _drawn(self) -> list[str]:
-        """Return the quantities whose errors are drawn."""
-        known = self.best.shown(COMPARED) or list(self.best.quantities[:2])
-        return known if isinstance(self.best.combination, Named) else list(COMPARED)

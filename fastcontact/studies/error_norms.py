@@ -11,7 +11,7 @@ and the contact pressure is added, as in residual-based estimates (for example W
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -32,7 +32,6 @@ from fastcontact.elasticity.smoothed_stress import smoothed_stress
 from fastcontact.errors import ModelError
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import area_vectors
-from fastcontact.mesh.elements import Element
 from fastcontact.mesh.topology import same_facets
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
@@ -165,14 +164,10 @@ def error_against(
     offset = model.material_field().offset(rise, [(1.0, state) for state in model.initial_states], model.mesh.n_points)
     total = np.zeros(4)
     for name, rows in solid_rows(model.mesh, names).items():
-        for rows_of_part in _portions(rows, elements.get(name), n_points):
-            total += _squares(theory, model, u, name, rows_of_part, n_points, offset)
+        at_once = max(1, AT_ONCE // len(integration_rule(elements.get(name), n_points)[1]))
+        for first in range(0, len(rows), at_once):
+            total += _squares(theory, model, u, name, rows[first : first + at_once], n_points, offset)
     return ErrorNorms(*(math.sqrt(square) for square in total))
-
-
-def _portions(rows: Indices, element: Element, n_points: int | None) -> Iterator[Indices]:
-    at_once = max(1, AT_ONCE // len(integration_rule(element, n_points)[1]))
-    return (rows[first : first + at_once] for first in range(0, len(rows), at_once))
 
 
 def stress_in_cells(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Block, folded, refusing, unquoted
+from fastcontact.cases.decks.blocks import Block, folded, refusing
 from fastcontact.cases.decks.content import Content, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -12,14 +12,6 @@ from fastcontact.model.model import Model
 
 # Largest number of sectors. A larger number is treated as an error.
 MOST_SECTORS = 100_000
-
-
-def sector_ends(block: Block) -> SectorEnds:
-    """Read *TIE, CYCLIC SYMMETRY: the end surfaces of a sector."""
-    if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
-        raise block.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
-    row = block.rows[0]
-    return SectorEnds(block.location, block.get("NAME"), (unquoted(row.text(0)), unquoted(row.text(1))))
 
 
 def cyclic_symmetry_model(content: Content, block: Block) -> None:

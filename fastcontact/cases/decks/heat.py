@@ -10,7 +10,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
-from fastcontact.cases.decks.blocks import Block, Row
+from fastcontact.cases.decks.blocks import Row
 from fastcontact.cases.decks.content import Content, Given, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
@@ -21,11 +21,6 @@ from fastcontact.model.ramp import Table
 OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 # Number of the temperature degree of freedom.
 TEMPERATURE = 11
-
-
-def physical_constants(content: Content, block: Block) -> None:
-    """Read *PHYSICAL CONSTANTS: constants of radiation, which have no effect."""
-    content.note(block, "no effect: there is no radiation")
 
 
 def check_steps(content: Content) -> None:

@@ -110,11 +110,6 @@ def keep(content: Content, current: Interaction, block: Block) -> None:
     current.cohesion[block.keyword] = block
 
 
-def stabilization(content: Content, current: Interaction, block: Block) -> None:
-    """Read *DAMAGE STABILIZATION, which has no effect."""
-    content.note(block, "no effect: damage has no viscous regularisation")
-
-
 def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
     """Return the friction options of a pair, with the changes by *CHANGE FRICTION at the start of steps."""
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()

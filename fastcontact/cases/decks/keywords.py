@@ -53,6 +53,11 @@ def heading(content: Content, block: Block) -> None:
     content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
 
 
+def noted(text: str) -> Callable[..., None]:
+    """Return the function that reads a keyword without effect, for which `text` is noted."""
+    return lambda content, *owner_and_block: content.note(owner_and_block[-1], text)
+
+
 def end(content: Content, block: Block) -> None:
     """Read the end of a part, an instance or the assembly."""
 
@@ -95,14 +100,14 @@ TRANSLATED = {
     "EXPANSION": Keyword("material", materials.expansion, "TYPE", "ZERO"),
     "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
-    "SPECIFIC HEAT": Keyword("material", materials.specific_heat, ANYTHING),
+    "SPECIFIC HEAT": Keyword("material", noted("no effect, heat is steady, or temperatures are given"), ANYTHING),
     # Below *SURFACE INTERACTION.
     "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
         "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
     "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
-    "DAMAGE STABILIZATION": Keyword("interaction", interactions.stabilization, ANYTHING),
+    "DAMAGE STABILIZATION": Keyword("interaction", noted("no effect: damage has no viscous regularisation"), ANYTHING),
     "FRICTION": Keyword("interaction", interactions.friction),
     "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
     "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
@@ -116,7 +121,7 @@ TRANSLATED = {
     "GAP": Keyword("model", gaps.gap, "ELSET"),
     "INITIAL CONDITIONS": Keyword("model", initial_fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", relating.multi_point),
-    "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
+    "PHYSICAL CONSTANTS": Keyword("model", noted("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),

@@ -161,11 +161,6 @@ def conductivity(content: Content, current: Material, block: Block) -> None:
     current.conductivity = block
 
 
-def specific_heat(content: Content, current: Material, block: Block) -> None:
-    """Read *SPECIFIC HEAT, which has no effect in static and steady-state steps."""
-    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
-
-
 def expansion(content: Content, current: Material, block: Block) -> None:
     """Read *EXPANSION: coefficients of thermal expansion at one temperature."""
     current.expansion = along_axes(current, block)

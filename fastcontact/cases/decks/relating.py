@@ -13,8 +13,7 @@ from scipy.sparse import csr_array
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import facet_points
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, refusing, unquoted
-from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint, Pair, Pin
-from fastcontact.cases.decks.cyclic_symmetry import sector_ends
+from fastcontact.cases.decks.content import Content, Equation, Link, MultiPoint, Pair, Pin, SectorEnds
 from fastcontact.cases.decks.local_axes import local_axes, local_directions, orientation_of
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.loads import Traction
@@ -147,7 +146,9 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
         return [_mean_rotation(constraint, nodes, where)]
     first = where[1] - where[0]
     if constraint.kind == "STRAIGHT":
-        across = _normals_to(constraint, first)
+        if not first.any():
+            raise constraint.refuse("the first two nodes of STRAIGHT coincide")
+        across = np.linalg.svd(first[None])[2][1:]
         along = (where - where[0]) @ first / (first @ first)
         weights = np.column_stack([1.0 - along, along])
     else:
@@ -164,13 +165,6 @@ def multi_point_rows(deck_mesh: DeckMesh, constraint: MultiPoint) -> list[list[T
         for i in range(k, len(nodes))
         for normal in across
     ]
-
-
-def _normals_to(constraint: MultiPoint, line: Array) -> Array:
-    """Return two unit vectors (2, 3) [-] normal to a line."""
-    if not line.any():
-        raise constraint.refuse("the first two nodes of STRAIGHT coincide")
-    return np.asarray(np.linalg.svd(line[None])[2][1:])
 
 
 def _mean_rotation(constraint: MultiPoint, nodes: list[int], where: Array) -> list[Term]:
@@ -246,7 +240,9 @@ def clearance(content: Content, block: Block) -> None:
 def tie(content: Content, block: Block) -> None:
     """Read *TIE: tied surfaces, or the end surfaces of a cyclic sector."""
     if "CYCLIC SYMMETRY" in block.parameters:
-        content.sector_ends.append(sector_ends(block))
+        block.only()
+        ends = [(first, second) for _, first, second in _sides(block, "cyclic symmetry")]
+        content.sector_ends.append(SectorEnds(block.location, block.get("NAME"), ends[0]))
         return
     tolerance = block.get("POSITION TOLERANCE")
     value = as_number(block.location, tolerance) if tolerance else None

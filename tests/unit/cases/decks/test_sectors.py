@@ -62,7 +62,7 @@ def test_a_quarter_of_a_ring_stays_one(tmp_path):
         (TIE + MODEL.replace("tie=round", "tie=other"), "TIE=other, and the ties with CYCLIC SYMMETRY are: round"),
         (MODEL, "TIE=round, and the ties with CYCLIC SYMMETRY are: none"),
         (TIE, r"\*TIE: no \*CYCLIC SYMMETRY MODEL defines the number of sectors"),
-        (TIE.replace("left, right", "left"), r"\*TIE: cyclic symmetry needs one data line with two surfaces"),
+        (TIE.replace("left, right", "left"), r"\*TIE: cyclic symmetry needs two surfaces"),
         (TIE.replace("left,", "west,") + MODEL, r"\*TIE: surface 'west' is not defined"),
         (
             TIE.replace(", cyclic", ", multistage, cyclic") + MODEL,
