@@ -174,10 +174,9 @@ class Block(Item):
 
 @dataclass
 class Source:
-    """State of reading a deck: its folder, whether data lines are kept, size and paths of files read, and open files."""
+    """State of reading a deck: its folder, size and paths of the files read, and open files."""
 
     folder: Path
-    with_data: bool = True
     size: int = 0
     files: list[Path] = field(default_factory=list)
     open: list[Path] = field(default_factory=list)
@@ -214,13 +213,12 @@ def read_blocks(path: Path) -> Iterator[Block]:
     CaseError
         If a line is invalid or the file of an *INCLUDE is not accepted; the message names file and line.
     """
-    source = Source(path.resolve().parent)
-    return _blocks(path, path.name, source)
+    return _blocks(path, path.name, Source(path.resolve().parent))
 
 
 def files_of_deck(path: Path) -> list[Path]:
     """Return the paths of a deck and of its included files in reading order; errors as for `read_blocks`."""
-    source = Source(path.resolve().parent, with_data=False)
+    source = Source(path.resolve().parent)
     for _ in _blocks(path, path.name, source):
         pass
     return source.files
@@ -274,7 +272,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
                 raise Location(name, line.number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
-            yield _with_lines(current, contents, last, line.begin, source)
+            yield _with_lines(current, contents, last, line.begin)
         location = Location(name, line.number, _keyword(line.text))
         last = _continued(location, line, lines)
         current = Block(location, _parameters(location, last.text))
@@ -282,13 +280,13 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
             yield from _included(current, name, source)
             current = None
     if current is not None:
-        yield _with_lines(current, contents, last, len(contents), source)
+        yield _with_lines(current, contents, last, len(contents))
     source.open.pop()
 
 
-def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: Source) -> Block:
+def _with_lines(block: Block, contents: bytes, last: _Line, end: int) -> Block:
     """Return a block with the data lines between the last line of its keyword and the offset `end`."""
-    if not source.with_data or last.end >= end:
+    if last.end >= end:
         return block
     location = Location(block.location.file, last.number + 1, block.keyword)
     return Block(block.location, block.parameters, Lines(location, contents, last.end, end))

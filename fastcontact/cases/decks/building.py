@@ -319,7 +319,7 @@ class Building:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
             with refusing(pair):
-                options = self._tied(pair) if pair.tied else self._options(pair)
+                options = self._options(pair)
                 if secondary in self.assembly.loose:
                     options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
@@ -336,9 +336,13 @@ class Building:
         return options
 
     def _options(self, pair: Pair) -> dict[str, Any]:
+        alone = self.content.heat == "alone"
+        if pair.tied:
+            heat = self.content.heat and {"conductance": perfect_conductance(self.content, self.model, pair.location)}
+            return {"kind": "gap_only" if alone else "tied", **(heat or {})}
         law = self.content.interactions[folded(pair.interaction)]
         options: dict[str, Any] = conductance_of(self.content, law) if self.content.heat else {}
-        if self.content.heat == "alone":
+        if alone:
             return {**options, "kind": "gap_only", **self._fitted(pair)}
         if law.cohesion:
             return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
@@ -352,13 +356,6 @@ class Building:
         if "friction" in options and self.content.heat:
             options.update(friction_heat_of(self.content, law))
         return {**options, **self._fitted(pair)}
-
-    def _tied(self, pair: Pair) -> dict[str, Any]:
-        """Return the options of a tie, with a conductance if temperatures are computed."""
-        if not self.content.heat:
-            return {"kind": "tied"}
-        kind = "gap_only" if self.content.heat == "alone" else "tied"
-        return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
         """Return the option `clearance` that ADJUST or *CLEARANCE requires; an empty dictionary if it is zero.
