@@ -77,7 +77,6 @@ class Part:
     name: str = ""
     nodes: dict[int, int] = field(default_factory=dict)
     coordinates: array[float] = field(default_factory=lambda: array("d"))
-    flat: bool = False
     cells: dict[int, Cell] = field(default_factory=dict)
     node_sets: dict[str, list[Members]] = field(default_factory=dict)
     element_sets: dict[str, list[Members]] = field(default_factory=dict)
@@ -144,7 +143,6 @@ class Pair(Located):
     tied: bool = False
     adjust: str = ""
     clearance: float | None = None
-    tolerance: float | None = None
 
     @property
     def name(self) -> str:
@@ -269,7 +267,7 @@ class Content:
     """The content of a deck."""
 
     title: str = ""
-    root: Part = field(default_factory=lambda: Part(flat=True))
+    root: Part = field(default_factory=Part)
     parts: dict[str, Part] = field(default_factory=dict)
     instances: dict[str, Instance] = field(default_factory=dict)
     materials: dict[str, Material] = field(default_factory=dict)

@@ -244,10 +244,9 @@ def tie(content: Content, block: Block) -> None:
         ends = [(first, second) for _, first, second in _sides(block, "cyclic symmetry")]
         content.sector_ends.append(SectorEnds(block.location, block.get("NAME"), ends[0]))
         return
-    tolerance = block.get("POSITION TOLERANCE")
-    value = as_number(block.location, tolerance) if tolerance else None
     adjust = block.choice("ADJUST", ("YES", "NO"))
-    if value is not None:
+    if tolerance := block.get("POSITION TOLERANCE"):
+        value = as_number(block.location, tolerance)
         if value < 0.0:
             raise block.refuse(f"POSITION TOLERANCE={value:g} is negative")
         content.note(
@@ -257,7 +256,7 @@ def tie(content: Content, block: Block) -> None:
         )
     if adjust == "YES" and "ADJUST" in block.parameters:
         content.note(block, "ADJUST=YES: nodes are not moved, distances of the sides are kept")
-    content.pairs += [Pair(*sides, tied=True, adjust=adjust, tolerance=value) for sides in _sides(block, "a tie")]
+    content.pairs += [Pair(*sides, tied=True) for sides in _sides(block, "a tie")]
 
 
 def equation(content: Content, block: Block) -> None:
