@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.hdf5_driver import new_hdf5
+from fastcontact._tools.hdf5 import new_hdf5
 from fastcontact._tools.packing import packed
 from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.elasticity.material_sides import material_sides

@@ -352,7 +352,7 @@ def test_a_sweep_shows_itself(tmp_path):
 @pytest.mark.parametrize("first", ["truncate", "write"])
 def test_a_disk_that_fails_while_hdf5_writes_is_told_once(first, tmp_path):
     """The first error is kept, nothing is written after it, and HDF5 sees no exception."""
-    from fastcontact._tools.hdf5_driver import DriverFile
+    from fastcontact._tools.hdf5 import DriverFile
 
     path = tmp_path / "a.med"
     path.write_bytes(b"before")

@@ -14,8 +14,8 @@ from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels
-from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import fill
+from fastcontact.results.plot.solid import seen_along
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 

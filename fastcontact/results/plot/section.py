@@ -14,10 +14,9 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, framed, mark, new_axes, part_shown, placed, size_around
 from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import shaded
 from fastcontact.results.plot.shape import scale_of, scaled
-from fastcontact.results.plot.solid import MOST_EDGES
+from fastcontact.results.plot.solid import MOST_EDGES, seen_along
 from fastcontact.results.step import StepResult
 
 # Distance by which a plane that only touches a body is moved into the body, relative to the size of the body.
