@@ -78,8 +78,7 @@ _NAMES = {
     "results.writer": ("ResultWriter",),
     "results.xmgrace": ("write_agr",),
     "studies.adaptive": ("adaptive_study",),
-    "studies.error_estimate": ("ErrorEstimate", "estimate_error"),
-    "studies.error_norms": ("ErrorNorms", "error_against"),
+    "studies.error_norms": ("ErrorEstimate", "ErrorNorms", "error_against", "estimate_error"),
     "studies.convergence": ("convergence_study",),
     "studies.sweep": ("parameter_sweep",),
 }

@@ -11,11 +11,10 @@ from fastcontact import analytic
 from fastcontact._tools import toml_text
 from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
-from fastcontact.cases.checks import CHECK, Check, read_check
-from fastcontact.cases.input_files import files_named
+from fastcontact.cases.case_files import case_path, files_named, shipped_cases
+from fastcontact.cases.checks import Check, read_check
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
 from fastcontact.cases.model_tables import LISTS, build_model, points
-from fastcontact.cases.shipped import case_path, shipped_cases
 from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
@@ -244,7 +243,10 @@ def build_case(
         linear_tolerance=tolerance,
         probes=probes,
         theories=theories,
-        checks=_checks(data, probes, pairs, theories),
+        checks=[
+            read_check(f"check[{i}]", entry, probes, pairs, theories, str(data["kinematics"]))
+            for i, entry in enumerate(tables("check", data.get("check", [])))
+        ],
         units=known_units(model.units),
         approach=approach,
         folder=Path(folder).resolve(),
@@ -266,16 +268,6 @@ def _pairs(data: dict[str, Any], model: Model) -> dict[str, Any]:
     named = data.get("contact", {})
     named = {**(named if isinstance(named, dict) else {}), **data.get("obstacle", {})}
     return {pair.name: named.get(pair.name, data.get("contacts", {})) for pair in model.contact}
-
-
-def _checks(
-    data: dict[str, Any], probes: Mapping[str, int], pairs: Mapping[str, Any], theories: Mapping[str, Any]
-) -> list[Check]:
-    checks = []
-    for i, entry in enumerate(tables("check", data.get("check", []))):
-        check_keys(f"check[{i}]", entry, CHECK)
-        checks.append(read_check(f"check[{i}]", entry, probes, pairs, theories, str(data["kinematics"])))
-    return checks
 
 
 def _sensitivities(model: Model, data: dict[str, Any]) -> list[tuple[Label, list[Label]]]:
@@ -354,22 +346,16 @@ def _theories(
         if not isinstance(entry, dict):
             raise CaseError(f"'theory.{pair}' must be a table with the key 'kind', not {entry!r:.80}")
         constants = {key: value for key, value in entry.items() if key not in ("mesh_converged", "share")}
-        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": _share(f"theory.{pair}", entry)}
+        theories[pair] = {"theory": _theory(f"theory.{pair}", constants), "share": entry.get("share", 1.0)}
+        check_keys(f"theory.{pair}", {"share": theories[pair]["share"]}, {"share": NUMBER})
+        if not 0.0 < theories[pair]["share"] <= 1.0:
+            text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
+            raise CaseError(f"theory.{pair}.share = {entry['share']:g} {text}")
         if "mesh_converged" in entry:
             theories[pair]["mesh_converged"] = _theory(f"theory.{pair}.mesh_converged", entry["mesh_converged"])
         if "approach" in constants:
             approach[pair] = float(constants["approach"])
     return theories, approach
-
-
-def _share(where: str, data: dict[str, Any]) -> float:
-    """Return the fraction of the theory's contact that the model represents [-], 1 by default."""
-    check_keys(where, {"share": data.get("share", 1.0)}, {"share": NUMBER})
-    share = float(data.get("share", 1.0))
-    if not 0.0 < share <= 1.0:
-        text = "must be more than 0 and at most 1: 0.25 for a quarter of the contact"
-        raise CaseError(f"{where}.share = {share:g} {text}")
-    return share
 
 
 def _theory(where: str, data: dict[str, Any]) -> Any:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.analysis.resultants import contact_moment
-from fastcontact.cases.keys import NUMBER, keys_of
+from fastcontact.cases.keys import NUMBER, check_keys, keys_of
 from fastcontact.errors import CaseError, check_known, unknown
 from fastcontact.results.step import ContactResult, StepResult
 
@@ -152,7 +152,8 @@ def read_check(
     theories: Mapping[str, Any],
     kinematics: str = "3d",
 ) -> Check:
-    """Return the check that an entry of a case file describes, whose keys are known; CaseError if a value is invalid."""
+    """Return the check that an entry of a case file describes; CaseError if a key or a value is invalid."""
+    check_keys(where, entry, CHECK)
     for key in ("quantity", "tolerance"):
         if key not in entry:
             raise CaseError(f"{where} needs '{key}'")
@@ -164,9 +165,9 @@ def read_check(
     if owner in pairs and field in NEEDED and NEEDED[field][0] not in pairs[owner]:
         raise CaseError(f"{where}: '{owner}' has no {field}: {NEEDED[field][1]}")
     of = field.split(".")[0] if owner in pairs else "pressure_max"
-    factor = _whole(field, theories.get(entry.get("theory", ""), {}))
+    share = theories.get(entry.get("theory", ""), {}).get("share", 1.0) if field.split(".")[0] == "force" else 1.0
     numbers = {key: float(entry[key]) for key in ("tolerance", "value", "factor") if key in entry}
-    check = Check(**{"name": entry["quantity"], "of": of, "factor": factor, **entry, **numbers})
+    check = Check(**{"name": entry["quantity"], "of": of, "factor": 1.0 / float(share), **entry, **numbers})
     if not 0.0 < check.tolerance < math.inf:
         raise CaseError(
             f"{where}.tolerance = {check.tolerance:g} must be a positive number, e.g. 0.01 for one per cent"
@@ -192,25 +193,16 @@ def _check_quantity(where: str, field: str, allowed: Collection[str], kinematics
     check_known(f"quantity in {where}", field, allowed, CaseError)
 
 
-def _whole(field: str, theory: Mapping[str, Any]) -> float:
-    """Return the ratio of the force of the whole contact to that of the modelled fraction; 1 for other quantities."""
-    return 1.0 / float(theory.get("share", 1.0)) if field.split(".")[0] == "force" else 1.0
-
-
 def check_target(where: str, check: Check, theory: Any) -> None:
     """Raise CaseError if the theory lacks the target, or if the target is zero or infinite."""
     try:
         target = check.target(theory)
     except (AttributeError, TypeError):
-        numbers = [name for name in dir(theory) if not name.startswith("_") and _is_number(theory, name)]
+        public = [name for name in dir(theory) if not name.startswith("_")]
+        numbers = [name for name in public if type(getattr(theory, name, None)) in NUMBER]
         raise CaseError(unknown(f"number of the theory in {where}.of", check.of, numbers)) from None
     if not (math.isfinite(target) and target):
         raise CaseError(f"{where}: the theory's {check.of} is {target:g}, so the relative deviation is undefined")
-
-
-def _is_number(theory: Any, name: str) -> bool:
-    value = getattr(theory, name, None)
-    return isinstance(value, NUMBER) and not isinstance(value, bool)
 
 
 def measured(check: Check, step: StepResult, probes: Mapping[str, int]) -> float:

@@ -54,7 +54,11 @@ def summarise(
         },
         "probes": {name: _probe(last, point) for name, point in case.probes.items()},
         "von_mises_max": {"value": float(last.von_mises[top]), "at": mesh.points[top].tolist()},
-        **({"cell_fields": _extremes(last)} if last.cell_fields else {}),
+        **(
+            {"cell_fields": {name: _range(field) for name, field in last.cell_fields.items()}}
+            if last.cell_fields
+            else {}
+        ),
         **({} if last.temperature is None else {"heat": _heat(last)}),
         "theory": {
             pair: _against_theory(last.contact[pair], case.approach.get(pair), **theories)
@@ -152,30 +156,21 @@ def finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _extremes(step: StepResult) -> dict[str, list[float]]:
-    """Return the smallest and the largest value of each cell field."""
-    return {name: _range(values) for name, values in step.cell_fields.items()}
-
-
 def _range(values: Any) -> list[float]:
     return [float(values.min()), float(values.max())]
 
 
 def _probe(step: StepResult, point: int) -> dict[str, Any]:
     contact, row = at_point(step, point) or (None, 0)
+    by_material = step.material_stress.at(point) if step.material_stress is not None else {}  # empty inside a material
+    of_materials = {str(number): stress.tolist() for number, stress in by_material.items()}
     return {
         "stress": step.stress[point].tolist(),
         "displacement": step.displacement[point].tolist(),
         "von_mises": float(step.von_mises[point]),
         "pressure": float(contact.pressure[row]) if contact else None,
-        **({"stress_by_material": _by_material(step, point)} if _by_material(step, point) else {}),
+        **({"stress_by_material": of_materials} if of_materials else {}),
     }
-
-
-def _by_material(step: StepResult, point: int) -> dict[str, list[float]]:
-    """Return the stress of each material at a point on an interface, by material number; empty at other points."""
-    values = step.material_stress.at(point) if step.material_stress is not None else {}
-    return {str(number): stress.tolist() for number, stress in values.items()}
 
 
 def _against_theory(
@@ -232,16 +227,20 @@ def lines(summary: Mapping[str, Any]) -> list[str]:
         crossing = "".join(f"; across '{name}' {power:.6g}" for name, power in heat["contacts"].items())
         low, high = heat["temperature"]
         rows.append(f"  temperatures from {low:.6g} to {high:.6g}; heat into the bodies by {ends}, {powers}{crossing}")
-    if summary["regularised"]:
-        rows.append(_regularised_line(summary["regularised"], unit))
+    if report := summary["regularised"]:
+        rows.append(
+            f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
+            f"{valued(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} "
+            "of the load at the end"
+        )
     for name, theory in summary["theory"].items():
         rows += _theory_lines(name, theory, summary["contact"][name]["extent"])
     for entry in summary["sensitivities"]:
-        rows += _sensitivity_lines(entry)
+        rows.append(_sensitivity_line(entry))
     if "modes" in summary:
         rows += _mode_lines(summary["modes"])
     for check in summary["checks"]:
-        rows += [_check_line(check, unit), *_why(check)]
+        rows += _check_lines(check, unit)
     return rows
 
 
@@ -298,14 +297,6 @@ def _edge(extent: str, inside: float | None, outside: float | None, unit: Mappin
     return f"{extent} {inside:.4g} to {valued(outside, unit, 'length')}"
 
 
-def _regularised_line(report: Mapping[str, Any], unit: Mapping[str, str]) -> str:
-    return (
-        f"  held by contact alone: {grouped(report['motions'])}. Regularised by springs of "
-        f"{valued(report['spring_stiffness'], unit, 'stiffness', 3)}, which carry {report['relative_to_load']:.1e} of the "
-        "load at the end"
-    )
-
-
 def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str]:
     titles = {
         "equal_approach": "theory at equal approach",
@@ -322,15 +313,16 @@ def _theory_lines(pair: str, theory: Mapping[str, Any], extent: str) -> list[str
     ]
 
 
-def _sensitivity_lines(report: Mapping[str, Any]) -> list[str]:
+def _sensitivity_line(report: Mapping[str, Any]) -> str:
     quantity = " ".join(map(str, report["quantity"]))
     if "refused" in report:
-        return [f"  no sensitivities of {quantity}: {report['refused']}"]
+        return f"  no sensitivities of {quantity}: {report['refused']}"
     changes = ", ".join(f"{' '.join(map(str, d['by']))} {d['value']:.6g}" for d in report["derivatives"])
-    return [f"  sensitivities of {quantity}, now {report['value']:.6g}: by {changes}"]
+    return f"  sensitivities of {quantity}, now {report['value']:.6g}: by {changes}"
 
 
-def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
+def _check_lines(check: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
+    """Yield the result of a check and, if it fails because of its theory rather than the mesh, the explanation."""
     verdict = "within" if check["passed"] else "NOT within"
     owner = "the theory's" if check["of"] else "the documented"
     measured = valued(check["value"], unit, check["unit"], 6)
@@ -338,20 +330,14 @@ def _check_line(check: Mapping[str, Any], unit: Mapping[str, str]) -> str:
         f"  check {check['name']}: {measured} is {abs(check['deviation']):.3%} from {owner} "
         f"{check['target']:.6g}, {verdict} {check['tolerance']:.3g}"
     )
-    if check["distance_to_mesh_converged"] is not None:
-        text += (
-            f"; {check['distance_to_mesh_converged']:+.3%} from the mesh-converged value, which itself is "
-            f"{check['mesh_converged_deviation']:+.3%} from the theory"
-        )
-    return text
-
-
-def _why(check: Mapping[str, Any]) -> list[str]:
-    """Return a line of explanation if a check fails because of its theory rather than the mesh."""
     off = check["mesh_converged_deviation"]
-    if check["passed"] or off is None or abs(off) <= check["tolerance"]:
-        return []
-    return [
-        f"    reason: the theory is not exact for these bodies: on finer meshes the deviation tends to {off:+.3%}, more than "
-        f"the {check['tolerance']:.3g} that this check requires"
-    ]
+    if off is None:
+        yield text
+        return
+    distance = f"{check['distance_to_mesh_converged']:+.3%} from the mesh-converged value"
+    yield f"{text}; {distance}, which itself is {off:+.3%} from the theory"
+    if not check["passed"] and abs(off) > check["tolerance"]:
+        yield (
+            f"    reason: the theory is not exact for these bodies: on finer meshes the deviation tends to {off:+.3%}, more "
+            f"than the {check['tolerance']:.3g} that this check requires"
+        )

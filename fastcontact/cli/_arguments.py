@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+
 # The key is the usage, such as ``"-o --output FILE"``, and the value is the help, or the kind of the argument and the help.
 # The kind is a type, a default value, or a dictionary of settings of argparse. A nested table is a group with its key as
 # title; the arguments of a group without a title are mutually exclusive.
-Arguments = Mapping[str, Any]
-
-
-def declare(parser: Any, table: Arguments, **common: Any) -> None:
+def declare(parser: Any, table: Mapping[str, Any], **common: Any) -> None:
     """Add the arguments of a table to a parser or to an argument group; `common` are settings of all arguments."""
     for usage, entry in table.items():
         if isinstance(entry, Mapping):
@@ -24,3 +22,12 @@ def declare(parser: Any, table: Arguments, **common: Any) -> None:
         value = usage.split()[len(flags) :]
         shown = {} if not flags else {"metavar": value[0]} if value else {"action": "store_true"}
         parser.add_argument(*(flags or value), **{"help": text, **shown, **kind, **common})
+
+
+def add_loudness(parser: Any, default: Any) -> None:
+    """Add the verbosity options, which all commands have, with the default value `default`."""
+    table = {
+        "-v --verbose": "report what is being done and why",
+        "-q --quiet": "print nothing but errors and warnings",
+    }
+    declare(parser.add_mutually_exclusive_group(), table, default=default)

@@ -20,17 +20,44 @@ from typing import Any
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
-from fastcontact.cli._arguments import declare
-from fastcontact.cli._completion import SHELLS, PrintCompletion
+from fastcontact.cli._arguments import add_loudness, declare
 from fastcontact.cli._interrupts import CODES, forget, interruptible, meant
-from fastcontact.cli._terminal import add_loudness, encodable, say, somebody_watches
-from fastcontact.cli._warnings import warnings_shown
+from fastcontact.cli._terminal import encodable, say, somebody_watches, warnings_shown
 from fastcontact.errors import ConvergenceError, FastcontactError, printable, unknown
+
+SHELLS = ("bash", "zsh", "tcsh")
+# Names and metavars of arguments whose values are file names.
+FILES = ("case", "file", "output", "mesh", "FILE", "PNG", "FOLDER", "DIR")
+
+
+class PrintCompletion(argparse.Action):
+    """Action of ``--print-completion SHELL``: print the completion script of a shell and exit."""
+
+    def __call__(self, parser: argparse.ArgumentParser, namespace: Any, values: Any, option_string: Any = None) -> None:
+        """Print the script; FastcontactError if shtab is not installed."""
+        try:
+            import shtab
+        except ImportError as error:
+            raise FastcontactError("completion in shells needs shtab: pip install 'fastcontact[completion]'") from error
+        _mark_files(parser, shtab.FILE)
+        say(shtab.complete(parser, shell=values))
+        parser.exit()
+
+
+def _mark_files(parser: argparse.ArgumentParser, kind: Any) -> None:
+    """Mark the arguments of a parser and its subcommands that are file names, for shtab."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for sub in action.choices.values():
+                _mark_files(sub, kind)
+        elif {action.dest, action.metavar} & {*FILES}:
+            action.complete = kind  # type: ignore[attr-defined]
+
 
 log = logging.getLogger("fastcontact")
 _FLAG = re.compile(r"(?<![\w-])--?[A-Za-z][\w-]*")
-# Message of argparse for an invalid choice, with the valid names.
 _SEVERAL = re.compile(r"expected \d+ arguments")
+# Message of argparse for an invalid choice, with the valid names.
 _CHOICE = re.compile(r"argument (?P<kind>[\w-]+): invalid choice: '(?P<given>.*)' \(choose from (?P<known>.*)\)")
 _NAME = re.compile(r"[\w-]+")
 

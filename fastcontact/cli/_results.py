@@ -10,12 +10,11 @@ import numpy as np
 
 from fastcontact._tools import toml_text
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._terminal import say
 from fastcontact.errors import CaseError, check_known
 
 # Arguments that choose a step and a contact pair.
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "file": "result file (.vtkhdf)",
     "--step STEP": (-1, "number of the step, from 1; by default the last"),
     "--contact NAME": "contact pair; by default the first",
@@ -47,10 +46,8 @@ def chosen_contact(options: argparse.Namespace, step: Any) -> str:
     name, *others = step.contact
     if others and not options.quiet:
         listed = ", ".join(f"'{other}'" for other in others)
-        say(
-            f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)",
-            error=True,
-        )
+        text = f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)"
+        say(text, error=True)
     return str(name)
 
 

@@ -1,4 +1,4 @@
-"""Printing on terminals, with control characters escaped.
+"""Printing on terminals, warnings included, with control characters escaped.
 
 Names and titles from files may contain escape sequences, which could change the display or the behaviour of a terminal, and
 characters that change the direction of writing, which could hide part of a line (Boucher and Anderson, 2023). Characters that
@@ -7,22 +7,15 @@ the encoding of the terminal lacks are escaped as well.
 
 from __future__ import annotations
 
-import argparse
+import contextlib
+import logging
 import os
 import sys
-from typing import Any, TextIO
+import warnings
+from collections.abc import Iterator
+from typing import TextIO
 
-from fastcontact.cli._arguments import declare
-from fastcontact.errors import FileError, printable
-
-
-def add_loudness(parser: argparse.ArgumentParser, default: Any) -> None:
-    """Add the verbosity options, which all commands have, with the default value `default`."""
-    table = {
-        "-v --verbose": "report what is being done and why",
-        "-q --quiet": "print nothing but errors and warnings",
-    }
-    declare(parser.add_mutually_exclusive_group(), table, default=default)
+from fastcontact.errors import FastcontactWarning, FileError, printable
 
 
 def somebody_watches() -> bool:
@@ -70,3 +63,25 @@ def encodable(text: str, stream: TextIO) -> str:
     """Return a string in which escapes replace the characters that a stream cannot encode."""
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+log = logging.getLogger("fastcontact")
+
+
+@contextlib.contextmanager
+def warnings_shown() -> Iterator[list[str]]:
+    """Log each distinct warning of the library once, in one line, when it is issued; yield a list of their texts."""
+    texts: list[str] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", FastcontactWarning)
+        ordinary = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
+            if not issubclass(category, FastcontactWarning):
+                ordinary(message, category, *rest)  # type: ignore[arg-type]
+            elif str(message) not in texts:
+                texts.append(str(message))
+                log.warning("warning: %s", message)
+
+        warnings.showwarning = show  # type: ignore[assignment]
+        yield texts

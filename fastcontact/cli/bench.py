@@ -8,11 +8,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.errors import FastcontactError
 
 HELP = "run the benchmarks of the checkout"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "names": ({"nargs": "*", "metavar": "NAME"}, "benchmarks (default: all)"),
     "--smallest": "run the smallest size of each benchmark once, as a check",
     "--sizes N": ({"type": int, "nargs": "+"}, "approximate numbers of unknowns"),

@@ -7,13 +7,12 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
 HELP = "list the ready-made cases, or print or copy one of them"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "name": ({"nargs": "?"}, "print this case file instead of the list"),
     "--copy NAME": "copy this case file and its mesh file",
     "-o --output FILE": "copy to this file (default: NAME.toml, here)",
@@ -22,7 +21,7 @@ ARGUMENTS: Arguments = {
 
 def run(options: argparse.Namespace) -> int:
     """List the ready-made cases, or print or copy one of them."""
-    from fastcontact.cases.shipped import shipped_case, shipped_cases
+    from fastcontact.cases.case_files import shipped_case, shipped_cases
 
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")

@@ -7,14 +7,12 @@ import dataclasses
 from functools import partial
 
 from fastcontact.cli import _study
-from fastcontact.cli._arguments import Arguments
-from fastcontact.cli._terminal import somebody_watches
-from fastcontact.cli._warnings import warnings_shown
+from fastcontact.cli._terminal import somebody_watches, warnings_shown
 from fastcontact.errors import CaseError
 
 HELP = "mesh-convergence study: orders, limits with error bars, model error and mesh error"
 HINT = "--html FILE writes a report"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "case": "case file (TOML); its table [study] defines the meshes",
     "--levels N": (5, "number of meshes (default 5)"),
     "--elements NAMES": "elements to compare, e.g. quad4,quad8, or all",

@@ -8,12 +8,11 @@ import signal
 import tempfile
 import time
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError
 
 HELP = "show versions, threads and the cache folder of compiled kernels"
-ARGUMENTS: Arguments = {"--warmup": "compile all kernels, so that later runs start fast"}
+ARGUMENTS = {"--warmup": "compile all kernels, so that later runs start fast"}
 
 
 def run(options: argparse.Namespace) -> int:

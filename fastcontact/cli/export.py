@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.errors import CaseError
 
 HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "file": "result file (.vtkhdf)",
     "--med FILE": "write mesh and fields of all steps as MED",
     "--xdmf FILE": "write an XDMF file that refers to the result file",

@@ -7,12 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
 HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "file": "mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)",
     "--contacts": "show the surfaces of bodies that face each other instead",
     "--distance LENGTH": (float, "largest gap for --contacts (default: the size of facets)"),
@@ -23,31 +22,33 @@ ARGUMENTS: Arguments = {
 
 def run(options: argparse.Namespace) -> int:
     """Print the content of the file."""
+    file, suffix = Path(options.file), Path(options.file).suffix.lower()
     if options.contacts or options.png:
         return _contacts(options)
-    if Path(options.file).suffix == ".vtkhdf":
+    if suffix == ".vtkhdf":
         from fastcontact.results.reader import open_results
 
         with open_results(options.file) as results:
-            say("\n".join([*_mesh_lines(results.mesh), *_result_lines(results)]))
-        return 0
-    if Path(options.file).suffix.lower() == ".inp" and _is_deck(Path(options.file)):
+            rows = [*_mesh_lines(results.mesh), *_result_lines(results)]
+    elif suffix == ".inp" and _is_deck(file):
         from fastcontact.cases.decks.deck import read_deck
 
         deck = read_deck(options.file)
-        say("\n".join([*_deck_lines(deck), *_mesh_lines(deck.model.mesh)]))
-        return 0
-    if Path(options.file).suffix.lower() == ".toml":
+        factors = ", ".join(f"{t:g}" for t in deck.ramp.instants)
+        rows = [f"{deck.path}: {deck.title}", repr(deck.model), f"load factors: {factors}"]
+        rows += [*(f"  note: {text}" for text in deck.notes), *_mesh_lines(deck.model.mesh)]
+    elif suffix == ".toml":
         from fastcontact.cases.case import read_case
 
         case = read_case(options.file)
-        say("\n".join([f"{options.file}: {case.title}", repr(case.model), *_mesh_lines(case.mesh)]))
-        return 0
-    from fastcontact.mesh.files.mesh_files import read_mesh_report
-    from fastcontact.mesh.quality import quality
+        rows = [f"{options.file}: {case.title}", repr(case.model), *_mesh_lines(case.mesh)]
+    else:
+        from fastcontact.mesh.files.mesh_files import read_mesh_report
+        from fastcontact.mesh.quality import quality
 
-    mesh, report = read_mesh_report(options.file)
-    say("\n".join([str(report), *_mesh_lines(mesh), str(quality(mesh))]))
+        mesh, report = read_mesh_report(options.file)
+        rows = [str(report), *_mesh_lines(mesh), str(quality(mesh))]
+    say("\n".join(rows))
     return 0
 
 
@@ -57,7 +58,8 @@ def _contacts(options: argparse.Namespace) -> int:
     from fastcontact.contact.found_contacts import find_contacts
     from fastcontact.results import plot
 
-    case = _is_case(Path(options.file))
+    path = Path(options.file)
+    case = path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
     check_outputs(files_of_case(options.file) if case else [options.file], [], [options.png])
     mesh = read_case(options.file).mesh if case else _mesh_of(options.file)
     contacts = find_contacts(mesh, distance=options.distance, angle=options.angle)
@@ -66,11 +68,6 @@ def _contacts(options: argparse.Namespace) -> int:
         save(plot.contacts(contacts), options.png)
         say(f"wrote {options.png}")
     return 0
-
-
-def _is_case(path: Path) -> bool:
-    """Return whether a file is a case file, or a deck with more than a mesh."""
-    return path.suffix.lower() == ".toml" or (path.suffix.lower() == ".inp" and _is_deck(path))
 
 
 def _mesh_of(file: str) -> Any:
@@ -92,13 +89,6 @@ def _is_deck(path: Path) -> bool:
     words = ("*STEP", "*PART", "*INCLUDE")
     with open(existing_file(path), encoding="utf-8", errors="replace") as file:
         return any(line.lstrip().upper().startswith(words) for line in file)
-
-
-def _deck_lines(deck: Any) -> Iterator[str]:
-    yield f"{deck.path}: {deck.title}"
-    yield repr(deck.model)
-    yield f"load factors: {', '.join(f'{t:g}' for t in deck.ramp.instants)}"
-    yield from (f"  note: {text}" for text in deck.notes)
 
 
 def _mesh_lines(mesh: Any) -> list[str]:

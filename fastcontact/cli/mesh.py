@@ -8,9 +8,9 @@ import typing
 from collections.abc import Callable
 from typing import Any
 
-from fastcontact.cli._arguments import declare
+from fastcontact.cli._arguments import add_loudness, declare
 from fastcontact.cli._outputs import check_outputs, say_written
-from fastcontact.cli._terminal import add_loudness, say
+from fastcontact.cli._terminal import say
 
 HELP = "generate a mesh with named groups and report its quality"
 

@@ -6,14 +6,13 @@ import argparse
 from typing import Any
 
 from fastcontact.cli import _results
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
 # Options that draw a contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     **_results.ARGUMENTS,
     "--png FILE": "write the picture to this file",
     "": {
@@ -79,7 +78,7 @@ def _plane(text: str) -> tuple[int, float]:
 
 def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
     from fastcontact.results import plot
-    from fastcontact.results.phases import phases
+    from fastcontact.results.steps import phases
 
     shown = list(results) if options.phases is None else phases(step, options.phases)
     plot.animate(

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _results
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
 from fastcontact.cli._results import drawn, load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     **_results.ARGUMENTS,
     "--csv FILE": "write the table",
     "--agr FILE": "write an XMGRACE project with the computed and the theoretical pressure",

@@ -11,10 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._arguments import Arguments
 from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
-from fastcontact.cli._terminal import say, somebody_watches
-from fastcontact.cli._warnings import warnings_shown
+from fastcontact.cli._terminal import say, somebody_watches, warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
 
 if TYPE_CHECKING:
@@ -27,7 +25,7 @@ HELP = "solve a case file or an input deck (.inp) and write the results of all s
 ERROR_FIELD = "error"
 # Smallest number of mesh points for which steps are written in the background while the next step is solved.
 LARGE = 30_000
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "case": "case file (TOML), the name of a ready-made case (see 'fastcontact cases'), or a deck (.inp)",
     "-o --output OUTPUT": "result file (default: the case's name with .vtkhdf, here)",
     "--resume": "continue after the last complete step of the result file, if there is one",
@@ -45,13 +43,17 @@ ARGUMENTS: Arguments = {
 
 def run(options: argparse.Namespace) -> int:
     """Solve the case, write the files of the options and print the summary."""
+    from fastcontact._jit import decorators
     from fastcontact.cases import summary
     from fastcontact.cases.case import files_of_case, read_case
-    from fastcontact.cases.shipped import case_path
+    from fastcontact.cases.case_files import case_path
 
     started = time.perf_counter()
     if options.threads is not None:
-        _set_threads(options.threads)
+        limit = os.cpu_count() or 1
+        if not 1 <= options.threads <= limit:
+            raise CaseError(f"--threads {options.threads} must lie between 1 and {limit}, the number of processors")
+        decorators.set_threads(options.threads)
     output = Path(options.output or f"{case_path(options.case).stem}.vtkhdf")
     check_outputs(files_of_case(options.case), [output, options.json, options.modes], [options.plot])
     with warnings_shown() as setup_warnings:
@@ -134,6 +136,8 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
     from fastcontact.cases.summary import of_step
     from fastcontact.results.writer import ResultWriter
 
+    if options.estimate_error:
+        from fastcontact.studies.error_norms import estimate_error
     fields, large = (ERROR_FIELD,) if options.estimate_error else (), case.model.mesh.n_points >= LARGE
     with ResultWriter(
         output, case.model, case_text=case.text, cell_fields=fields, resume=options.resume, background=large
@@ -151,7 +155,8 @@ def _solved(options: argparse.Namespace, case: Case, output: Path) -> tuple[int,
             chosen = {**case.solution, "linear_solver": options.linear or case.linear_solver}
             for last in solve_steps(case.model, case.ramp, **chosen, resume=writer.done):
                 last = case.finished(last)
-                writer.write(_estimated(case.model, last) if fields else last)
+                error = {ERROR_FIELD: estimate_error(case.model, last).cells} if fields else {}
+                writer.write(dataclasses.replace(last, cell_fields=error) if fields else last)
                 steps.append(of_step(last))
                 progress.step(last, writer.n_steps)  # steps in the background thread are not counted
             writer.wait()
@@ -169,7 +174,9 @@ def _stopped(error: BaseException, writer: ResultWriter, output: Path, summary: 
         writer.wait()
     except FileError as failure:
         error.add_note(str(failure))
-    error.add_note(_kept_steps(output, writer.n_steps))
+    many = "one complete step" if writer.n_steps == 1 else f"all {writer.n_steps} complete steps"
+    kept = f"keeps {many}: 'fastcontact run --resume' continues from there"
+    error.add_note(f"'{output}' {kept if writer.n_steps else 'contains no complete step'}")
     if summary:  # replaces the summary of an earlier run
         write_json(summary, {"failed": str(error) or "interrupted from the keyboard", "complete_steps": writer.n_steps})
 
@@ -196,14 +203,6 @@ def _warn_of_other_steps(case: Case, done: Sequence[float], output: Path) -> Non
         )
 
 
-def _kept_steps(output: Path, steps: int) -> str:
-    """Return a message on the complete steps in the result file of a run that was stopped."""
-    if not steps:
-        return f"'{output}' contains no complete step"
-    many = "one complete step" if steps == 1 else f"all {steps} complete steps"
-    return f"'{output}' keeps {many}: 'fastcontact run --resume' continues from there"
-
-
 def _written(output: Path, done: int, total: int, others: list[str]) -> str:
     """Return a message on the files written and the number of earlier steps."""
     if done == total:
@@ -211,18 +210,3 @@ def _written(output: Path, done: int, total: int, others: list[str]) -> str:
         return "; wrote ".join([message, ", ".join(others)] if others else [message])
     after = f" (resumed after step {done})" if done else ""
     return f"wrote {', '.join([f'{output}{after}', *others])}"
-
-
-def _estimated(model: Any, step: Any) -> Any:
-    from fastcontact.studies.error_estimate import estimate_error
-
-    return dataclasses.replace(step, cell_fields={ERROR_FIELD: estimate_error(model, step).cells})
-
-
-def _set_threads(count: int) -> None:
-    from fastcontact._jit import decorators as _jit
-
-    limit = os.cpu_count() or 1
-    if not 1 <= count <= limit:
-        raise CaseError(f"--threads {count} must lie between 1 and {limit}, the number of processors")
-    _jit.set_threads(count)

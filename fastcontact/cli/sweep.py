@@ -10,11 +10,10 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cli import _study
-from fastcontact.cli._arguments import Arguments
 from fastcontact.errors import CaseError
 
 HELP = "solve a case for many values of its parameters, and compare with theory"
-ARGUMENTS: Arguments = {
+ARGUMENTS = {
     "case": "case file (TOML)",
     "--set NAME=VALUES": (
         {"action": "append", "required": True},
@@ -54,7 +53,7 @@ def values(text: str) -> tuple[str, list[Any]]:
 
 
 def _range(text: str, fields: list[str]) -> list[float]:
-    from fastcontact.studies.affordable import check_runs
+    from fastcontact.studies.checks import check_runs
 
     logarithmic = fields[-1] == "log"
     try:

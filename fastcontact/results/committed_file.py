@@ -27,7 +27,7 @@ from types import FrameType
 
 import numpy as np
 
-from fastcontact._tools.hdf5_driver import DriverFile
+from fastcontact._tools.hdf5 import DriverFile
 from fastcontact.results import journal
 
 # Signatures of the superblock, of nodes of indices and of name tables in HDF5.

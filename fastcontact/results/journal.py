@@ -13,7 +13,7 @@ import hashlib
 import io
 import struct
 from collections.abc import Iterable, Iterator, Sequence
-from typing import IO, Any
+from typing import IO
 
 from fastcontact.errors import FileError
 
@@ -111,40 +111,18 @@ def _forged(file: IO[bytes], reason: str) -> FileError:
     return FileError(f"the journal at the end of '{name}' {reason}: it is damaged, compute the file again")
 
 
-class Repeated(io.RawIOBase):
+class Repeated:
     """A read-only view of a file with the writes of its journal applied."""
 
     def __init__(self, file: IO[bytes], writes: Sequence[Write]) -> None:
         self._file, self._writes = file, writes
+        self.seek, self.tell, self.close = file.seek, file.tell, file.close
 
-    def readable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seekable(self) -> bool:
-        """Return True."""
-        return True
-
-    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Set the position."""
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        """Return the position."""
-        return self._file.tell()
-
-    def readinto(self, buffer: Any) -> int:
-        """Read from the current position into a buffer and return the number of bytes."""
-        start, view = self._file.tell(), memoryview(buffer).cast("B")
-        data = self._file.read(len(view))
-        view[: len(data)] = data
-        overlay(self._writes, start, view[: len(data)])
-        return len(data)
-
-    def close(self) -> None:
-        """Close the file; further calls have no effect."""
-        self._file.close()
-        super().close()
+    def read(self, size: int) -> bytes:
+        """Return up to `size` bytes from the current position."""
+        start, data = self._file.tell(), bytearray(self._file.read(size))
+        overlay(self._writes, start, data)
+        return bytes(data)
 
 
 def overlay(writes: Iterable[Write], start: int, view: memoryview | bytearray) -> None:

@@ -33,12 +33,40 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fastcontact.arrays import AnyArray, Array, Numbers
+from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FileError
 from fastcontact.mesh import elements, topology
 from fastcontact.mesh.mesh import Mesh, starts_of
-from fastcontact.results.separated import mean_in_cells
 from fastcontact.results.step import ContactResult, StepResult
+
+
+def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
+    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress (m, ...) [pressure].
+
+    The points of `mesh` are the first points of the new mesh, which has only solid cells and no groups. Stress has the
+    components of `StepResult.stress`. Without interfaces `mesh` is returned.
+    """
+    material_stress = step.material_stress
+    if material_stress is None:
+        return mesh, np.arange(mesh.n_points, dtype=np.int32), step.stress
+    sides = material_sides(mesh, cells_by_element(mesh, material_stress.cells))
+    stress = step.stress[sides.node]
+    stress[sides.place] = material_stress.stress
+    return Mesh(mesh.points[sides.node], sides.cells), sides.node, stress
+
+
+def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
+    """Return the values (n_solids,) of solid cells by element type."""
+    ends = np.cumsum([len(block) for block in mesh.solids.values()])[:-1]
+    return dict(zip(mesh.solids, np.split(values, ends), strict=True))
+
+
+def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
+    """Return the mean (n_solids, n_components) [pressure] over the nodes of each cell of the stress of its material."""
+    separate_mesh, _, stress = separated(mesh, step)
+    return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])
+
 
 Flags = NDArray[np.int8]
 
@@ -48,7 +76,8 @@ SCHEMA = 4
 # Oldest version that can be resumed.
 RESUMABLE = 2
 
-# Point data by name, with the number of components that viewers expect. Stress is a symmetric tensor.
+# Point data by name, with the number of components that viewers expect: 3 for vectors and 6 for symmetric tensors, of which
+# plane models have 2 and 4.
 POINT_FIELDS = {
     "displacement": 3,
     "stress": 6,
@@ -204,10 +233,16 @@ def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
     return slip
 
 
+def step_shapes(mesh: Mesh) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each nodal array of a `StepResult`, by name."""
+    tails = {1: (), 3: (mesh.dim,), 6: (4 if mesh.dim == 2 else 6,)}  # type: dict[int, tuple[int, ...]]
+    widths = {**POINT_FIELDS, **HEAT_FIELDS}.items()
+    return {name: (mesh.n_points, *tails[width]) for name, width in widths if not name.startswith("contact_")}
+
+
 def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
     """Return the point data of a step by name, padded to the components of `POINT_FIELDS`."""
-    values = {name: getattr(step, name) for name in POINT_FIELDS if not name.startswith("contact_")}
-    values |= {name: getattr(step, name) for name in HEAT_FIELDS if getattr(step, name) is not None}
+    values = {name: getattr(step, name) for name in step_shapes(mesh) if getattr(step, name) is not None}
     values["contact_pressure"] = contact_pressure(mesh, step)
     values |= {f"contact_{name}": contact_slip(mesh, step, name) for name in ("slip", "slip_total")}
     return {
@@ -257,9 +292,7 @@ def _flags(members: dict[str, AnyArray], count: int) -> dict[str, Flags]:
 
 def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None:
     """Raise FileError if an array of a step does not match the mesh, or a declared cell field is missing."""
-    n, dim = mesh.n_points, mesh.dim
-    expected = {"displacement": (n, dim), "reaction": (n, dim), "stress": (n, 4 if dim == 2 else 6)}
-    for name, shape in {**expected, **dict.fromkeys(("von_mises", "von_mises_signed", *HEAT_FIELDS), (n,))}.items():
+    for name, shape in step_shapes(mesh).items():
         field = getattr(step, name)
         if field is None and name in HEAT_FIELDS:
             continue

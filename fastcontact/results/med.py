@@ -12,7 +12,7 @@ from fastcontact.arrays import Array
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files.med import AXES, add_field, add_mesh, new_file
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import contact_pressure
+from fastcontact.results.layout import contact_pressure, step_shapes
 from fastcontact.results.step import StepResult
 
 # Index of each MED component in the order xx, yy, zz, xy, yz, xz of this package; in MED files xz precedes yz.
@@ -85,26 +85,24 @@ def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Ar
     """Return the component names and the values (n_points, n_components) of each field, by name."""
     directions = tuple(f"D{axis}" for axis in AXES[: mesh.dim])
     stresses = tuple(STRESSES)[: 4 if mesh.dim == 2 else 6]
-    stress = _checked(mesh, step, "stress", (len(stresses),))
-    equivalent = [_checked(mesh, step, name, ()) for name in ("von_mises", "von_mises_signed")]
-    temperature = (
-        {} if step.temperature is None else {"TEMP": (("TEMP",), _checked(mesh, step, "temperature", ())[:, None])}
-    )
+    stress = _checked(mesh, step, "stress")
+    equivalent = [_checked(mesh, step, name) for name in ("von_mises", "von_mises_signed")]
+    heated = step.temperature is not None
     return {
-        "DEPL": (directions, _checked(mesh, step, "displacement", (mesh.dim,))),
+        "DEPL": (directions, _checked(mesh, step, "displacement")),
         "SIEF_NOEU": (stresses, stress[:, [STRESSES[name] for name in stresses]]),
         "SIEQ_NOEU": (("VMIS", "VMIS_SG"), np.column_stack(equivalent)),
-        "REAC_NODA": (directions, _checked(mesh, step, "reaction", (mesh.dim,))),
+        "REAC_NODA": (directions, _checked(mesh, step, "reaction")),
         "PRES_CONT": (("PRES",), contact_pressure(mesh, step)[:, None]),
-        **temperature,
+        **({"TEMP": (("TEMP",), _checked(mesh, step, "temperature")[:, None])} if heated else {}),
     }
 
 
-def _checked(mesh: Mesh, step: StepResult, name: str, shape: tuple[int, ...]) -> Array:
-    field = np.asarray(getattr(step, name), np.float64)
-    if field.shape != (mesh.n_points, *shape):
+def _checked(mesh: Mesh, step: StepResult, name: str) -> Array:
+    field, shape = np.asarray(getattr(step, name), np.float64), step_shapes(mesh)[name]
+    if field.shape != shape:
         raise MeshError(
-            f"{name} of step {step.index} has shape {field.shape} where the mesh needs "
-            f"{(mesh.n_points, *shape)}: write results with the mesh they were computed on"
+            f"{name} of step {step.index} has shape {field.shape} where the mesh needs {shape}: write results with the mesh "
+            "they were computed on"
         )
     return field

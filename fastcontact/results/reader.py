@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import os
+import struct
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,8 +26,48 @@ from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.step import ContactResult, StepResult
 from fastcontact.results.steps import StepSequence
-from fastcontact.results.texts import read_text
 from fastcontact.results.units import units_of_results
+
+# Global heap collections, which contain the strings of variable length (HDF5 File Format Specification 3.0, section III.E):
+# a header of 16 bytes with the size of the collection and a sequence of objects, each with a header of 16 bytes. They are
+# read without HDF5, which does not terminate for some damaged files.
+SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
+HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
+OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
+REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the string, address of the collection, object number
+
+
+def read_text(dataset: Any, raw: Any) -> str:
+    """Return the string in a data set that contains a single string; `raw` is the open file, with addresses of eight bytes.
+
+    Raises ValueError if the data set is of another kind or damaged.
+    """
+    import h5py
+
+    kind, start = h5py.check_string_dtype(dataset.dtype), dataset.id.get_offset()
+    if dataset.shape != () or start is None or kind is None or kind.length is not None:
+        raise ValueError(f"'{dataset.name}' is not a string")
+    file_size = raw.seek(0, os.SEEK_END)
+    length, offset, wanted = _unpacked(REFERENCE, raw, start, file_size)
+    signature, size = _unpacked(HEAD, raw, offset, file_size)
+    at, end = offset + HEAD.size, min(offset + size, file_size)
+    while signature == SIGNATURE and at + OBJECT.size <= end:
+        number, size = _unpacked(OBJECT, raw, at, end)
+        at += OBJECT.size
+        if number == wanted and length <= size and at + length <= end:
+            return raw.read(length).decode("utf-8")
+        if number in (0, wanted):
+            break
+        at += -(-size // 8) * 8
+    raise ValueError(f"its texts are damaged at byte {at}")
+
+
+def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
+    if offset + kind.size > end:
+        raise ValueError(f"its texts are damaged: they are at byte {offset} of {end}")
+    raw.seek(offset)
+    return kind.unpack(raw.read(kind.size))
+
 
 if TYPE_CHECKING:
     import pandas
@@ -117,7 +156,7 @@ class Results(StepSequence):
         try:
             writes = journal.found(self._raw) if not is_being_written(self.path) or repeat else []
             if writes:
-                self._raw = io.BufferedReader(journal.Repeated(self._raw, writes))
+                self._raw = journal.Repeated(self._raw, writes)
             with self._explained():
                 self._file = h5py.File(self._raw, "r")
                 self._read_header(self._checked())
@@ -196,9 +235,7 @@ class Results(StepSequence):
     def __enter__(self) -> Results:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     def __repr__(self) -> str:
@@ -296,15 +333,10 @@ class Results(StepSequence):
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
         with self._explained():
-            notes = self._notes(number)
+            notes, known = self._notes(number), self.point_field_names
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
-                displacement=self._field("displacement", number, self.mesh.dim),
-                stress=self._field("stress", number, 4 if self.mesh.dim == 2 else 6),
-                von_mises=self._field("von_mises", number),
-                von_mises_signed=self._field("von_mises_signed", number),
-                reaction=self._field("reaction", number, self.mesh.dim),
                 contact=self._contact(number, dict(notes["contact"])),
                 iterations=notes["iterations"],
                 warnings=tuple(notes["warnings"]),
@@ -312,7 +344,7 @@ class Results(StepSequence):
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
                 units=self.units,
-                **{name: self._field(name, number) for name in layout.HEAT_FIELDS if name in self.point_field_names},
+                **{k: self._field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in known},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -363,11 +395,11 @@ class Results(StepSequence):
                 raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return fields
 
-    def _field(self, name: str, number: int, width: int | None = None) -> Array:
+    def _field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
         n = self.mesh.n_points
-        data, rows = self._file["VTKHDF/PointData"][name], slice(number * n, (number + 1) * n)
-        values = data[rows] if width is None else data[rows, :width]
-        if values.shape != ((n,) if width is None else (n, width)) or values.dtype.kind != "f":
+        rows = slice(number * n, (number + 1) * n)
+        values = self._file["VTKHDF/PointData"][name][(rows, *map(slice, shape[1:]))]
+        if values.shape != shape or values.dtype.kind != "f":
             raise ValueError(f"{name} of step {number} is cut off or of another kind")
         return values
 
@@ -455,3 +487,36 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
         table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
         faced = {f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")}
     return ContactResult(name=name, formulation=formulation, **resultants, **faced, **columns)
+
+
+class StoredSteps(StepSequence):
+    """The steps that a file contains when it is opened, which are read on access.
+
+    The last step, with its `restart`, is kept in memory. `release` must be called before the file is changed, because HDF5
+    does not update its view of an open file. Access to another step opens the file again.
+    """
+
+    def __init__(self, results: Results) -> None:
+        self._path: Path = results.path
+        self._results: Results | None = results
+        self._count = len(results)
+        self._last = results[-1]
+
+    def release(self) -> None:
+        """Close the file; further calls have no effect."""
+        if self._results is not None:
+            self._results.close()
+            self._results = None
+
+    def __len__(self) -> int:
+        return self._count
+
+    def _step(self, position: int) -> StepResult:
+        if position == self._count - 1:
+            return self._last
+        if self._results is None:
+            self._results = Results(self._path)
+        return self._results[position]
+
+    def __repr__(self) -> str:
+        return f"StoredSteps('{self._path}': {self._count} steps)"

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import SupportsIndex, overload
 
 from fastcontact._tools.html_table import html_table
+from fastcontact.errors import ModelError
 from fastcontact.results.step import StepResult
 
 # Largest number of steps in the representation of a list.
@@ -70,3 +73,21 @@ def rows_of(step: StepResult) -> list[tuple[str, ...]]:
     begin = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
     pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]
     return [(*begin, *pair) for pair in pairs] or [(*begin, *[""] * (len(HEAD) - len(begin)))]
+
+
+def phases(shape: StepResult, count: int) -> list[StepResult]:
+    """Return a vibration with a given shape at `count` equidistant phases, as steps.
+
+    The load factor of a step is its phase in periods, in [0, 1). Raises ModelError if `count` is less than two.
+    """
+    if count < 2:
+        raise ModelError(f"count = {count}: a period needs two phases or more")
+    return [_times(shape, k + 1, k / count, math.cos(2.0 * math.pi * k / count)) for k in range(count)]
+
+
+def _times(shape: StepResult, index: int, phase: float, factor: float) -> StepResult:
+    return replace(
+        shape, index=index, load_factor=phase, displacement=factor * shape.displacement, stress=factor * shape.stress,
+        von_mises=abs(factor) * shape.von_mises, von_mises_signed=factor * shape.von_mises_signed, restart=None,
+        iterations={"parameter": "phase"},
+    )  # fmt: skip

@@ -15,28 +15,24 @@ import os
 import threading
 import time
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.hdf5_driver import new_hdf5
+from fastcontact._tools.hdf5 import new_hdf5
 from fastcontact._tools.packing import packed
 from fastcontact._tools.paths import PathLike, checked_target, replacing
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.errors import ConvergenceError, FastcontactError, FileError, ModelError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import journal, layout, write_arrays
-from fastcontact.results.background import Background
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
 from fastcontact.results.file_lock import PathLock, left_at, reserve
-from fastcontact.results.reader import Results
+from fastcontact.results.reader import Results, StoredSteps, read_text
 from fastcontact.results.step import StepResult
-from fastcontact.results.stored_steps import StoredSteps
-from fastcontact.results.texts import read_text
 
 # Time after which each step is synchronised with the disk [s]; a shorter run is quickly repeated after a power loss.
 SHORT = 10.0
@@ -138,7 +134,8 @@ class ResultWriter:
         self._file: Any = None
         self._committed: Any = None
         self._closed = self._ended = False
-        self._background = Background() if background else None
+        self._background = ThreadPoolExecutor(1, "fastcontact-writer") if background else None
+        self._writing: Future[None] | None = None
         self._turn = threading.RLock()
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
         self._notes: dict[str, str] = {}  # notes of the next step: the case file, if another one is resumed
@@ -147,29 +144,23 @@ class ResultWriter:
             self._lock = PathLock(self.path)
             try:
                 if resume:
-                    self._take_up(str(kinematics), case_text)
-                if not self.done:
+                    left = left_at(self.path)
+                    self.done, self._ended, old = _steps_to_resume(self.path, mesh, str(kinematics), self._cell_fields)
+                if self.done:
+                    self._left, self.n_steps = left, len(self.done)
+                    self._last = self.done[-1].index, _case_of(self.done[-1])
+                    self._notes = {"case": case_text} if case_text not in ("", old) else {}
+                else:
                     _check_replaceable(self.path, overwrite or resume)
                     self._begin(str(kinematics), case_text)
             except BaseException:
                 self._lock.release()
                 raise
 
-    def _take_up(self, kinematics: str, case_text: str) -> None:
-        """Check whether the file contains steps, and prepare to append to them."""
-        left = left_at(self.path)
-        self.done, self._ended, old_case = _steps_to_resume(self.path, self._mesh, kinematics, self._cell_fields)
-        self.n_steps = len(self.done)
-        if self.done:
-            self._left, self._last = left, (self.done[-1].index, _case_of(self.done[-1]))
-            self._notes = {"case": case_text} if case_text not in ("", old_case) else {}
-
     def __enter__(self) -> ResultWriter:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         if error is None:
             self.close()
             return
@@ -212,7 +203,7 @@ class ResultWriter:
             if self._background is None:
                 self._append(step)
             else:
-                self._background.start(partial(self._append, copy.deepcopy(step)))
+                self._writing = self._background.submit(self._append, copy.deepcopy(step))
 
     def wait(self) -> None:
         """Wait until all steps given to `write` are complete.
@@ -223,14 +214,17 @@ class ResultWriter:
             If the disk was full or failed.
         """
         if self._background is not None:
-            with self._turn:
-                self._background.wait()
+            with self._turn, uninterrupted():
+                writing, self._writing = self._writing, None
+                if writing is not None:
+                    writing.result()
 
     def _append(self, step: StepResult) -> None:
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
-            self._committed.synchronised = self._is_synchronised()
+            late = time.monotonic() - self._started > SHORT
+            self._committed.synchronised = late if self._synchronise is None else self._synchronise
             restart = packed({"step": self.n_steps, "restart": step.restart})
             room = write_arrays.step_size(self._mesh, step) + restart.nbytes
             self._reserve(2 * room if self._committed.synchronised else room)
@@ -280,34 +274,24 @@ class ResultWriter:
         self._finish({"log": log, "warnings": [str(warning) for warning in warnings]})
 
     def _finish(self, run: dict[str, Any]) -> None:
-        with self._turn:
-            if not self._closed:
-                self._finish_once(run)
-
-    def _finish_once(self, run: dict[str, Any]) -> None:
-        if self._file is None and self._ended and "error" not in run:
-            self._give_up()  # a complete file is not changed
-            return
-        self._release_done()
-        try:
-            with self._explained("closed"):
-                self._open()
-                try:
-                    self._check_ours()
-                    if self._committed.writable:
-                        self._reserve(len(write_arrays.as_json(run)))
-                        write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
-                finally:
-                    try:
-                        self._file.close()
-                    finally:
-                        self._committed.close()
-        finally:
-            self._file = None
-            self._give_up()
+        with self._turn, contextlib.ExitStack() as closing:
+            closing.callback(self._give_up)
+            if self._closed or (self._file is None and self._ended and "error" not in run):
+                return  # a complete file is not changed
+            self._release_done()
+            closing.enter_context(self._explained("closed"))
+            self._open()
+            closing.callback(self._committed.close)
+            closing.callback(self._file.close)
+            self._check_ours()
+            if self._committed.writable:
+                self._reserve(len(write_arrays.as_json(run)))
+                write_arrays.append_run(self._objects, self.n_steps, run, self._flush)
 
     def _give_up(self) -> None:
-        self._closed = True
+        self._closed, self._file = True, None
+        if self._background is not None:
+            self._background.shutdown(wait=False)
         self._release_done()
         self._lock.release()
 
@@ -326,7 +310,11 @@ class ResultWriter:
             self._committed = CommittedFile(self.path)
             try:
                 self._file = h5py.File(self._committed, "r+")
-                _limit_index_memory(self._file)
+                # The cache for index nodes grows with the steps and takes ten times the size in the file.
+                settings = self._file.id.get_mdc_config()
+                settings.set_initial_size = True
+                settings.initial_size = settings.min_size = settings.max_size = INDICES
+                self._file.id.set_mdc_config(settings)
             except BaseException:
                 self._committed.close()
                 raise
@@ -360,11 +348,6 @@ class ResultWriter:
     def _flush(self) -> None:
         self._file.flush()
         self._committed.check()
-
-    def _is_synchronised(self) -> bool:
-        if self._synchronise is None:
-            return time.monotonic() - self._started > SHORT
-        return self._synchronise
 
     def _reserve(self, size: int) -> None:
         reserve(self._committed.fileno(), self.path.parent, self._committed.end, size + MARGIN)
@@ -401,14 +384,6 @@ class ResultWriter:
                 write_arrays.write_own(file, self._mesh, kinematics, case_text, self._units)
         # The file is closed in between, because Windows does not rename open files; without locks viewers can read it.
         self._open()
-
-
-def _limit_index_memory(file: Any) -> None:
-    """Limit the cache of HDF5 for index nodes, which grows with the steps and takes ten times the size in the file."""
-    settings = file.id.get_mdc_config()
-    settings.set_initial_size = True
-    settings.initial_size = settings.min_size = settings.max_size = INDICES
-    file.id.set_mdc_config(settings)
 
 
 def _materials_that_meet(model: Any) -> Any:

@@ -21,7 +21,7 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
 from fastcontact.studies.adaptive_report import AdaptiveStudy, Round
-from fastcontact.studies.error_estimate import ErrorEstimate, estimate_error
+from fastcontact.studies.error_norms import ErrorEstimate, estimate_error
 from fastcontact.studies.job import case_data, last_step
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.report import of_case
@@ -91,7 +91,11 @@ def adaptive_study(
     >>> study = fc.adaptive_study("forma04c.toml", "pressure_max", tolerance=0.005)  # doctest: +SKIP
     >>> print(study)  # doctest: +SKIP
     """
-    case = _checked(case, tolerance)
+    case = case if isinstance(case, Case) else read_case(case)
+    if not 0 < tolerance < 1:
+        raise CaseError(f"the relative tolerance {tolerance:g} must lie between 0 and 1")
+    if case.mesh.dim != 2:
+        raise CaseError("adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D")
     chosen = settings(case)
     quantities.check_names(case, [quantity, *chosen.quantities])
     combination = one_combination(chosen, element, formulation)
@@ -114,15 +118,6 @@ def adaptive_study(
     return AdaptiveStudy(
         **of_case(case), combination=str(combination), quantity=quantity, tolerance=tolerance, reached=reached, rounds=rounds,
         case=solved, last=last, error=error)  # fmt: skip
-
-
-def _checked(case: Case | str | Path, tolerance: float) -> Case:
-    case = case if isinstance(case, Case) else read_case(case)
-    if not 0 < tolerance < 1:
-        raise CaseError(f"the relative tolerance {tolerance:g} must lie between 0 and 1")
-    if case.mesh.dim != 2:
-        raise CaseError("adaptive refinement is for triangles and quadrangles in two dimensions; this case is in 3D")
-    return case
 
 
 def _first_mesh(case: Case, chosen: Settings, combination: Combination) -> tuple[Forest, list[Any]]:

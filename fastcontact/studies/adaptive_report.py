@@ -15,10 +15,9 @@ from fastcontact.results.plot.patches import outlines
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import structured
 from fastcontact.results.units import labelled
-from fastcontact.studies.error_estimate import ErrorEstimate
+from fastcontact.studies.error_norms import ErrorEstimate
 from fastcontact.studies.quantities import column, title, unit
-from fastcontact.studies.render.figure import frame, panels
-from fastcontact.studies.render.table import Rows, by_columns, number
+from fastcontact.studies.render import Rows, by_columns, frame, number, panels
 from fastcontact.studies.report import Report
 
 

@@ -14,7 +14,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, read_case
 from fastcontact.errors import CaseError, check_known, warn
 from fastcontact.studies import function_runs as functions
-from fastcontact.studies.affordable import check_levels, check_runs
+from fastcontact.studies.checks import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.fit import Limit, fit_limit
@@ -135,11 +135,8 @@ def _of_function(
     descending = sorted(map(float, sizes), reverse=True)
     if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
-    name, measures, argument = (
-        functions.function_name(function),
-        functions.measures_of(wanted),
-        functions.first_parameter(function),
-    )
+    name, measures = functions.function_name(function), functions.measures_of(wanted)
+    argument = functions.first_parameter(function)
     runs = [
         FunctionRun(
             label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
@@ -150,18 +147,14 @@ def _of_function(
     results = functions.run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
     series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
-    _warn_of_coarser_meshes(series.levels)
-    return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)
-
-
-def _warn_of_coarser_meshes(levels: Sequence[Level]) -> None:
-    for coarse, fine in pairwise(levels):
+    for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(
                 f"the mesh of size {fine.h:g} has {fine.n_dofs} degrees of freedom, that of size {coarse.h:g} has "
                 f"{coarse.n_dofs}: sizes must be lengths that shrink as meshes get finer, or limits and orders mean nothing"
             )
-            return
+            break
+    return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)
 
 
 def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:

@@ -1,4 +1,4 @@
-"""Execution of runs in local processes or by any executor, with a store of finished runs."""
+"""Execution of runs in local processes or by any executor, with a status line and a store of finished runs."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -21,10 +22,32 @@ from typing import Any
 
 from fastcontact import errors
 from fastcontact._tools.paths import replacing
+from fastcontact.analysis.progress import StatusLine
 from fastcontact.errors import CaseError, FastcontactError, FileError
 from fastcontact.results.committed_file import uninterrupted
 from fastcontact.studies.job import Run, run
-from fastcontact.studies.progress import reporting
+
+
+class Runs(StatusLine):
+    """Status line of a study with the last run, the number of remaining runs, and the remaining time."""
+
+    def __init__(self, show: bool) -> None:
+        super().__init__(100, show)
+        self._stored = 0
+
+    def __enter__(self) -> Runs:
+        self.draw("the first runs")
+        return super().__enter__()
+
+    def __call__(self, progress: Any) -> None:
+        """Redraw the line after a run; `progress` is a `fastcontact.studies.execute.Progress`."""
+        self._stored += progress.stored
+        solved = progress.done - self._stored
+        outcome = "failed" if progress.error else "found in the store" if progress.stored else "done"
+        each, count = (time.perf_counter() - self._started) / max(solved, 1), len(progress.left)
+        left = f", {count} left: about {each * count:.0f} s" if solved and count else ""
+        self.draw(f"{progress.done}/{progress.total} {progress.label} {outcome}{left}")
+
 
 Result = dict[str, Any]
 # NumPy and Numba read these variables when they are imported, so they must be set before a worker process starts.
@@ -102,8 +125,14 @@ def run_study(
 
     If all runs fail, the first error is raised again with `name` before its message.
     """
-    with reporting(on_progress, progress) as report:
-        results = run_all(jobs, on_progress=report, **options)
+    with Runs(progress) as line:
+
+        def ended(progress: Progress) -> None:
+            line(progress)
+            if on_progress is not None:
+                on_progress(progress)
+
+        results = run_all(jobs, on_progress=ended, **options)
     if all("error" in result for result in results):
         kind = getattr(errors, str(results[0].get("kind")), CaseError)
         raise kind(f"{name}; {jobs[0].label}: {results[0]['error']}")
@@ -163,8 +192,9 @@ def on_processes(count: int, jobs: Sequence[Run], rest: list[int]) -> Iterator[t
 
     If a worker process dies, each remaining job runs again in a separate process.
     """
-    if _imports_its_script():
-        # The script calls the study outside "if __name__ == '__main__'"; the parent process reports the error.
+    if sys.modules.get("__mp_main__") not in (None, sys.modules["__main__"]):
+        # This process is a worker that imports the script of its parent, which calls the study outside
+        # "if __name__ == '__main__'"; the parent process reports the error.
         raise SystemExit(1)
     left = list(rest)
     try:
@@ -240,12 +270,6 @@ def started_pool(count: int) -> Iterator[Workers]:
         raise
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _imports_its_script() -> bool:
-    """Return whether this process is a worker that is importing the script of its parent process."""
-    script = sys.modules.get("__mp_main__")
-    return script not in (None, sys.modules["__main__"])  # after its import, the script is __main__
 
 
 def _alone(job: Run) -> Result:

@@ -41,7 +41,18 @@ class FunctionRun(Run):
 
     def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
         """See `Run`."""
-        return _solved(self._result(), self.name)
+        made = self._result()
+        if isinstance(made, Model):
+            case = Case(self.name, self.name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
+            return case, solve(made, case.ramp)
+        if isinstance(made, StepResult):
+            return None, [made]
+        if isinstance(made, Sequence) and len(made) and isinstance(made[-1], StepResult):
+            return None, made
+        raise CaseError(
+            f"the function {self.name} must return a Model, or what fc.solve returns, not {type(made).__name__}: end it with "
+            "'return'"
+        )
 
     def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
         """See `Run`."""
@@ -57,23 +68,6 @@ class FunctionRun(Run):
             lines = [entry.lineno for entry in traceback.extract_tb(error.__traceback__)][1:2]
             where = f" at line {lines[0]}" if lines else ""
             raise CaseError(f"the function {self.name} failed{where}: {type(error).__name__}: {error}") from error
-
-
-def _solved(made: Any, name: str) -> tuple[Case | None, Sequence[StepResult]]:
-    """Return the case and the steps of a model that a function has returned, or None and the steps that it has returned.
-
-    Raises CaseError if it has returned something else.
-    """
-    if isinstance(made, Model):
-        case = Case(name, name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
-        return case, solve(made, case.ramp)
-    if isinstance(made, StepResult):
-        return None, [made]
-    if isinstance(made, Sequence) and len(made) and isinstance(made[-1], StepResult):
-        return None, made
-    raise CaseError(
-        f"the function {name} must return a Model, or what fc.solve returns, not {type(made).__name__}: end it with 'return'"
-    )
 
 
 def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:

@@ -24,7 +24,7 @@ from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
 from fastcontact.analysis.run import solve_steps
 from fastcontact.cases.case import Case, build_case
-from fastcontact.cases.input_files import digest, files_named
+from fastcontact.cases.case_files import digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
@@ -156,7 +156,11 @@ def case_data(settings: Settings, combination: Combination) -> dict[str, Any]:
         for name, entry in {**(pairs if isinstance(pairs, dict) else {}), **data.get("obstacle", {})}.items():
             _exchange(entry, formulation, settings, settings.formulations[name])
     if settings.load_steps is not None:
-        data["ramp"] = ramp_of(data.get("ramp", {}), settings.load_steps)
+        ramp, steps = data.setdefault("ramp", {}), settings.load_steps
+        if "instants" in ramp:
+            ramp["instants"] = [ramp["instants"][-1] * (k + 1) / steps for k in range(steps)]
+        else:
+            ramp["steps"] = steps
     return data
 
 
@@ -168,14 +172,6 @@ def _exchange(entry: dict[str, Any], formulation: str, settings: Settings, name:
             del entry[key]
         entry["formulation"] = formulation
     entry.update(settings.options.get(formulation, {}))
-
-
-def ramp_of(ramp: dict[str, Any], steps: int) -> dict[str, Any]:
-    """Return a ramp with the same end and `steps` equal steps."""
-    if "instants" not in ramp:
-        return {**ramp, "steps": steps}
-    last = ramp["instants"][-1]
-    return {**ramp, "instants": [last * (k + 1) / steps for k in range(steps)]}
 
 
 def run(job: Run, threads: int | None = None) -> dict[str, Any]:

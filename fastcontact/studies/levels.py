@@ -34,17 +34,11 @@ def _spheres(element: str, arguments: Mapping[str, Any]) -> Rule:
     return Rule({"arc_sizes": (R / 250, R / 25), "segments": 15}, ("arc_sizes", "radial_sizes"), ("segments",))
 
 
-def _cylinder(element: str, arguments: Mapping[str, Any]) -> Rule:
+def _round(arguments: Mapping[str, Any], coarse: int, fine: int, *further: str) -> Rule:
+    """Return the rule of a body of radius R with edges of R / `coarse`, in contact of R / `fine`, on level 0."""
     R = float(arguments.get("R", 50.0))
-    coarse = float(arguments.get("size", R / 10))
-    return Rule({"size": coarse, "contact_size": min(R / 100, coarse)}, ("size", "contact_size"))
-
-
-def _ball(element: str, arguments: Mapping[str, Any]) -> Rule:
-    R = float(arguments.get("R", 50.0))
-    coarse = float(arguments.get("size", R / 4))
-    # Along a graded line, the length of the edges grows by `growth` times the distance, independently of the smallest edge.
-    return Rule({"size": coarse, "contact_size": min(R / 50, coarse)}, ("size", "contact_size", "growth"))
+    size = float(arguments.get("size", R / coarse))
+    return Rule({"size": size, "contact_size": min(R / fine, size)}, ("size", "contact_size", *further))
 
 
 def _half_space(element: str, arguments: Mapping[str, Any]) -> Rule:
@@ -54,23 +48,21 @@ def _half_space(element: str, arguments: Mapping[str, Any]) -> Rule:
     return Rule({"size": coarse, "contact_size": min(least / 10, coarse)}, ("size", "contact_size", "growth"))
 
 
-def _punched(element: str, arguments: Mapping[str, Any]) -> Rule:
-    return Rule({"edge_size": float(arguments.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",))
-
-
+# Along a graded line, the length of the edges grows by `growth` times the distance, independently of the smallest edge.
 RULES: dict[str, Callable[[str, Mapping[str, Any]], Rule]] = {
     "half-spheres": _spheres,
     "quarter-disc": _spheres,
-    "cylinder-on-block": _cylinder,
+    "cylinder-on-block": lambda element, given: _round(given, 10, 100),
     "block-on-block": lambda element, given: Rule(double=("divisions_lower", "divisions_upper")),
     "block": lambda element, given: Rule(double=("divisions",)),
     "box": lambda element, given: Rule(double=("divisions",)),
     "rings": lambda element, given: Rule(double=("divisions_inner", "divisions_outer")),
     "graded-block": _half_space,
-    "punched-block": _punched,
+    "punched-block": lambda element, given: Rule(
+        {"edge_size": float(given.get("punch_radius", 1.0)) / 200}, ("edge_size",), root=("growth",)
+    ),
     "crowned-blocks": lambda element, given: Rule(halve=("contact_size",), root=("growth",)),
-    "sphere-on-block": _ball,
-    "sphere-octant": _ball,
+    **dict.fromkeys(("sphere-on-block", "sphere-octant"), lambda element, given: _round(given, 4, 50, "growth")),
 }
 
 

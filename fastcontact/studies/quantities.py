@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact.analytic.lame import PressFit
 from fastcontact.analytic.manufactured import HertzBox
 from fastcontact.analytic.pressure_curve import pressure_curve
-from fastcontact.arrays import Array, Numbers
+from fastcontact.arrays import Array
 from fastcontact.cases.case import Case
 from fastcontact.cases.checks import OF_PROBES, ONLY_IN_SPACE
 from fastcontact.contact.integration import facet_measure
@@ -157,7 +157,7 @@ def peak(mesh: Mesh, values: Array, axisymmetric: bool) -> tuple[float, Array]:
     on_axis_peak = _along_axis(mesh, values, top) if on_axis else None
     if on_axis_peak is not None:
         return on_axis_peak
-    ring = _around(mesh, top)
+    ring = np.unique(np.concatenate([block[(block == top).any(axis=1)].ravel() for block in mesh.solids.values()]))
     x = (mesh.points[ring] - mesh.points[top]).T
     size = np.abs(x).max()
     vertex = _vertex(x / size, values[ring], on_axis) if mesh.dim == 2 and size > 0 else None
@@ -191,11 +191,6 @@ def _along_axis(mesh: Mesh, values: Array, top: int) -> tuple[float, Array] | No
         return None
     best = inside[np.argmax(curve(inside))]
     return float(curve(best)), mesh.points[top] + np.array([0.0, best * size])
-
-
-def _around(mesh: Mesh, point: int) -> Numbers:
-    near = [block[(block == point).any(axis=1)].ravel() for block in mesh.solids.values()]
-    return np.unique(np.concatenate(near))
 
 
 def _vertex(x: Array, v: Array, on_axis: bool) -> tuple[float, Array] | None:

@@ -13,9 +13,9 @@ from fastcontact.cases.case import Case
 from fastcontact.results.conversions import data_frame
 from fastcontact.results.tables import structured
 from fastcontact.results.units import units_of_results
+from fastcontact.studies import render
 from fastcontact.studies.quantities import unit
-from fastcontact.studies.render import page
-from fastcontact.studies.render.table import Rows, aligned
+from fastcontact.studies.render import Rows, aligned
 
 if TYPE_CHECKING:
     import pandas
@@ -85,12 +85,12 @@ class Report:
 
     def html(self) -> str:
         """Return the report as a self-contained HTML page."""
-        blocks = [*map(page.paragraph, self.sentences()), page.image(self.figure(), self.picture)]
-        blocks += [page.table(rows, caption) for caption, rows in self.tables()]
-        blocks += map(page.failure, self.remarks())
+        blocks = [*map(render.paragraph, self.sentences()), render.image(self.figure(), self.picture)]
+        blocks += [render.table(rows, caption) for caption, rows in self.tables()]
+        blocks += map(render.failure, self.remarks())
         if self.explanations:
-            blocks += [page.section("How to read this"), *map(page.paragraph, self.explanations)]
-        return page.page(f"{self.kind}: {self.title}", blocks, self.text)
+            blocks += [render.section("How to read this"), *map(render.paragraph, self.explanations)]
+        return render.page(f"{self.kind}: {self.title}", blocks, self.text)
 
     def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""

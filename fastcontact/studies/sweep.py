@@ -15,18 +15,17 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, described, read_case
 from fastcontact.errors import CaseError, FastcontactError
 from fastcontact.studies import function_runs as functions
-from fastcontact.studies.affordable import check_runs
 from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.checks import check_runs
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
 from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.quantities import check_names, of_theory
 from fastcontact.studies.report import of_case
+from fastcontact.studies.series import Point, TheoryCurve, Value
 from fastcontact.studies.settings import data_of, one_combination, settings
-from fastcontact.studies.sweep_figures import label_of
-from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
-from fastcontact.studies.sweep_report import Sweep
+from fastcontact.studies.sweep_report import Sweep, label_of
 
 # Default refinement level of the meshes, on which mesh errors are smaller than the trends of interest.
 LEVEL = 2
@@ -133,7 +132,7 @@ def _of_function(
     choices, name, measures = _choices(by_name), functions.function_name(function), functions.measures_of(wanted)
     runs = [
         FunctionRun(
-            label=_label(choice), name=name, marks=choice, function=function,
+            label=label_of(choice), name=name, marks=choice, function=function,
             positional=() if named else tuple(choice.values()), named=choice if named else {}, measures=measures,
         )
         for choice in choices
@@ -154,10 +153,6 @@ def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]
         raise CaseError("a sweep needs at least one parameter with at least one value")
     check_runs(prod(len(values) for values in parameters.values()))
     return [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
-
-
-def _label(choice: Mapping[str, Value]) -> str:
-    return label_of(choice, list(choice))
 
 
 def _points(
@@ -188,7 +183,7 @@ def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: 
         rows = [_theory_at(data, {first: float(value), **rest}, linked, pair) for value in x]
         known = [name for name in rows[0] if all(name in row for row in rows)]
         columns = {name: np.array([row[name] for row in rows]) for name in known}
-        curves.append(TheoryCurve(label_of(rest, list(rest)), x, columns))
+        curves.append(TheoryCurve(label_of(rest), x, columns))
     return tuple(curves)
 
 
@@ -216,4 +211,4 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     # The runs with the largest meshes start first. With a generator, the size of a run is the number of points on level 0.
     size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {finer}"}
-    return job_of(case, chosen, member, finer, label=_label(choice), marks=marks, size=size)
+    return job_of(case, chosen, member, finer, label=label_of(choice), marks=marks, size=size)

@@ -3,16 +3,161 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fastcontact.arrays import AnyArray
-from fastcontact.studies.quantities import column
-from fastcontact.studies.render.figure import panels
-from fastcontact.studies.render.table import Rows, by_columns, number, percent
+from fastcontact.studies.quantities import column, title
+from fastcontact.studies.render import Rows, by_columns, frame, marker, message, number, panels, percent
 from fastcontact.studies.report import Report
-from fastcontact.studies.sweep_figures import Drawing
-from fastcontact.studies.sweep_point import Point, TheoryCurve, Value
+from fastcontact.studies.series import Point, TheoryCurve, Value
+
+# Smallest ratio between the largest and the smallest parameter value for which axes are logarithmic.
+WIDE = 9.0
+# Title and kind of unit, empty for ratios, by the last word of the path of a parameter.
+MEANINGS = {
+    "E": ("Young's modulus", "pressure"),
+    "nu": ("Poisson's ratio", ""),
+    "friction": ("friction coefficient", ""),
+    "approach": ("approach", "length"),
+    "clearance": ("clearance", "length"),
+    "interference": ("interference", "length"),
+    "R": ("radius", "length"),
+    "radius": ("radius", "length"),
+    "size": ("element size", "length"),
+    "contact_size": ("element size at the contact", "length"),
+}
+_TABLE = re.compile(r"(?P<table>\w+)(?:\[(?P<number>\d+)\]|\.(?P<name>[\w-]+))\.")
+
+
+def parameter_label(parameter: str, units: Mapping[str, str]) -> str:
+    """Return the label of a parameter with its unit; unknown paths are returned unchanged.
+
+    Examples
+    --------
+    >>> parameter_label("material[0].E", {"pressure": "MPa"})
+    "Young's modulus of material 1 [MPa]"
+    >>> parameter_label("contact.hertz.friction", {})
+    "friction coefficient of contact 'hertz' [-]"
+    """
+    last = parameter.rsplit(".", 1)[-1]
+    if last not in MEANINGS:
+        return parameter
+    words, kind = MEANINGS[last]
+    match = _TABLE.match(parameter)
+    if match is not None:
+        words += f" of {match['table']} " + (f"'{match['name']}'" if match["name"] else str(int(match["number"]) + 1))
+    elif "." in parameter:
+        words += f" of the {parameter.split('.', 1)[0]}"
+    unit = units.get(kind, "") if kind else "-"
+    return f"{words} [{unit}]" if unit else words
+
+
+class Drawing:
+    """Plots of a sweep over its first parameter, with a curve for each choice of the other parameters.
+
+    Parameters
+    ----------
+    parameters : dict of str to sequence
+        Values by parameter.
+    points : list of Point
+        Points of the sweep.
+    theories : list of TheoryCurve
+        Theory over the first parameter.
+    units : dict of str to str
+        Names of units.
+    compared : str
+        Condition of the comparison with theory, as in `Sweep`.
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, Sequence[Value]], points: Sequence[Point], theories: Sequence[TheoryCurve],
+        units: Mapping[str, str], compared: str,
+    ) -> None:  # fmt: skip
+        self.first, *self.others = parameters
+        self.points, self.theories, self.units = points, theories, units
+        self.theory = f"theory {compared}".strip()
+        values = parameters[self.first]
+        numbers = [float(v) for v in values if not isinstance(v, (str, bool))]
+        wide = len(numbers) == len(values) and min(numbers) > 0 and max(numbers) >= WIDE * min(numbers)
+        self.scale = "plain log" if wide else "linear"
+
+    def draw_values(self, ax: Any, quantity: str) -> None:
+        """Draw a quantity and its theory over the first parameter; both axes are logarithmic if all values are positive."""
+        for k, (label, x, points) in enumerate(self._curves()):
+            y = [point.values.get(quantity, math.nan) for point in points]
+            ax.plot(x, y, marker(k), ms=5, label=label or "computed", color=f"C{k}")
+            self._draw_theory(ax, quantity, label, x, points, k)
+        positive = all(point.values.get(quantity, 1.0) > 0 for point in self.points)
+        scale = self.scale if positive else "linear"
+        self._frame(ax, title(quantity), column(title(quantity), quantity, self.units), scale)
+
+    def _draw_theory(
+        self, ax: Any, quantity: str, label: str, x: Sequence[Any], points: Sequence[Point], k: int
+    ) -> None:
+        """Draw the theory for one choice of the other parameters, as a curve or at the points."""
+        name = (self.theory + self._unmoved(quantity)) if k == 0 else None
+        color = "black" if not self.others else f"C{k}"
+        for curve in self.theories:
+            if curve.label == label and quantity in curve.values:
+                ax.plot(curve.x, curve.values[quantity], "--", lw=1.1, label=name, color=color)
+                return
+        exact = [point.theory.get(quantity, math.nan) for point in points]
+        if np.isfinite(exact).any():
+            ax.plot(x, exact, "_", ms=9, label=name, color=color)
+
+    def _unmoved(self, quantity: str) -> str:
+        """Return a note if the theory does not depend on the first parameter, and otherwise an empty string."""
+        curves = [points for _, _, points in self._curves()]
+        values = [{point.theory[quantity] for point in points if quantity in point.theory} for points in curves]
+        same = all(len(of_curve) == 1 for of_curve in values) and any(len(points) > 1 for points in curves)
+        return f"\n(the same for every {self.first})" if same else ""
+
+    def draw_ratios(self, ax: Any, quantity: str) -> None:
+        """Draw the ratios of a quantity to theory, at equal approach and at equal force, over the first parameter."""
+        styles = {"theory": ("-", self.theory), "equal_force": ("--", "theory at equal force")}
+        drawn = 0
+        for k, (label, x, points) in enumerate(self._curves()):
+            for other, (style, name) in styles.items():
+                ratios = [point.ratio(quantity, other) for point in points]
+                if np.isfinite(ratios).any() and (other, quantity) != ("equal_force", "force"):
+                    name = f"to {name}" + (f"\n{label}" if label else "")
+                    color = f"C{k if self.others else drawn}"
+                    ax.plot(x, ratios, f"{marker(k)}{style}", ms=4, lw=1.0, label=name, color=color)
+                    drawn += 1
+        if not drawn:
+            return message(ax, f"no theory of the {title(quantity)}")
+        ax.axhline(1.0, color="black", lw=0.8)
+        self._frame(ax, f"{title(quantity)}: ratio to theory{self._unmoved(quantity)}", "computed / theory [-]")
+
+    def _frame(self, ax: Any, heading: str, y_label: str, y_scale: str = "linear") -> None:
+        labels = parameter_label(self.first, self.units), y_label
+        frame(ax, heading, labels, scales=(self.scale, y_scale), title_size=10)
+        if self.others:  # curves may be everywhere
+            ax.legend(fontsize=8, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+    def _curves(self) -> list[tuple[str, Sequence[Any], list[Point]]]:
+        """Return, for each choice of the other parameters, the label, the values of the first parameter and the points."""
+        by_label: dict[str, list[Point]] = {}
+        for point in self.points:
+            by_label.setdefault(label_of(point.parameters, self.others), []).append(point)
+        curves: list[tuple[str, Sequence[Any], list[Point]]] = []
+        for label, points in by_label.items():
+            x = [point.parameters[self.first] for point in points]
+            plain = all(isinstance(value, (int, float)) for value in x)
+            curves.append((label, x if plain else list(map(str, x)), points))
+        return curves
+
+
+def label_of(parameters: Mapping[str, Value], others: Sequence[str] | None = None) -> str:
+    """Return the label of a point with the values of the parameters `others`, by default of all parameters."""
+    values = ((name, parameters[name]) for name in (parameters if others is None else others))
+    return ", ".join(f"{name} = {f'{value:.6g}' if isinstance(value, float) else value}" for name, value in values)
+
 
 # Quantities shown in tables and figures.
 MAIN = ("force", "pressure_max", "contact_radius")

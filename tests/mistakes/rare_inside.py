@@ -34,10 +34,9 @@ from fastcontact.mesh.files import aster_mail, med, meshio_content
 from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
-from fastcontact.studies import execute, levels
+from fastcontact.studies import execute, levels, render
 from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.levels import recipe
-from fastcontact.studies.render import figure
 from fastcontact.studies.settings import Combination, settings
 from fastcontact.studies.sweep import parameter_sweep
 
@@ -86,7 +85,7 @@ def no_matplotlib_for_outputs(patch):
 
 def no_matplotlib_for_studies(patch):
     patch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
-    figure.panels(1, 1, (4.0, 3.0))
+    render.panels(1, 1, (4.0, 3.0))
 
 
 def no_scheduler(patch):

@@ -18,10 +18,11 @@ from fastcontact._tools import paths
 from fastcontact._tools.argument_types import check_type, fits, words
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import _outputs, main
-from fastcontact.cli._executor import _failing_threads_interrupt
+from fastcontact.cli._study import _failing_threads_interrupt
 from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
-from fastcontact.studies import affordable, execute
+from fastcontact.studies import checks as affordable
+from fastcontact.studies import execute
 from fastcontact.studies.levels import _default_element
 
 SQUARE = fc.generate.block()
@@ -351,7 +352,7 @@ def test_a_sweep_shows_itself(tmp_path):
 @pytest.mark.parametrize("first", ["truncate", "write"])
 def test_a_disk_that_fails_while_hdf5_writes_is_told_once(first, tmp_path):
     """The first error is kept, nothing is written after it, and HDF5 sees no exception."""
-    from fastcontact._tools.hdf5_driver import DriverFile
+    from fastcontact._tools.hdf5 import DriverFile
 
     path = tmp_path / "a.med"
     path.write_bytes(b"before")

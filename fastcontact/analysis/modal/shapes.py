@@ -21,9 +21,8 @@ from fastcontact.mesh.generate import union
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.results.conversions import data_frame
-from fastcontact.results.phases import phases
 from fastcontact.results.step import StepResult
-from fastcontact.results.steps import StepSequence
+from fastcontact.results.steps import StepSequence, phases
 from fastcontact.round_off import ROUND_OFF
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""The assembly of a deck: points, elements, and the points and elements of sets and surfaces."""
+"""The assembly of a deck: points, elements, and the points and elements of sets, surfaces and distributed loads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.arrays import Array, Mask
-from fastcontact.cases.decks.blocks import Location, defined, folded
+from fastcontact.cases.decks.blocks import Location, Row, defined, folded
 from fastcontact.cases.decks.content import Cell, Content, Instance, Members, Part, Section, SurfaceDefinition
 from fastcontact.cases.decks.element_types import ElementType, element_type
 from fastcontact.mesh import elements
@@ -86,9 +86,7 @@ class Assembly:
     @cached_property
     def solids(self) -> list[Element]:
         """All solids."""
-        return [
-            element for elements in self.elements.values() for element in elements.values() if element.type is not None
-        ]
+        return [element for elements in self.elements.values() for element in elements.values() if element.type]
 
     @cached_property
     def of_solids(self) -> set[int]:
@@ -151,22 +149,15 @@ class Assembly:
             defined("instance", scope, self.content.instances, entry)
         if entry.name:
             return self._named(kind, scope, entry)
-        numbers = entry.numbers
+        items, numbers = self._items_of(kind, scope), entry.numbers
         if not isinstance(numbers, range):
-            return self._all_existing(kind, scope, entry)
-        items = self._items_of(kind, scope)
+            return (items[n] if n in items else self._existing(kind, scope, n, entry.location) for n in numbers)
         candidates = numbers if len(numbers) <= len(items) else sorted(items)
         known = [n for n in candidates if n in items and n in numbers]
         if len(known) < len(numbers):
             absent = f"{len(numbers) - len(known)} of the {len(numbers)} numbers {numbers[0]} to {numbers[-1]}"
             self.content.note(entry, f"{absent} are not {kind}s and are ignored")
         return (items[n] for n in known)
-
-    def _all_existing(self, kind: str, scope: str, entry: Members) -> Iterator[Any]:
-        items = self._items_of(kind, scope)
-        for number in entry.numbers:
-            item = items.get(number)
-            yield self._existing(kind, scope, number, entry.place_of(number)) if item is None else item
 
     def _named(self, kind: str, scope: str, entry: Members) -> Iterable[Any]:
         if not scope and any(entry.name.upper().startswith(name) for name in self.content.instances):
@@ -390,3 +381,52 @@ def _placed(part: Part, instance: Instance | None) -> Array:
         size = np.abs(points).max(initial=0.0)
         points[np.abs(points) < 1e-14 * size] = 0.0
     return points
+
+
+# For each keyword, the letter of loads on faces, and the loads on elements with the number of their additional entries.
+BODY_FORCES = {"GRAV": 3, "CENTRIF": 6, "BX": 0, "BY": 0, "BZ": 0}
+ON_ELEMENTS: dict[str, tuple[str, dict[str, int]]] = {
+    "DLOAD": ("P", BODY_FORCES),
+    "DFLUX": ("S", {"BF": 0}),
+    "FILM": ("F", {}),
+}
+ON_SURFACES = {"DSLOAD": "P", "DSFLUX": "S", "SFILM": "F"}
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """Keyword, kind and target of a distributed load, which is a face or some elements.
+
+    `numbers` contains the direction or the axis of a body force, or the coefficient of a film.
+    """
+
+    keyword: str
+    kind: str
+    face: Face | None = None
+    elements: tuple[Element, ...] = ()
+    numbers: tuple[float, ...] = ()
+
+
+def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> list[Target]:
+    """Return the targets of a line of a distributed load; CaseError if the load is not supported."""
+    keyword, label = row.location.keyword, row.text(1).upper()
+    load = "load " if keyword.endswith("LOAD") else ""
+    if keyword in ON_SURFACES:
+        letter = ON_SURFACES[keyword]
+        if label != letter:
+            raise row.refuse(f"{load}{label[:40]} on a surface is not supported, only {letter}")
+        faces = assembly.faces(row.text(0), row.location)
+        return [Target(keyword, letter, face, (), numbers) for face in faces]
+    letter, of_elements = ON_ELEMENTS[keyword]
+    every = keyword == "DLOAD" and not row.text(0)
+    elements = assembly.solids if every else assembly.elements_of(row.text(0), row.location)
+    if label[:1] == letter and label[1:].isdigit():
+        faces = [(element, assembly.facet(element, int(label[1:]), row.location)) for element in elements]
+        return [Target(keyword, letter, face, (), numbers) for face in faces]
+    if label not in of_elements:
+        known = ", ".join([f"{letter}1", f"{letter}2", "...", *of_elements])
+        raise row.refuse(f"{load}{label[:40]} is not supported; known are {known}")
+    vector = tuple(row.number(3 + i, 0.0) for i in range(of_elements[label]))
+    if vector and not any(vector[-3:]):
+        raise row.refuse(f"the direction of {label} is missing")
+    return [Target(keyword, label, None, tuple(elements), vector)]

@@ -86,9 +86,9 @@ class Row(Item):
             raise self.refuse(f"'{self.text(index)[:LONGEST_QUOTED]}' is not a whole number")
         return int(value)
 
-    def positive(self, index: int, quantity: str) -> float:
+    def positive(self, index: int, quantity: str, default: float | None = None) -> float:
         """Return an entry as a positive number; otherwise raise CaseError with the name of the `quantity`."""
-        value = self.number(index)
+        value = self.number(index, default)
         if not value > 0:
             raise self.refuse(f"the {quantity} {value:g} must be positive")
         return value
@@ -106,7 +106,11 @@ class Lines:
     def __iter__(self) -> Iterator[Row]:
         for line in _lines(self.contents, self.begin, self.end, self.location.line):
             if not line.text.startswith("**"):
-                yield _row(Location(self.location.file, line.number, self.location.keyword), line.text)
+                location, goes_on = (
+                    Location(self.location.file, line.number, self.location.keyword),
+                    line.text.endswith(","),
+                )
+                yield Row(location, tuple(_parts(line.text[:-1] if goes_on else line.text)), goes_on)
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,10 +174,9 @@ class Block(Item):
 
 @dataclass
 class Source:
-    """State of reading a deck: its folder, whether data lines are kept, size and paths of files read, and open files."""
+    """State of reading a deck: its folder, size and paths of the files read, and open files."""
 
     folder: Path
-    with_data: bool = True
     size: int = 0
     files: list[Path] = field(default_factory=list)
     open: list[Path] = field(default_factory=list)
@@ -210,13 +213,12 @@ def read_blocks(path: Path) -> Iterator[Block]:
     CaseError
         If a line is invalid or the file of an *INCLUDE is not accepted; the message names file and line.
     """
-    source = Source(path.resolve().parent)
-    return _blocks(path, path.name, source)
+    return _blocks(path, path.name, Source(path.resolve().parent))
 
 
 def files_of_deck(path: Path) -> list[Path]:
     """Return the paths of a deck and of its included files in reading order; errors as for `read_blocks`."""
-    source = Source(path.resolve().parent, with_data=False)
+    source = Source(path.resolve().parent)
     for _ in _blocks(path, path.name, source):
         pass
     return source.files
@@ -270,7 +272,7 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
                 raise Location(name, line.number, "").refuse("a data line before any keyword")
             continue
         if current is not None:
-            yield _with_lines(current, contents, last, line.begin, source)
+            yield _with_lines(current, contents, last, line.begin)
         location = Location(name, line.number, _keyword(line.text))
         last = _continued(location, line, lines)
         current = Block(location, _parameters(location, last.text))
@@ -278,13 +280,13 @@ def _blocks(path: Path, name: str, source: Source) -> Iterator[Block]:
             yield from _included(current, name, source)
             current = None
     if current is not None:
-        yield _with_lines(current, contents, last, len(contents), source)
+        yield _with_lines(current, contents, last, len(contents))
     source.open.pop()
 
 
-def _with_lines(block: Block, contents: bytes, last: _Line, end: int, source: Source) -> Block:
+def _with_lines(block: Block, contents: bytes, last: _Line, end: int) -> Block:
     """Return a block with the data lines between the last line of its keyword and the offset `end`."""
-    if not source.with_data or last.end >= end:
+    if last.end >= end:
         return block
     location = Location(block.location.file, last.number + 1, block.keyword)
     return Block(block.location, block.parameters, Lines(location, contents, last.end, end))
@@ -334,11 +336,6 @@ def _parameters(location: Location, line: str) -> dict[str, str | None]:
         if key:
             parameters[key] = unquoted(value.strip()) if equal else None
     return parameters
-
-
-def _row(location: Location, line: str) -> Row:
-    goes_on = line.endswith(",")
-    return Row(location, tuple(_parts(line[:-1] if goes_on else line)), goes_on)
 
 
 def _included(block: Block, name: str, source: Source) -> Iterator[Block]:

@@ -11,14 +11,14 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Element
+from fastcontact.cases.decks.assembled import Element, Target
 from fastcontact.cases.decks.blocks import defined, folded, refusing
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions
-from fastcontact.cases.decks.content import Content, Material, Pair, Section, Step
+from fastcontact.cases.decks.content import Content, Material, Pair, Section
 from fastcontact.cases.decks.cyclic_symmetry import add_sectors
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.histories import ByShape, Histories
-from fastcontact.cases.decks.initial_stresses import add_initial_stresses
+from fastcontact.cases.decks.initial_fields import add_initial_stresses, add_temperatures
 from fastcontact.cases.decks.interactions import (
     cohesion_of,
     conductance_of,
@@ -32,8 +32,6 @@ from fastcontact.cases.decks.meshing import begun, group_of_surface, secondary_g
 from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
 from fastcontact.cases.decks.stepping import MOST_PARTS
-from fastcontact.cases.decks.targets import Target
-from fastcontact.cases.decks.temperatures import add_temperatures
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
@@ -112,7 +110,7 @@ class Building:
         """Add supports, constraints, loads, temperatures and springs to the model."""
         self._supports(conditions)
         self.links += relations_of(self.assembly, self.model.mesh)
-        self.model.relations += self.links
+        self.model.relations += [*self.local_supports, *self.links]
         self.links += add_sections(self.model, self.assembly, conditions.locks)
         self.links += add_sectors(self.model, self.assembly)
         self._forces(conditions)
@@ -143,7 +141,12 @@ class Building:
                             f"element {element.number} has a section already, in line {element.section.location.line}"
                         )
                     element.section = section
-        self._check_sections()
+        without = [element for element in self.assembly.solids if element.section is None]
+        if without:
+            cell = without[0].cell
+            many = "1 element" if len(without) == 1 else f"{len(without)} elements"
+            named = f" of set '{cell.set}'" if cell.set else ""
+            raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
         by_material: dict[tuple[str, str, bool], list[Any]] = {}
         for element in self.assembly.solids:
             given = element.given_section
@@ -181,14 +184,6 @@ class Building:
         if material.law is None and self.content.heat != "alone":
             raise material.refuse(f"material '{material.name}' has no *ELASTIC")
         return material
-
-    def _check_sections(self) -> None:
-        without = [element for element in self.assembly.solids if element.section is None]
-        if without:
-            cell = without[0].cell
-            many = "1 element" if len(without) == 1 else f"{len(without)} elements"
-            named = f" of set '{cell.set}'" if cell.set else ""
-            raise cell.refuse(f"{many} ({without[0].number}){named} has no section, so no material")
 
     def _check_pairs(self) -> None:
         """Raise CaseError if a pair is given twice or has an undefined surface or interaction."""
@@ -237,7 +232,9 @@ class Building:
                 if point in alone:
                     self.driven[point, axis] = table
                 elif local:
-                    self._local_support(conditions, name, table)
+                    label = f"the support of {conditions.named(name)} on local axes"
+                    row = self._support_row(conditions, name)
+                    self.local_supports.append(MultiPointConstraint(label, row, 1.0, table))
                 else:
                     alike.add(axis, table, [point])
         for axis, points, value, table in alike:
@@ -259,17 +256,8 @@ class Building:
             line = f", line {acting.location.line}" if acting.location else ""
             label = f"the support of {conditions.named(names[0])}{line}, from {acting.begins:g}{ends}"
             rows = csr_array(vstack([self._support_row(conditions, name) for name in names]))
-            self._relate_support(
-                TemporaryConstraint(label, rows, 1.0, table, acting.begins, acting.ends, keeps=acting.keeps)
-            )
-
-    def _local_support(self, conditions: Conditions, name: Component, table: Table) -> None:
-        label = f"the support of {conditions.named(name)} on local axes"
-        self._relate_support(MultiPointConstraint(label, self._support_row(conditions, name), 1.0, table))
-
-    def _relate_support(self, constraint: MultiPointConstraint) -> None:
-        self.local_supports.append(constraint)
-        self.model.relations.append(constraint)
+            period = (acting.begins, acting.ends)
+            self.local_supports.append(TemporaryConstraint(label, rows, 1.0, table, *period, keeps=acting.keeps))
 
     def _support_row(self, conditions: Conditions, name: Component) -> csr_array:
         """Return the constraint row (1, n_dofs) [-] of the displacement component that a support prescribes."""
@@ -331,7 +319,7 @@ class Building:
         for pair in self.content.pairs:
             secondary, primary = (group_of_surface(self.assembly, name) for name in (pair.secondary, pair.primary))
             with refusing(pair):
-                options = self._tied(pair) if pair.tied else self._options(pair)
+                options = self._options(pair)
                 if secondary in self.assembly.loose:
                     options.update(self._at_nodes(pair, secondary))
                 self.model.add_contact(f"{secondary}/{primary}", secondary=secondary, primary=primary, **options)
@@ -348,9 +336,13 @@ class Building:
         return options
 
     def _options(self, pair: Pair) -> dict[str, Any]:
+        alone = self.content.heat == "alone"
+        if pair.tied:
+            heat = self.content.heat and {"conductance": perfect_conductance(self.content, self.model, pair.location)}
+            return {"kind": "gap_only" if alone else "tied", **(heat or {})}
         law = self.content.interactions[folded(pair.interaction)]
         options: dict[str, Any] = conductance_of(self.content, law) if self.content.heat else {}
-        if self.content.heat == "alone":
+        if alone:
             return {**options, "kind": "gap_only", **self._fitted(pair)}
         if law.cohesion:
             return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
@@ -364,13 +356,6 @@ class Building:
         if "friction" in options and self.content.heat:
             options.update(friction_heat_of(self.content, law))
         return {**options, **self._fitted(pair)}
-
-    def _tied(self, pair: Pair) -> dict[str, Any]:
-        """Return the options of a tie, with a conductance if temperatures are computed."""
-        if not self.content.heat:
-            return {"kind": "tied"}
-        kind = "gap_only" if self.content.heat == "alone" else "tied"
-        return {"kind": kind, "conductance": perfect_conductance(self.content, self.model, pair.location)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:
         """Return the option `clearance` that ADJUST or *CLEARANCE requires; an empty dictionary if it is zero.
@@ -421,7 +406,8 @@ class Building:
         instants = {float(number) for number in range(1, len(steps) + 1)}
         if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
             for number, step in enumerate(steps):
-                instants.update(number + part for part in _parts(step))
+                count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
+                instants.update(number + k / count for k in range(1, count))  # ends of equal increments
         mechanical: tuple[Histories[Any], ...] = (conditions.supports, conditions.forces, conditions.loads)
         for histories in (*mechanical, conditions.temperatures, *conditions.heat.histories):
             for track in histories.distinct():
@@ -429,12 +415,6 @@ class Building:
         if len(instants) > LONGEST_RAMP:
             raise steps[0].refuse(f"the histories have {len(instants)} corners, more than {LONGEST_RAMP}")
         return Ramp(tuple(sorted(instants)), ((0.0, 0.0), (float(len(steps)), 1.0)))
-
-
-def _parts(step: Step) -> list[float]:
-    """Return the boundaries between the equal increments of a step, as fractions of its length."""
-    count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
-    return [k / count for k in range(1, count)]
 
 
 def _body_force(kind: str, vector: tuple[float, ...], value: Any, dim: int) -> dict[str, Any]:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Location, Row
+from fastcontact.cases.decks.assembled import Target, targets
+from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Given
 from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
 from fastcontact.cases.decks.histories import Histories
+from fastcontact.cases.decks.initial_fields import by_point, initial_temperatures
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
 from fastcontact.cases.decks.pretension import Locks
-from fastcontact.cases.decks.targets import Target, targets
-from fastcontact.cases.decks.temperatures import give as give_temperatures
-from fastcontact.cases.decks.temperatures import initial_temperatures
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}
@@ -76,20 +76,22 @@ class Conditions:
             for given in step.given:
                 self._take(given)
             self._change(number)
-            self.supports.advance(number, step)
-            self.forces.advance(number, step)
-            self.loads.advance(number, step)
-            self.temperatures.advance(number, step)
-            self.heat.advance(number, step)
+            for advancing in (self.supports, self.forces, self.loads, self.temperatures, self.heat):
+                advancing.advance(number, step)  # type: ignore[attr-defined]
 
     def _take(self, given: Given) -> None:
-        keyword = given.block.keyword
+        keyword, block = given.block.keyword, given.block
         if keyword == "TEMPERATURE":
-            give_temperatures(self.assembly, self.temperatures, given)
+            self.temperatures.take(given, by_point(self.assembly, given.block))
         elif keyword in OF_HEAT:
             self.heat.take(given)
+        elif keyword == "BOUNDARY":
+            self._supports(given)
+        elif keyword == "CLOAD":
+            self.forces.take(given, self._forces(block))
         else:
-            {"BOUNDARY": self._supports, "CLOAD": self._forces}.get(keyword, self._loads)(given)
+            entries = ((t, row.number(2), row.location) for row in block.each() for t in targets(self.assembly, row))
+            self.loads.take(given, entries, lambda name: name.keyword == keyword)
 
     def _change(self, number: int) -> None:
         """Record the supports that begin or end at the start of step `number`."""
@@ -187,23 +189,11 @@ class Conditions:
             return (point, axis, False), float(np.sign(direction[axis]))
         return (point, component - 1, True), 1.0
 
-    def _forces(self, given: Given) -> None:
-        if given.new:
-            self.forces.forget()
-        for row in given.block.each():
+    def _forces(self, block: Block) -> Iterator[tuple[Component, float, Location]]:
+        for row in block.each():
             component, value = row.whole(1), row.number(2)
             for point in self.assembly.nodes(row.text(0), row.location):
                 name = self._component(point, component) if 1 <= component <= 6 else None
                 if name is None:
                     raise row.refuse(f"a force cannot act on component {component} of this node")
-                self.forces.give(
-                    (*name[:2], point in self.directions and component <= 3), value, given.amplitude, row.location
-                )
-
-    def _loads(self, given: Given) -> None:
-        keyword = given.block.keyword
-        if given.new:
-            self.loads.forget(lambda name: name.keyword == keyword)
-        for row in given.block.each():
-            for target in targets(self.assembly, row):
-                self.loads.give(target, row.number(2), given.amplitude, row.location)
+                yield (*name[:2], point in self.directions and component <= 3), value, row.location

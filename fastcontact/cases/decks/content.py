@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from array import array
-from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,25 +30,12 @@ class Cell(Located):
 class Members(Item):
     """Entries of a set: numbers, or the name of another set.
 
-    They refer to an instance, or to the instance of the definition if `instance` is empty. The numbers may come from several
-    lines: `lines` contains, for each line after the first, the index of its first number and its line number.
+    They refer to an instance, or to the instance of the definition if `instance` is empty.
     """
 
     numbers: Sequence[int] = ()
     name: str = ""
     instance: str = ""
-    lines: array[int] = field(default_factory=lambda: array("q"))
-
-    def add(self, numbers: array[int], line: int) -> None:
-        """Add the numbers of another line."""
-        assert isinstance(self.numbers, array)
-        self.lines.extend((len(self.numbers), line))
-        self.numbers.extend(numbers)
-
-    def place_of(self, number: int) -> Location:
-        """Return the location of the line with a number."""
-        row = bisect_right(self.lines[::2], self.numbers.index(number))
-        return replace(self.location, line=self.lines[2 * row - 1]) if row else self.location
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +77,6 @@ class Part:
     name: str = ""
     nodes: dict[int, int] = field(default_factory=dict)
     coordinates: array[float] = field(default_factory=lambda: array("d"))
-    flat: bool = False
     cells: dict[int, Cell] = field(default_factory=dict)
     node_sets: dict[str, list[Members]] = field(default_factory=dict)
     element_sets: dict[str, list[Members]] = field(default_factory=dict)
@@ -158,7 +143,6 @@ class Pair(Located):
     tied: bool = False
     adjust: str = ""
     clearance: float | None = None
-    tolerance: float | None = None
 
     @property
     def name(self) -> str:
@@ -236,7 +220,7 @@ class Axes(Item):
     by two points of the axis of the cylinder.
     """
 
-    nodes: str
+    name: str  # of an *ORIENTATION, or of the node set of a *TRANSFORM
     cylindrical: bool
     points: tuple[float, ...]
     distribution: str = ""  # name of a distribution of material axes by element, used instead of points
@@ -248,6 +232,7 @@ class Amplitude:
     """Times and values of an amplitude, in step time or in total time."""
 
     location: Location
+    name: str
     times: tuple[float, ...]
     values: tuple[float, ...]
     total: bool
@@ -282,7 +267,7 @@ class Content:
     """The content of a deck."""
 
     title: str = ""
-    root: Part = field(default_factory=lambda: Part(flat=True))
+    root: Part = field(default_factory=Part)
     parts: dict[str, Part] = field(default_factory=dict)
     instances: dict[str, Instance] = field(default_factory=dict)
     materials: dict[str, Material] = field(default_factory=dict)

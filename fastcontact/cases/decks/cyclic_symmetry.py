@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fastcontact.cases.decks.blocks import Block, folded, refusing, unquoted
+from fastcontact.cases.decks.blocks import Block, folded, refusing
 from fastcontact.cases.decks.content import Content, SectorEnds, Sectors
 from fastcontact.cases.decks.meshing import DeckMesh, group_of_surface
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
@@ -14,22 +14,13 @@ from fastcontact.model.model import Model
 MOST_SECTORS = 100_000
 
 
-def sector_ends(block: Block) -> SectorEnds:
-    """Read *TIE, CYCLIC SYMMETRY: the end surfaces of a sector."""
-    if len(block.rows) != 1 or len([entry for entry in block.rows[0].entries if entry]) != 2:
-        raise block.refuse("cyclic symmetry needs one data line with two surfaces, the ends of the sector")
-    row = block.rows[0]
-    return SectorEnds(block.location, block.get("NAME"), (unquoted(row.text(0)), unquoted(row.text(1))))
-
-
 def cyclic_symmetry_model(content: Content, block: Block) -> None:
     """Read *CYCLIC SYMMETRY MODEL: the number of sectors, and two points of the axis."""
     text = block.required("N")
     if not text.isdecimal() or not 2 <= int(text) <= MOST_SECTORS:
         raise block.refuse(f"N={text[:40]}: a whole number of sectors, 2 to {MOST_SECTORS}, is needed")
-    if len(block.rows) != 1:
-        raise block.refuse("one data line with two points of the axis is needed")
-    points = tuple(block.rows[0].number(i) for i in range(6))
+    row = block.only()
+    points = tuple(row.number(i) for i in range(6))
     if points[:3] == points[3:]:
         raise block.refuse("the two points of the axis are the same")
     content.sectors.append(Sectors(block.location, int(text), block.get("TIE"), points))

@@ -260,7 +260,7 @@ def read_deck(path: PathLike) -> Deck:
     if not content.steps:
         raise Location(file.name, 1, "STEP").refuse("the deck has no step, so nothing is loaded")
     try:
-        building = Building(content, _text(file))
+        building = Building(content, f"# from the deck {file.name}\n")
     except (ModelError, MeshError, ContactError) as error:
         raise type(error)(f"{file.name}: {error}") from error
     if building.linearised:
@@ -288,11 +288,6 @@ def _times(factor: float, sums: Mapping[str, Any]) -> dict[str, Any]:
         name: _times(factor, value) if isinstance(value, dict) else value if name == "exchanges" else factor * value
         for name, value in sums.items()
     }
-
-
-def _text(path: Path) -> str:
-    """Return the text that result files store for a deck: a comment in a case file."""
-    return f"# from the deck {path.name}\n"
 
 
 def _notes(content: Content, thickness: float) -> tuple[str, ...]:

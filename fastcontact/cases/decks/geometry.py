@@ -82,20 +82,10 @@ def _joined(block: Block, needed: int) -> Iterator[tuple[Row, tuple[str, ...]]]:
         yield first, entries
 
 
-def node_set(content: Content, part: Part, block: Block) -> None:
-    """Read *NSET: a node set."""
-    part.add("node", block.required("NSET"), _members(block))
-
-
-def element_set(content: Content, part: Part, block: Block) -> None:
-    """Read *ELSET: an element set."""
-    part.add("element", block.required("ELSET"), _members(block))
-
-
-def _members(block: Block) -> list[Members]:
-    """Return the entries of a set; CaseError if a range of GENERATE is empty."""
-    instance = folded(block.get("INSTANCE"))
-    entries = []
+def group(content: Content, part: Part, block: Block) -> None:
+    """Read *NSET or *ELSET: a node set or an element set; CaseError if a range of GENERATE is empty."""
+    name, instance = block.required(block.keyword), folded(block.get("INSTANCE"))
+    entries: list[Members] = []
     for row in block.each():
         if "GENERATE" in block.parameters:
             first, last, increment = row.whole(0), row.whole(1), row.whole(2, 1)
@@ -103,16 +93,12 @@ def _members(block: Block) -> list[Members]:
                 raise row.refuse(f"the range {first} to {last} by {increment} is empty: it must ascend")
             entries.append(Members(row.location, range(first, last + 1, increment), instance=instance))
             continue
-        for numbers, group in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
+        for numbers, members_named in groupby(row.entries, lambda entry: entry.isdecimal() and len(entry) < 19):
             if numbers:
-                members = array("q", map(int, group))
-                if entries and isinstance(entries[-1].numbers, array) and len(entries[-1].numbers):
-                    entries[-1].add(members, row.location.line)  # consecutive lines become one entry
-                else:
-                    entries.append(Members(row.location, members, instance=instance))
+                entries.append(Members(row.location, array("q", map(int, members_named)), instance=instance))
             else:
-                entries += [Members(row.location, name=entry, instance=instance) for entry in group if entry]
-    return entries
+                entries += [Members(row.location, name=entry, instance=instance) for entry in members_named if entry]
+    part.add("node" if block.keyword == "NSET" else "element", name, entries)
 
 
 def surface(content: Content, part: Part, block: Block) -> None:
@@ -151,9 +137,7 @@ def section(content: Content, part: Part, block: Block) -> None:
     """Read *SOLID SECTION: material, orientation and thickness of the elements of a set."""
     thickness = None
     for row in block.rows[:1]:
-        thickness = row.number(0, 1.0)
-        if not thickness > 0:
-            raise row.refuse(f"the thickness {thickness:g} must be positive")
+        thickness = row.positive(0, "thickness", 1.0)
     orientation = block.get("ORIENTATION")
     part.sections.append(
         Section(block.location, block.required("ELSET"), block.required("MATERIAL"), thickness, orientation)

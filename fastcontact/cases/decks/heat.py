@@ -9,12 +9,11 @@ from typing import Any, Generic
 import numpy as np
 
 from fastcontact.arrays import Array
-from fastcontact.cases.decks.assembled import Assembly, Face
-from fastcontact.cases.decks.blocks import Block, Row
+from fastcontact.cases.decks.assembled import Assembly, Face, Target, targets
+from fastcontact.cases.decks.blocks import Row
 from fastcontact.cases.decks.content import Content, Given, Step
 from fastcontact.cases.decks.histories import ByShape, Histories, Name
 from fastcontact.cases.decks.meshing import DeckMesh, rows_by_type
-from fastcontact.cases.decks.targets import Target, targets
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -22,11 +21,6 @@ from fastcontact.model.ramp import Table
 OF_HEAT = ("CFLUX", "DFLUX", "DSFLUX", "FILM", "SFILM")
 # Number of the temperature degree of freedom.
 TEMPERATURE = 11
-
-
-def physical_constants(content: Content, block: Block) -> None:
-    """Read *PHYSICAL CONSTANTS: constants of radiation, which have no effect."""
-    content.note(block, "no effect: there is no radiation")
 
 
 def check_steps(content: Content) -> None:
@@ -195,19 +189,16 @@ class HeatConditions:
                     blown.setdefault((table, film.numbers[0], span), []).append(film.face)
         for (table, coefficient, span), faces in blown.items():
             group = assembly.add_facets(f"film {len(adders)}", faces)
-            adders.append(partial(self._film(group, coefficient, table), **_between(span)))
+            rise = self._risen(table)
+            size = max((value for _, value in rise), key=abs)
+            ramp = tuple((time, value / size) for time, value in rise) if size else None
+            blowing: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_between(span)}
+            adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **blowing))
         return adders
 
     def _risen(self, table: Table) -> Table:
         """Return a temperature history relative to the reference temperature."""
         return tuple((time, value - self.reference) for time, value in table)
-
-    def _film(self, group: str, coefficient: float, table: Table) -> Callable[[Model], None]:
-        rise = self._risen(table)
-        size = max((value for _, value in rise), key=abs)
-        ramp = tuple((time, value / size) for time, value in rise) if size else None
-        ambient = self.reference + size
-        return partial(Model.add_film, group=group, coefficient=coefficient, ambient=ambient, ramp=ramp)
 
 
 def _between(span: tuple[float, float]) -> dict[str, float]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.cases.decks.blocks import Location, folded
-from fastcontact.cases.decks.content import Amplitude, Content, Step
+from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 from fastcontact.model.ramp import Table
 
 Name = TypeVar("Name", bound=Hashable)
@@ -155,6 +155,15 @@ class Histories(Generic[Name]):
         self.changing.put(name, value, amplitude, location)
         self.dying.pop(name, None)
 
+    def take(
+        self, given: Given, entries: Iterable[tuple[Name, float, Location]], which: Callable[[Name], bool] | None = None
+    ) -> None:
+        """Set the values of the lines of a block; OP=NEW removes the values of earlier steps that satisfy `which`."""
+        if given.new:
+            self.forget(which)
+        for name, value, location in entries:
+            self.give(name, value, given.amplitude, location)
+
     def hold(self, name: Name, location: Location) -> None:
         """Hold the value that was reached at the end of the latest step."""
         if name in self.tracks:
@@ -171,11 +180,11 @@ class Histories(Generic[Name]):
             self.tracks.update((name, track) for name in names)
         self.first, self.changing = self.changing, Values()
 
-    def forget(self, which: Callable[[Name], bool] = lambda name: True) -> None:
-        """Remove the values of earlier steps whose names satisfy `which`."""
+    def forget(self, which: Callable[[Name], bool] | None = None) -> None:
+        """Remove the values of earlier steps, by default all, or those whose names satisfy `which`."""
         self.first = Values()
         for name, track in self.tracks.items():
-            if track.alive and name not in self.changing and which(name):
+            if track.alive and name not in self.changing and (which is None or which(name)):
                 self.dying[name] = None
 
     def advance(self, number: int, step: Step) -> None:
@@ -254,12 +263,6 @@ def _equal(*columns: AnyArray) -> Iterator[Indices]:
         yield order[bounds[group] : bounds[group + 1]]
 
 
-def shape_of(table: Table) -> tuple[float, Table]:
-    """Return the value of largest magnitude in a history, and the history divided by this value."""
-    size = max((value for _, value in table), key=abs)
-    return size, tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
-
-
 class ByShape(Generic[Name]):
     """Histories of points along axes, grouped by axis and shape, so that many nodal values become a few loads.
 
@@ -273,7 +276,8 @@ class ByShape(Generic[Name]):
 
     def add(self, axis: Name, table: Table, points: Sequence[int]) -> None:
         """Add the history of some points along an axis."""
-        size, shape = shape_of(table)
+        size = max((value for _, value in table), key=abs)
+        shape = tuple((time, round(value / size, ALIKE)) for time, value in table) if size else table
         _, sizes, members = self._members.setdefault((axis, shape), (table, array("d"), array("q")))
         sizes.extend([size] * len(points))
         members.extend(points)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from fastcontact.cases.decks.blocks import Block, Location, Row, as_number, defined, refusing, registered
-from fastcontact.cases.decks.content import Content, Interaction
+from fastcontact.cases.decks.content import Content, Interaction, Step
 from fastcontact.cases.decks.histories import JUMP
 from fastcontact.contact.cohesion import ELASTIC
 from fastcontact.contact.conductance import Conductance
@@ -35,7 +35,7 @@ def interaction(content: Content, block: Block) -> Interaction:
     return properties
 
 
-def changed_interaction(content: Content, block: Block) -> Interaction:
+def changed_interaction(content: Content, step: Step, block: Block) -> Interaction:
     """Read *CHANGE FRICTION; a *FRICTION below it sets the friction from the start of the current step."""
     name = block.required("INTERACTION")
     before = defined("surface interaction", name, content.interactions, block)
@@ -110,11 +110,6 @@ def keep(content: Content, current: Interaction, block: Block) -> None:
     current.cohesion[block.keyword] = block
 
 
-def stabilization(content: Content, current: Interaction, block: Block) -> None:
-    """Read *DAMAGE STABILIZATION, which has no effect."""
-    content.note(block, "no effect: damage has no viscous regularisation")
-
-
 def friction_of(law: Interaction, n_steps: int) -> dict[str, Any]:
     """Return the friction options of a pair, with the changes by *CHANGE FRICTION at the start of steps."""
     table, sticks = [(0.0, law.friction)], {law.stick} if law.friction else set()
@@ -162,16 +157,10 @@ def cohesion_of(content: Content, law: Interaction) -> dict[str, Any]:
     given = {"strength": strength, "shear_strength": shear, "initiation": criterion}
     given.update(_evolution(evolution, given, stiffness))
     if stiffness is None:
-        content.note(
-            behaviour,
-            f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which the layer fails",
-        )
+        content.note(behaviour, f"without a stiffness, damage begins at {ELASTIC:g} of the opening at which it fails")
     else:
         given["stiffness"] = stiffness
-    content.note(
-        behaviour,
-        "sides that are pressed together have the stiffness of the layer, also where it is broken",
-    )
+    content.note(behaviour, "sides that are pressed together have the stiffness of the layer, also where it is broken")
     return {"cohesion": given}
 
 

@@ -5,20 +5,20 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Any, Literal
 
 from fastcontact.cases.decks import (
-    connections,
     cyclic_symmetry,
     gaps,
     geometry,
     heat,
+    initial_fields,
     interactions,
     local_axes,
     materials,
     pretension,
+    relating,
     stepping,
-    temperatures,
 )
 from fastcontact.cases.decks.blocks import Block
 from fastcontact.cases.decks.content import Content, Instance, Interaction, Material, Part, Step
@@ -31,14 +31,16 @@ ANYTHING = "*"
 class Keyword:
     """Properties of a keyword.
 
-    `place` is the context of the keyword and `read` the function that reads it, None for keywords that `Reader` handles.
-    `used` and `harmless` list the parameters that have an effect and those that are accepted without effect.
+    `place` is the context of the keyword and `read` the function that reads it. `used` and `harmless` list the parameters
+    that have an effect and those that are accepted without effect. `opens` is the attribute of `Reader` that `read` returns:
+    the object to which the next keywords belong, or None at its end.
     """
 
-    place: Literal["deck", "part", "material", "interaction", "model", "step", "procedure"]
-    read: Callable[..., None] | None = None
+    place: Literal["deck", "part", "material", "interaction", "coupling", "property", "model", "step", "procedure"]
+    read: Callable[..., Any]
     used: str = ""
     harmless: str = ""
+    opens: str = ""
 
     @property
     def parameters(self) -> set[str]:
@@ -46,28 +48,48 @@ class Keyword:
         return {*self.used.split("; "), *self.harmless.split("; ")} - {""}
 
 
+def heading(content: Content, block: Block) -> None:
+    """Read *HEADING: the title, of which the first line is used."""
+    content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
+
+
+def noted(text: str) -> Callable[..., None]:
+    """Return the function that reads a keyword without effect, for which `text` is noted."""
+    return lambda content, *owner_and_block: content.note(owner_and_block[-1], text)
+
+
+def end(content: Content, block: Block) -> None:
+    """Read the end of a part, an instance or the assembly."""
+
+
 # Parameters that control the solution of steps.
 STEERING = "SOLVER; DIRECT; STABILIZE; ALLSDTOL; CONTINUE; EXPLICIT; DELTMX; MXDEM; END"
+UNUSED_OF_STEPS = "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
 # Supported keywords.
 TRANSLATED = {
-    # Keywords that methods of `Reader` handle.
-    **dict.fromkeys(("ASSEMBLY", "MATERIAL", "PART", "SURFACE INTERACTION"), Keyword("deck", None, "NAME")),
-    **dict.fromkeys(("END ASSEMBLY", "END INSTANCE", "END PART", "END STEP"), Keyword("deck")),
-    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("deck")),
-    "CHANGE FRICTION": Keyword("deck", None, "INTERACTION"),
-    "COUPLING": Keyword("deck", None, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME"),
-    "HEADING": Keyword("deck", None, ANYTHING),
-    "INSTANCE": Keyword("deck", None, "NAME; PART"),
-    "STEP": Keyword(
-        "deck", None, "NLGEOM; AMPLITUDE", "NAME; INC; PERTURBATION; UNSYMM; EXTRAPOLATION; CONVERT SDI; SOLVER"
+    # Keywords that open or close an object to which others belong.
+    "ASSEMBLY": Keyword("deck", end, "NAME", opens="part"),
+    **dict.fromkeys(("END ASSEMBLY", "END PART"), Keyword("deck", end, opens="part")),
+    "END INSTANCE": Keyword("deck", end, opens="instance"),
+    "PART": Keyword("deck", geometry.new_part, "NAME", opens="part"),
+    "INSTANCE": Keyword("deck", geometry.instance, "NAME; PART", opens="instance"),
+    "MATERIAL": Keyword("property", materials.material, "NAME", opens="material"),
+    "SURFACE INTERACTION": Keyword("property", interactions.interaction, "NAME", opens="interaction"),
+    "CHANGE FRICTION": Keyword("procedure", interactions.changed_interaction, "INTERACTION", opens="interaction"),
+    "COUPLING": Keyword(
+        "property", lambda content, block: block, "REF NODE; SURFACE; ORIENTATION", "CONSTRAINT NAME", "coupling"
     ),
+    **dict.fromkeys(("DISTRIBUTING", "KINEMATIC"), Keyword("coupling", relating.coupling, opens="coupling")),
+    "STEP": Keyword("step", stepping.new_step, "NLGEOM; AMPLITUDE", UNUSED_OF_STEPS, "step"),
+    "END STEP": Keyword("step", stepping.end_step, opens="step"),
+    "HEADING": Keyword("deck", heading, ANYTHING),
     # In parts, or in decks without parts.
     "DISTRIBUTION": Keyword("part", local_axes.distribution, "NAME; LOCATION", "TABLE"),
     "DISTRIBUTION TABLE": Keyword("part", local_axes.distribution_table, ANYTHING),
     "ELEMENT": Keyword("part", geometry.cells, "TYPE; ELSET"),
-    "ELSET": Keyword("part", geometry.element_set, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
+    "ELSET": Keyword("part", geometry.group, "ELSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED"),
     "NODE": Keyword("part", geometry.nodes, "NSET; SYSTEM"),
-    "NSET": Keyword("part", geometry.node_set, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
+    "NSET": Keyword("part", geometry.group, "NSET; GENERATE; INSTANCE", "INTERNAL; UNSORTED; FREQUENCY"),
     "ORIENTATION": Keyword("part", local_axes.orientation, "NAME; SYSTEM; DEFINITION"),
     "SOLID SECTION": Keyword("part", geometry.section, "ELSET; MATERIAL; ORIENTATION", "CONTROLS"),
     "SURFACE": Keyword("part", geometry.surface, "NAME; TYPE", "INTERNAL"),
@@ -78,32 +100,32 @@ TRANSLATED = {
     "EXPANSION": Keyword("material", materials.expansion, "TYPE", "ZERO"),
     "HYPERELASTIC": Keyword("material", materials.hyperelastic, "NEO HOOKE; MOONEY-RIVLIN; YEOH; OGDEN; N", "MODULI"),
     "PLASTIC": Keyword("material", materials.plastic, "HARDENING"),
-    "SPECIFIC HEAT": Keyword("material", materials.specific_heat, ANYTHING),
+    "SPECIFIC HEAT": Keyword("material", noted("no effect, heat is steady, or temperatures are given"), ANYTHING),
     # Below *SURFACE INTERACTION.
     "COHESIVE BEHAVIOR": Keyword("interaction", interactions.keep, "TYPE; ELIGIBILITY"),
     "DAMAGE EVOLUTION": Keyword(
         "interaction", interactions.keep, "TYPE; SOFTENING; MIXED MODE BEHAVIOR; POWER; MODE MIX RATIO", "DEGRADATION"
     ),
     "DAMAGE INITIATION": Keyword("interaction", interactions.keep, "CRITERION"),
-    "DAMAGE STABILIZATION": Keyword("interaction", interactions.stabilization, ANYTHING),
+    "DAMAGE STABILIZATION": Keyword("interaction", noted("no effect: damage has no viscous regularisation"), ANYTHING),
     "FRICTION": Keyword("interaction", interactions.friction),
     "GAP CONDUCTANCE": Keyword("interaction", interactions.gap_conductance, "PRESSURE"),
     "GAP HEAT GENERATION": Keyword("interaction", interactions.gap_heat_generation),
     "SURFACE BEHAVIOR": Keyword("interaction", interactions.behaviour, "PRESSURE-OVERCLOSURE; NO SEPARATION"),
     # In the whole model.
     "AMPLITUDE": Keyword("model", stepping.amplitude, "NAME; TIME; DEFINITION; VALUE"),
-    "CLEARANCE": Keyword("model", connections.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
-    "CONTACT PAIR": Keyword("model", connections.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
+    "CLEARANCE": Keyword("model", relating.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
+    "CONTACT PAIR": Keyword("model", relating.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
     "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
-    "EQUATION": Keyword("model", connections.equation),
+    "EQUATION": Keyword("model", relating.equation),
     "GAP": Keyword("model", gaps.gap, "ELSET"),
-    "INITIAL CONDITIONS": Keyword("model", temperatures.initial_conditions, "TYPE"),
-    "MPC": Keyword("model", connections.multi_point),
-    "PHYSICAL CONSTANTS": Keyword("model", heat.physical_constants, ANYTHING),
+    "INITIAL CONDITIONS": Keyword("model", initial_fields.initial_conditions, "TYPE"),
+    "MPC": Keyword("model", relating.multi_point),
+    "PHYSICAL CONSTANTS": Keyword("model", noted("no effect: there is no radiation"), ANYTHING),
     "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
-    "RIGID BODY": Keyword("model", connections.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
+    "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
-    "TIE": Keyword("model", connections.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
+    "TIE": Keyword("model", relating.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
     "TRANSFORM": Keyword("model", local_axes.transform, "NSET; TYPE"),
     # Supports and loads in steps.
     "BOUNDARY": Keyword("step", stepping.given, "OP; AMPLITUDE; FIXED; TYPE"),
@@ -186,10 +208,11 @@ def checked(block: Block, about: str) -> Keyword:
     return known
 
 
-# Contexts that need an open material, interaction or step, with the message if there is none.
+# Contexts that need an open material, interaction, coupling or step, with the message if there is none.
 OWNERS = {
     "material": "belongs below *MATERIAL",
     "interaction": "belongs below *SURFACE INTERACTION",
+    "coupling": "belongs below *COUPLING",
     "procedure": "belongs in a step",
 }
 # Damage keywords, which are supported for cohesive layers only.
@@ -222,7 +245,7 @@ class Reader:
             raise block.refuse(f"material '{name}': damage is supported for cohesive layers only, not in bodies")
         owner = {
             "part": self.part or content.root, "material": self.material, "interaction": self.interaction,
-            "procedure": self.step, "step": self.step,
+            "coupling": self.coupling, "procedure": self.step, "step": self.step,
         }.get(known.place)  # fmt: skip
         if owner is None and known.place in OWNERS:
             raise block.refuse(OWNERS[known.place])
@@ -230,78 +253,15 @@ class Reader:
             self.material = None
         if known.place not in ("material", "interaction"):
             self.interaction = None
-        if known.place in ("part", "model") and keyword != "AMPLITUDE":
-            self._not_in_step(block)
-        if known.place in ("model", "step"):
-            self._not_in_part(block)
+        if known.place in ("part", "property", "model") and keyword != "AMPLITUDE" and self.step is not None:
+            raise block.refuse("cannot be inside a step")
+        if known.place in ("model", "step") and not (self.part is None and self.instance is None):
+            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
         if known.place == "part" and self.instance is not None:
             raise block.refuse("is not supported inside an instance: put it into the part or the assembly")
-        if known.read is None:
-            getattr(self, "_" + keyword.lower().replace(" ", "_"))(block)
-        else:
-            known.read(content, *([] if known.place == "model" else [owner]), block)
-
-    def _not_in_step(self, block: Block) -> None:
-        if self.step is not None:
-            raise block.refuse("cannot be inside a step")
-
-    def _not_in_part(self, block: Block) -> None:
-        if self.part is not None or self.instance is not None:
-            raise block.refuse("is supported for the whole assembly only, not inside a part or instance")
-
-    def _heading(self, block: Block) -> None:
-        self.content.title = " ".join(" ".join(", ".join(row.entries) for row in block.rows[:1]).split())
-
-    def _assembly(self, block: Block) -> None:
-        self.part = None
-
-    _end_part = _end_assembly = _assembly
-
-    def _part(self, block: Block) -> None:
-        self.part = geometry.new_part(self.content, block)
-
-    def _instance(self, block: Block) -> None:
-        self.instance = geometry.instance(self.content, block)
-
-    def _end_instance(self, block: Block) -> None:
-        self.instance = None
-
-    def _material(self, block: Block) -> None:
-        self._not_in_step(block)
-        self.material = materials.material(self.content, block)
-
-    def _surface_interaction(self, block: Block) -> None:
-        self._not_in_step(block)
-        self.interaction = interactions.interaction(self.content, block)
-
-    def _change_friction(self, block: Block) -> None:
-        if self.step is None:
-            raise block.refuse("belongs in a step")
-        self.interaction = interactions.changed_interaction(self.content, block)
-
-    def _coupling(self, block: Block) -> None:
-        self._not_in_step(block)
-        self.coupling = block
-
-    def _kinematic(self, block: Block) -> None:
-        if self.coupling is None:
-            raise block.refuse("belongs below *COUPLING")
-        connections.coupling(self.content, self.coupling, block)
-        self.coupling = None
-
-    _distributing = _kinematic
-
-    def _step(self, block: Block) -> None:
-        if self.step is not None:
-            raise block.refuse("the previous step has no *END STEP")
-        self._not_in_part(block)
-        self.step = stepping.new_step(self.content, block)
-
-    def _end_step(self, block: Block) -> None:
-        if self.step is None:
-            raise block.refuse("there is no step to end")
-        stepping.end_step(self.content, self.step)
-        self.step = None
+        read = known.read(content, *([] if known.place in ("deck", "property", "model") else [owner]), block)
+        if known.opens:
+            setattr(self, known.opens, read)
 
 
 def read_content(blocks: Iterable[Block]) -> Content:

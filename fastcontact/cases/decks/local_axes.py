@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.cases.decks.assembled import Assembly, Element
-from fastcontact.cases.decks.blocks import Block, Location, folded, registered, unquoted
+from fastcontact.cases.decks.blocks import Block, Location, defined, folded, registered, unquoted
 from fastcontact.cases.decks.content import Axes, Content, Part
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
@@ -18,12 +18,8 @@ def orientation(content: Content, part: Part, block: Block) -> None:
     """Read *ORIENTATION: material axes."""
     name, system = block.required("NAME"), block.choice("SYSTEM", ("RECTANGULAR", "CYLINDRICAL"))
     block.choice("DEFINITION", ("COORDINATES",))
-    rows, key = block.rows, folded(name)
+    rows = block.rows
     points: tuple[float, ...] = ()
-    if key in content.orientations:
-        raise block.refuse(
-            f"orientation '{name}' is defined twice, first in line {content.orientations[key].location.line}"
-        )
     if not rows:
         raise block.refuse("a data line with six coordinates is needed")
     distribution = unquoted(rows[0].text(0)) if re.match("[A-Za-z_]", rows[0].text(0)) else ""
@@ -35,7 +31,8 @@ def orientation(content: Content, part: Part, block: Block) -> None:
             raise rows[0].refuse("an origin of the axes is not supported: give points relative to 0, 0, 0")
     if len(rows) > 1 and rows[1].number(1, 0.0):
         raise rows[1].refuse("a further rotation of the axes is not supported: rotate the points of the first line")
-    content.orientations[key] = Axes(block.location, "", system == "CYLINDRICAL", points, distribution, part)
+    axes = Axes(block.location, name, system == "CYLINDRICAL", points, distribution, part)
+    registered("orientation", name, content.orientations, axes, block)
 
 
 def distribution_table(content: Content, part: Part, block: Block) -> None:
@@ -54,9 +51,8 @@ def distribution(content: Content, part: Part, block: Block) -> None:
 def transform(content: Content, block: Block) -> None:
     """Read *TRANSFORM: local axes of nodes."""
     cylindrical = block.choice("TYPE", ("R", "C")) == "C"
-    if len(block.rows) != 1:
-        raise block.refuse("one data line with six coordinates is needed")
-    points = tuple(block.rows[0].number(i) for i in range(6))
+    row = block.only()
+    points = tuple(row.number(i) for i in range(6))
     content.axes.append(Axes(block.location, block.required("NSET"), cylindrical, points))
 
 
@@ -65,16 +61,13 @@ def local_directions(assembly: Assembly) -> dict[int, Array]:
     return {
         point: local_axes(axes, assembly.points[point])
         for axes in assembly.content.axes
-        for point in assembly.nodes(axes.nodes, axes.location)
+        for point in assembly.nodes(axes.name, axes.location)
     }
 
 
 def orientation_of(content: Content, name: str, location: Location) -> Axes:
     """Return the axes of an *ORIENTATION; CaseError if it is not defined, or is used outside sections but varies."""
-    axes = content.orientations.get(folded(name))
-    if axes is None:
-        known = ", ".join(content.orientations).lower() or "none"
-        raise location.refuse(f"orientation '{name}' is not defined; orientations: {known}")
+    axes: Axes = defined("orientation", name, content.orientations, location)
     if axes.distribution and location.keyword != "SOLID SECTION":
         raise location.refuse(
             f"orientation '{name}' varies by element, by a distribution: it can be used in sections only"

@@ -138,7 +138,7 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     constants, compressible = numbers[:first], [*numbers[first : first + rest], *[0.0] * rest][:rest]
     if any(compressible[1:]):
         raise block.refuse(f"material '{current.name}': only the compressibility constant D1 is supported")
-    mu = _shear_modulus(kind, constants)
+    mu = sum(constants[::2]) if kind == "OGDEN" else 2.0 * sum(constants[: 2 if kind == "MOONEY-RIVLIN" else 1])
     bulk = 2.0 / compressible[0] if compressible[0] else 2.0 * mu * (1.0 + UNGIVEN) / (3.0 * (1.0 - 2.0 * UNGIVEN))
     if not compressible[0]:
         content.note(block, f"D1 = 0: the bulk modulus is that of nu = {UNGIVEN}")
@@ -147,30 +147,18 @@ def hyperelastic(content: Content, current: Material, block: Block) -> None:
     current.law = lambda axes: law
 
 
-def _shear_modulus(kind: str, constants: list[float]) -> float:
-    if kind == "OGDEN":
-        return sum(constants[::2])
-    return 2.0 * (constants[0] + (constants[1] if kind == "MOONEY-RIVLIN" else 0.0))
-
-
 def _hyperelastic(kind: str, constants: list[float], mu: float, bulk: float) -> Any:
     if kind == "NEO HOOKE":
         return NeoHookean(E=9.0 * bulk * mu / (3.0 * bulk + mu), nu=(3.0 * bulk - 2.0 * mu) / (2.0 * (3.0 * bulk + mu)))
     if kind == "OGDEN":
         return Ogden(constants[::2], constants[1::2], bulk=bulk)
-    if kind == "MOONEY-RIVLIN":
-        return MooneyRivlin(constants[0], constants[1], bulk)
-    return Yeoh(constants[0], constants[1], constants[2], bulk)
+    law: Any = MooneyRivlin if kind == "MOONEY-RIVLIN" else Yeoh
+    return law(*constants, bulk)
 
 
 def conductivity(content: Content, current: Material, block: Block) -> None:
     """Read *CONDUCTIVITY, which is interpreted after all steps are read."""
     current.conductivity = block
-
-
-def specific_heat(content: Content, current: Material, block: Block) -> None:
-    """Read *SPECIFIC HEAT, which has no effect in static and steady-state steps."""
-    content.note(block, f"material '{current.name}': no effect, heat is steady, or temperatures are given")
 
 
 def expansion(content: Content, current: Material, block: Block) -> None:
@@ -183,12 +171,7 @@ def expansion(content: Content, current: Material, block: Block) -> None:
 def along_axes(current: Material, block: Block) -> float | tuple[float, ...]:
     """Return one coefficient, or one along each axis; CaseError if coefficients depend on the temperature."""
     kind = block.choice("TYPE", tuple(COEFFICIENTS))
-    if len(block.rows) != 1:
-        raise block.refuse(
-            f"material '{current.name}': {len(block.rows)} data lines, but one is needed: coefficients that depend on "
-            "temperatures are not supported"
-        )
-    row, count = block.rows[0], COEFFICIENTS[kind]
+    row, count = block.only("temperatures"), COEFFICIENTS[kind]
     values = tuple(row.number(index) for index in range(count))
     if any(row.entries[count + 1 :]):
         raise row.refuse(f"material '{current.name}': TYPE={kind} has {count} coefficients, at one temperature")
@@ -219,15 +202,19 @@ def law_of(content: Content, material: Material, axes: Any, modes: bool) -> Any:
 
 
 def _conductivity(content: Content, material: Material) -> float | tuple[float, ...] | None:
-    """Return the conductivity of a material; CaseError if temperatures are computed and it has none."""
+    """Return the conductivity of a material; CaseError if temperatures are computed and it has none, or one not positive."""
     block = material.conductivity
-    if content.heat:
-        if block is None:
+    if block is None:
+        if content.heat:
             raise material.refuse(f"material '{material.name}' has no *CONDUCTIVITY")
-        return conductivity_of(material, block)
-    if block is not None:
+        return None
+    if not content.heat:
         content.note(block, f"material '{material.name}': no effect, temperatures are given, not computed")
-    return None
+        return None
+    values = along_axes(material, block)
+    if not np.min(values) > 0.0:
+        raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
+    return values
 
 
 def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any:
@@ -241,14 +228,6 @@ def _with_axes(material: Material, law: Any, axes: Any, **constants: Any) -> Any
         others = {name: getattr(law, name) for name in ("density", "expansion", "conductivity")}
         law = Orthotropic((law.E,) * 3, (law.nu,) * 3, (G,) * 3, axes, **others)
     return replace(law, **constants)
-
-
-def conductivity_of(material: Material, block: Block) -> float | tuple[float, ...]:
-    """Return one conductivity, or three along the material axes; CaseError unless all are positive."""
-    values = along_axes(material, block)
-    if not np.min(values) > 0.0:
-        raise block.refuse(f"material '{material.name}': the conductivity {np.min(values):g} must be positive")
-    return values
 
 
 def strain_of(content: Content, laws: list[Any]) -> tuple[str, str]:

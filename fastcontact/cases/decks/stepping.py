@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from fastcontact.cases.decks.blocks import Block, folded
+from fastcontact.cases.decks.blocks import Block, defined, folded
 from fastcontact.cases.decks.content import Amplitude, Content, Given, Step
 
 # Largest number of increments of a step, in models with friction or cohesive contact.
 MOST_PARTS = 20
 
 
-def new_step(content: Content, block: Block) -> Step:
+def new_step(content: Content, step: Step | None, block: Block) -> Step:
     """Read *STEP and return the new step."""
+    if step is not None:
+        raise block.refuse("the previous step has no *END STEP")
     nonlinear = "NLGEOM" in block.parameters and block.get("NLGEOM", "YES").upper() != "NO"
     if content.modes is not None:
         raise block.refuse("follows a step with *FREQUENCY, which must be the last step")
@@ -61,8 +63,10 @@ def frequency(content: Content, step: Step, block: Block) -> None:
     step.modes = number
 
 
-def end_step(content: Content, step: Step) -> None:
+def end_step(content: Content, step: Step | None, block: Block) -> None:
     """Read *END STEP; a step with *FREQUENCY becomes a request for modes instead of a load step."""
+    if step is None:
+        raise block.refuse("there is no step to end")
     if not step.modes:
         if not step.static:
             raise step.refuse("the step has no *STATIC or other procedure")
@@ -86,9 +90,8 @@ def end_step(content: Content, step: Step) -> None:
 def given(content: Content, step: Step | None, block: Block) -> None:
     """Store a block of supports or loads of a step, or a *BOUNDARY before all steps."""
     name = block.get("AMPLITUDE")
-    if name and folded(name) not in content.amplitudes:
-        known = ", ".join(content.amplitudes) or "none"
-        raise block.refuse(f"amplitude '{name}' is not defined above this line; amplitudes: {known}")
+    if name:
+        defined("amplitude", name, content.amplitudes, block)
     conditions = Given(block, block.choice("OP", ("MOD", "NEW")) == "NEW", name)
     if step is not None:
         step.given.append(conditions)
@@ -108,4 +111,4 @@ def amplitude(content: Content, block: Block) -> None:
     times, values = numbers[::2], numbers[1::2]
     if not times or len(times) != len(values) or any(b <= a for a, b in pairwise(times)):
         raise block.refuse(f"amplitude '{name}' needs pairs of ascending times and multipliers")
-    content.amplitudes[folded(name)] = Amplitude(block.location, tuple(times), tuple(values), total)
+    content.amplitudes[folded(name)] = Amplitude(block.location, name, tuple(times), tuple(values), total)

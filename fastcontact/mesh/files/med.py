@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
-from fastcontact._tools.hdf5 import attribute, check_size, opened, values
-from fastcontact._tools.hdf5_driver import new_hdf5
+from fastcontact._tools.hdf5 import attribute, check_size, new_hdf5, opened, values
 from fastcontact._tools.paths import PathLike, replacing
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.errors import FileError, MeshError, check_known, warn

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+import textwrap
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -12,7 +13,9 @@ import numpy as np
 
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError, check_known
+from fastcontact.results.plot.fields import Field
 from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,12 +54,6 @@ def png(figure: Any) -> bytes:
     return buffer.getvalue()
 
 
-def displayed(figure: Any) -> None:
-    """Add a representation for notebooks to a figure and its axes."""
-    for artist in (figure, *figure.axes):
-        artist._repr_png_ = partial(png, figure)
-
-
 class Panels(tuple[Any, ...]):
     """The axes of a figure with several panels, which are displayed as the figure in notebooks."""
 
@@ -66,18 +63,15 @@ class Panels(tuple[Any, ...]):
         return png(self[0].figure)
 
 
-def drawable(ax: Any) -> Any:
-    """Return `ax`; FastcontactError unless it is an axes object of Matplotlib."""
+def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
+    """Return `ax` or, if it is None, the axes of a new figure; ``projection="3d"`` gives axes in space."""
+    if ax is None:
+        return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0]
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
         raise FastcontactError(
             f"pictures are drawn on axes of matplotlib, not on {ax!r}: leave the argument out for new ones"
         )
     return ax
-
-
-def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax` or, if it is None, the axes of a new figure; ``projection="3d"`` gives axes in space."""
-    return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0] if ax is None else drawable(ax)
 
 
 def without_matplotlib(error: Exception) -> FastcontactError:
@@ -100,7 +94,8 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
     figure = Figure(figsize=size, layout="constrained", dpi=dpi)
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
-    displayed(figure)
+    for artist in (figure, *figure.axes):  # notebooks show any of them as the figure
+        artist._repr_png_ = partial(png, figure)  # type: ignore[attr-defined]
     return panels
 
 
@@ -112,4 +107,43 @@ def outer_legend(ax: Any, columns: int) -> None:
 def settled(axes: Any) -> Any:
     """Draw axes in space, so that the size of their labels is known to the layout, and return them."""
     axes.figure.draw_without_rendering()
+    return axes
+
+
+LETTER = 0.09  # mean width of a letter of a label [inch]
+
+
+def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
+    """Return width and height [inch] of a figure for a body, with space for colour bar, labels and title."""
+    width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
+    return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
+
+
+def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
+    """Return the lower and upper corners of a square with a centre (2,) and a half width, clipped to points (n, 2)."""
+    low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
+    return np.maximum(middle - half, low), np.minimum(middle + half, high)
+
+
+def framed(
+    axes: Any, drawn: Any, shown: Field, heading: str, units: Units, labels: Sequence[str], points: Array | None = None,
+    *, alone: bool = True,
+) -> Any:  # fmt: skip
+    """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
+
+    `points` (n, 2) [length] are the points of a body in the plane, and None for axes in space. `alone` is whether the figure
+    has no other axes.
+    """
+    caption, length, below = labelled(shown.caption, units, shown.quantity), 0.6, 0.02
+    if points is not None:
+        width, height = np.ptp(points, axis=0)
+        caption = textwrap.fill(caption, int(size_around(points)[1] / LETTER))
+        length = float(np.clip(2.0 * height / max(width, 1e-300), 0.45, 0.8))  # shorter for flat bodies
+        half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
+        below = half_inch if alone else -0.09
+        axes.set_aspect("equal")
+    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=length)
+    axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
+    axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))
     return axes

@@ -14,8 +14,8 @@ from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels
-from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import fill
+from fastcontact.results.plot.solid import seen_along
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 
@@ -108,7 +108,8 @@ def contact_map(
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
     if both:
-        _arrows(panels[1], flat, vectors @ basis.T, size)
+        far = size > 0.1 * size.max()  # arrows show the direction where the magnitude is not small
+        panels[1].quiver(*flat[far].T, *(vectors @ basis.T)[far].T, color="white", width=0.004, pivot="tail")
     if axes is None:
         panels[0].figure.set_figheight(1.6 + 3.0 * high)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
@@ -169,12 +170,6 @@ def _nodes(ax: Any, flat: Array, contact: ContactResult, both: bool) -> None:
     ):
         if here.any():
             ax.plot(*flat[here].T, "o", ms=3, mfc=colour, mec="black", mew=0.4, label=name)
-
-
-def _arrows(ax: Any, flat: Array, vectors: Array, size: Array) -> None:
-    """Draw the direction of shear traction or slip at nodes with at least a tenth of the largest value."""
-    here = size > 0.1 * size.max()
-    ax.quiver(*flat[here].T, *vectors[here].T, color="white", width=0.004, pivot="tail")
 
 
 def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:

@@ -12,10 +12,9 @@ import numpy as np
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.recovery import von_mises, von_mises_signed
-from fastcontact.errors import FastcontactError, unknown
+from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import contact_slip
-from fastcontact.results.separated import cells_by_element, separated
+from fastcontact.results.layout import cells_by_element, contact_slip, separated
 from fastcontact.results.step import StepResult
 from fastcontact.results.tables import AXES, STRESS_COMPONENTS
 from fastcontact.results.units import valued
@@ -78,14 +77,8 @@ class Field:
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     """Return a field of a step by its name; FastcontactError if there is no field with this name."""
     fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
-    known = [
-        *names(mesh),
-        *step.cell_fields,
-        *["temperature"] * (step.temperature is not None),
-        *["heat_flux"] * bool(fluxes),
-    ]
-    if name not in known:
-        raise FastcontactError(unknown("field", name, known))
+    heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
+    check_known("field", name, [*names(mesh), *step.cell_fields, *heat], FastcontactError)
     if name in OF_STRESS and name not in step.cell_fields:
         separate_mesh, node, stress = separated(mesh, step)
         caption, of_stress = OF_STRESS[name]

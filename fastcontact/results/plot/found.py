@@ -10,8 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import Axes, new_axes, settled
-from fastcontact.results.plot.framing import size_around
+from fastcontact.results.plot._axes import Axes, new_axes, settled, size_around
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 

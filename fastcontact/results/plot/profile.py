@@ -83,7 +83,8 @@ def pressure_profile(
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
         x = np.unique(np.concatenate([[low, high], np.linspace(max(-end, low), end, 400)]))
-        label = f"{legend}: {_largest(curve, units)}"
+        name = "$p_0$" if np.isfinite(curve.radius) else "$p$"  # the pressure is uniform
+        label = f"{legend}: {name} = {valued(curve.pressure_max, units, 'pressure')}"
         ax.plot(x, curve.pressure(np.abs(x)), style, color="black", lw=1.1, label=label)
     peak = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
     label = f"{contact.formulation.replace('_', '-')}: {peak}"
@@ -102,12 +103,6 @@ def pressure_profile(
     ax.title.set_fontsize("medium")
     outer_legend(ax, 2)
     return ax
-
-
-def _largest(curve: PressureCurve, units: Units) -> str:
-    """Return a label with the largest pressure of a theory, or with its pressure if it is uniform."""
-    name = "$p_0$" if np.isfinite(curve.radius) else "$p$"
-    return f"{name} = {valued(curve.pressure_max, units, 'pressure')}"
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:

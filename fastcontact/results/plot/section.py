@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -13,13 +12,11 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, mark, new_axes, placed
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, framed, mark, new_axes, part_shown, placed, size_around
 from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.framing import framed, part_shown, size_around
-from fastcontact.results.plot.hiding import seen_along
 from fastcontact.results.plot.patches import shaded
 from fastcontact.results.plot.shape import scale_of, scaled
-from fastcontact.results.plot.solid import MOST_EDGES
+from fastcontact.results.plot.solid import MOST_EDGES, seen_along
 from fastcontact.results.step import StepResult
 
 # Distance by which a plane that only touches a body is moved into the body, relative to the size of the body.
@@ -86,6 +83,8 @@ def section(
     >>> step = fc.solve(model, 1)[-1]
     >>> ax = fc.plot.section(mesh, step, point=(0.5, 0.5, 0.5), normal=(0.0, 1.0, 0.0))
     """
+    from matplotlib.collections import LineCollection
+
     at, direction = _plane(mesh, point, normal)
     shown, units = field_of(mesh, step, field), units or step.units
     triangles, lines = _touching(shown, step, at, direction)
@@ -102,9 +101,11 @@ def section(
     drawn = shaded(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
     strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
-        _stroke(axes, strokes)
+        axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
     before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
-    _mark(axes, flat[best], values[best], before, corners.reshape(-1, 3), units, shown)
+    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    label = f"{shown.described(values[best], units, ' on the section')}\nundeformed at {placed(before, size)}"
+    mark(axes, flat[best], label)
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
@@ -200,18 +201,3 @@ def _between(data: Array, height: Array, i: int, j: int) -> Array:
     """Return the data (n, k) interpolated linearly between two corners to the point of zero height."""
     t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
     return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
-
-
-def _stroke(axes: Any, strokes: Array) -> None:
-    from matplotlib.collections import LineCollection
-
-    axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
-
-
-def _mark(axes: Any, at: Array, value: float, before: Array, points: Array, units: Units, shown: Field) -> None:
-    """Mark the largest value of the section at the position `at` (2,) of the plot.
-
-    The label contains the position `before` (3,) in the reference configuration.
-    """
-    size = float(np.ptp(points, axis=0).max())
-    mark(axes, at, f"{shown.described(value, units, ' on the section')}\nundeformed at {placed(before, size)}")

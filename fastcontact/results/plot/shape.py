@@ -11,9 +11,19 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, mark, new_axes, placed, settled
+from fastcontact.results.plot._axes import (
+    UNKNOWN,
+    Axes,
+    Units,
+    framed,
+    mark,
+    new_axes,
+    part_shown,
+    placed,
+    settled,
+    size_around,
+)
 from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.framing import framed, part_shown, size_around
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view_of_extreme
 from fastcontact.results.step import StepResult

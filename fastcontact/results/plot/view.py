@@ -44,7 +44,8 @@ def view(
         import pyvista
     except ImportError as error:
         raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
-    if screenshot is None and not _has_display():
+    displayed = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if screenshot is None and not displayed:
         raise FastcontactError("there is no display to open a window on: write a picture instead, with --png FILE")
     grid = results.to_pyvista(step)
     grid.points = scaled(grid.points, scale_of(scale, results.mesh, [step]), grid.point_data["displacement"])
@@ -58,10 +59,3 @@ def view(
         plotter.view_xy()
     plotter.add_axes()
     plotter.show(screenshot=screenshot or False)
-
-
-def _has_display() -> bool:
-    """Return whether the environment has a display for a window."""
-    if sys.platform in ("win32", "darwin"):
-        return True
-    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

@@ -10,7 +10,7 @@ from pairwise import first_of
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.cases.shipped import case_path, shipped_case, shipped_cases
+from fastcontact.cases.case_files import case_path, shipped_case, shipped_cases
 from fastcontact.cli import main
 
 NAMES = list(shipped_cases())

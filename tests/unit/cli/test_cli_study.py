@@ -12,8 +12,8 @@ import pytest
 
 import fastcontact as fc
 from fastcontact.cli import _study, main, sweep
-from fastcontact.studies.execute import Progress
-from fastcontact.studies.progress import Runs, reporting
+from fastcontact.studies.execute import Progress, Runs, run_study
+from fastcontact.studies.job import Run
 
 
 @pytest.mark.parametrize(
@@ -49,7 +49,12 @@ def test_nothing_is_drawn_where_nobody_looks(capsys):
 
 @pytest.mark.parametrize(("store", "told"), [("runs", "with the runs in runs"), (None, "with --store DIR")])
 def test_an_interrupted_study_says_how_to_go_on(store, told):
-    assert told in _study.stopped(argparse.Namespace(store=store))
+    def interrupted(**options):
+        raise KeyboardInterrupt
+
+    options = argparse.Namespace(store=store, quiet=True, executor="processes", workers=1)
+    with pytest.raises(fc.FastcontactError, match=told):
+        _study.finished(options, interrupted)
 
 
 @pytest.mark.parametrize(
@@ -192,14 +197,21 @@ def is_running(process):
         return False
 
 
+class Solved(Run):
+    """A run that is already solved."""
+
+    def measured(self):
+        return {"values": {}, "seconds": 1.0}
+
+
 def test_a_study_tells_its_runs_where_it_is_asked_to(capsys):
     heard = []
+    runs = [Solved(label=f"level {number}", name="case", marks={}) for number in (1, 2)]
     for show in (False, True):
-        with reporting(heard.append, show) as ended:
-            ended(Progress("level 1", 1, 2, ("level 2",), 1.0, "", False))
+        run_study(runs, "nothing", on_progress=heard.append, progress=show, workers=1)
         shown = capsys.readouterr().err
         assert ("the first runs" in shown) is show
         assert ("1/2 level 1 done, 1 left" in shown) is show
-    assert [progress.label for progress in heard] == ["level 1"] * 2
+    assert [progress.label for progress in heard] == ["level 1", "level 2"] * 2
     for study in (fc.convergence_study, fc.parameter_sweep, fc.adaptive_study):
         assert inspect.signature(study).parameters["progress"].default is False

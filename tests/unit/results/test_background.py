@@ -10,7 +10,6 @@ from test_result_files import MESH, assert_same, nth_step
 
 from fastcontact import ConvergenceError, FileError, ResultWriter, open_results
 from fastcontact.results import write_arrays
-from fastcontact.results.background import Background
 
 
 @pytest.fixture
@@ -121,19 +120,14 @@ def test_a_step_that_does_not_follow_is_refused_at_once(tmp_path):
             out.write(nth_step(2))
 
 
-def test_an_error_is_raised_once_and_the_next_task_runs():
-    work, done = Background(), []
-
-    def fail():
-        raise ValueError("no")
-
-    work.start(fail)
-    with pytest.raises(ValueError, match="no"):
-        work.wait()
-    work.wait()
-    work.start(lambda: done.append(1))
-    work.wait()
-    assert done == [1]
+def test_an_error_is_raised_once(tmp_path, monkeypatch):
+    failing(monkeypatch, 0)
+    out = ResultWriter(tmp_path / "run.vtkhdf", MESH, background=True)
+    out.write(nth_step(1))
+    with pytest.raises(FileError, match="No space left"):
+        out.wait()
+    out.wait()
+    out.close()
 
 
 def test_arrays_of_the_caller_may_change(tmp_path, slow):

@@ -10,7 +10,7 @@ import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.elasticity.material_sides import material_sides
 from fastcontact.results import layout
-from fastcontact.results.separated import mean_in_cells, separated
+from fastcontact.results.layout import mean_in_cells, separated
 
 STRAIN = -0.01
 MODULI = (1.0, 1000.0)

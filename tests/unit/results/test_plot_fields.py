@@ -20,9 +20,9 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, union
 from fastcontact.results.plot.fields import field_of, names
-from fastcontact.results.plot.hiding import Screen
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.section import _cut_tetrahedra
+from fastcontact.results.plot.solid import Screen
 
 pytestmark = pytest.mark.each_value
 

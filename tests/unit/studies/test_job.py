@@ -10,7 +10,7 @@ from fastcontact.cases.case import read_case
 from fastcontact.studies import job
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.levels import recipe
-from fastcontact.studies.render.table import percent
+from fastcontact.studies.render import percent
 from fastcontact.studies.settings import Combination, combinations, settings
 
 
@@ -62,9 +62,13 @@ def test_options_that_another_formulation_does_not_have_are_dropped(chosen):
     assert job.case_data(chosen, Combination("tri6", None))["contact"]["hertz"] == own
 
 
-def test_fewer_load_steps_end_where_the_ramp_does():
-    assert job.ramp_of({"steps": 20}, 2) == {"steps": 2}
-    assert job.ramp_of({"instants": [0.1, 0.5, 2.0]}, 4)["instants"] == [0.5, 1.0, 1.5, 2.0]
+@pytest.mark.parametrize(
+    ("ramp", "steps", "fewer"),
+    [({"steps": 20}, 2, {"steps": 2}), ({"instants": [0.1, 0.5, 2.0]}, 4, {"instants": [0.5, 1.0, 1.5, 2.0]})],
+)
+def test_fewer_load_steps_end_where_the_ramp_does(chosen, ramp, steps, fewer):
+    changed = replace(chosen, data={**chosen.data, "ramp": ramp}, load_steps=steps)
+    assert job.case_data(changed, Combination("tri6", None))["ramp"] == fewer
 
 
 def test_a_run_that_goes_wrong_in_any_way_is_a_result(monkeypatch):

@@ -11,10 +11,10 @@ from fastcontact.cli import main
 from fastcontact.mesh.generate import GENERATORS
 from fastcontact.studies import quantities
 from fastcontact.studies.convergence import convergence_study
+from fastcontact.studies.convergence_tables import sentences
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.job import job_of
 from fastcontact.studies.levels import RULES, make_mesh, recipe
-from fastcontact.studies.sentences import sentences
 from fastcontact.studies.settings import combinations, one_combination, settings
 
 BALL = """kinematics = "axisymmetric"

@@ -10,7 +10,7 @@ from fastcontact.cli import main
 from fastcontact.errors import CaseError
 from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.sweep import parameter_sweep
-from fastcontact.studies.sweep_figures import parameter_label
+from fastcontact.studies.sweep_report import parameter_label
 
 
 @pytest.fixture(scope="module")

@@ -58,11 +58,11 @@ def test_a_quarter_of_a_ring_stays_one(tmp_path):
         (TIE + MODEL.replace("n=4", "n=4.5"), "N=4.5: a whole number of sectors"),
         (TIE + MODEL.replace("n=4", "n=5"), r"turned by 1/5 of a turn, lies .* from the nearest node .* check axis"),
         (TIE + MODEL.replace("0., 0., 1.", "0., 0., 0."), "the two points of the axis are the same"),
-        (TIE + MODEL + "0., 0., 0., 0., 0., 1.\n", "one data line with two points of the axis is needed"),
+        (TIE + MODEL + "0., 0., 0., 0., 0., 1.\n", "2 data lines, but one is needed"),
         (TIE + MODEL.replace("tie=round", "tie=other"), "TIE=other, and the ties with CYCLIC SYMMETRY are: round"),
         (MODEL, "TIE=round, and the ties with CYCLIC SYMMETRY are: none"),
         (TIE, r"\*TIE: no \*CYCLIC SYMMETRY MODEL defines the number of sectors"),
-        (TIE.replace("left, right", "left"), r"\*TIE: cyclic symmetry needs one data line with two surfaces"),
+        (TIE.replace("left, right", "left"), r"\*TIE: cyclic symmetry needs two surfaces"),
         (TIE.replace("left,", "west,") + MODEL, r"\*TIE: surface 'west' is not defined"),
         (
             TIE.replace(", cyclic", ", multistage, cyclic") + MODEL,

@@ -113,7 +113,7 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (heated("*Expansion\n1.e-5, 20.\n2.e-5, 100.\n"), r"\*EXPANSION: material 'steel': 2 data lines"),
+        (heated("*Expansion\n1.e-5, 20.\n2.e-5, 100.\n"), r"\*EXPANSION: 2 data lines, but one is needed"),
         (heated("*Expansion, type=ANISO\n1.e-5\n"), r"\*EXPANSION: TYPE=ANISO is not supported"),
         (heated("*Expansion\n1.e-5, 20., 3.\n"), r"\*EXPANSION: .*has 1 coefficients"),
         (heated(steps="*Temperature, file=heat.frd\n"), r"\*TEMPERATURE: the parameter FILE"),

@@ -1,1 +1,0 @@
-"""Rendering of all studies: tables, figures and pages from plain rows, curves and strings."""
