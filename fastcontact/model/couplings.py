@@ -18,8 +18,7 @@ from fastcontact.elasticity.loads import Load, Table, Traction, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import MeshError, ModelError, check_known
 from fastcontact.linear.sparse_rows import nodal_rows
-from fastcontact.mesh.companion_groups import ROTATION
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import ROTATION, Mesh
 from fastcontact.round_off import ROUND_OFF, TINY
 
 Term = tuple[int, int, float]  # point, component, coefficient

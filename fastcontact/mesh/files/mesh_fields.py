@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +14,7 @@ from fastcontact._tools.hdf5 import check_size, opened, values
 from fastcontact._tools.neighbours import nearest
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
-from fastcontact.errors import FastcontactError, FileError, MeshError, check_known, unknown
+from fastcontact.errors import FastcontactError, FileError, MeshError, ModelError, check_known, unknown
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.mesh import Mesh
 
@@ -236,6 +237,38 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
     if not len(field):
         raise FileError(f"field '{name}' of '{path}' has no instant")
     return FileField(times, np.asarray(field, np.float64).reshape(field.shape[:2]), places)
+
+
+def read_temperatures(
+    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, wanted: Indices, instant: float | None
+) -> tuple[Array, Array | None]:
+    """Return a field (n_instants, n_points) at the `wanted` (k,) of int points, elsewhere NaN, and its times (n_instants,).
+
+    Temperatures are in the unit of the file [temperature], times are load factors [-] or None.
+
+    Raises
+    ------
+    FileError, MeshError, ModelError
+        If a file cannot be read or lacks the field, a wanted point has no value, or there is no such instant.
+    """
+    files = [file] if isinstance(file, (str, os.PathLike)) else list(file)
+    if not files:
+        raise ModelError("no file is given for the temperature")
+    fields, times = [], []
+    for path in files:
+        field_of_file = read_file_field(path, field, "points")
+        values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
+        if len(files) > 1 and len(values) > 1:
+            raise ModelError(
+                f"'{path}' has {len(values)} instants: each of several files must have one, or give a single file"
+            )
+        fields.append(values)
+        times.append(field_of_file.times)
+    values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
+    if instant is None:
+        return values, time
+    row = row_of(instant, time, f"field '{field}' of '{files[0]}'", ModelError)
+    return values[row : row + 1], None
 
 
 def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:
