@@ -34,8 +34,7 @@ def test_a_uniform_tension_passes(formulation, kinematics, swap):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_a_bilateral_pair_slides_without_resistance(formulation):
-    model = elastic_model(blocks(upper=(4, 2)), "plane_strain", LOWER_BOTTOM="xy")
-    model.prescribe("UPPER_TOP", x=0.5, y=0.0)
+    model = elastic_model(blocks(upper=(4, 2)), "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.5, "y": 0.0})
     touching(model, formulation, kind="bilateral", projection_tolerance=0.5)
     last = fc.solve(model, fc.linear_ramp(1))[-1]
     upper = model.mesh.points_of("UPPER")
@@ -84,8 +83,7 @@ def test_once_closed_leaves_the_rest_free(formulation, forma04):
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_an_obstacle_may_be_a_guide(formulation):
-    model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x")
-    model.prescribe("TOP", y=0.01)
+    model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x", TOP={"y": 0.01})
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation=formulation, kind="bilateral")
     last = fc.solve(model, fc.linear_ramp(1))[-1]

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.cli._main import main
@@ -100,8 +100,7 @@ def test_in_space_the_moment_has_three_components():
     model.add_obstacle("plane", secondary="ZMIN", obstacle=fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     corners = [int(np.flatnonzero((mesh.points == place).all(axis=1))[0]) for place in ([0, 0, 0], [2, 0, 0])]
     model.mesh = mesh.with_groups(points={"ONE": corners[:1], "BOTH": corners})
-    model.fix("ONE", "x")
-    model.fix("BOTH", "y")
+    supported(model, ONE="x", BOTH="y")
     model.add_traction("ZMAX", z=lambda x: -(1.0 + 0.3 * (x[:, 0] - 1.0) - 0.6 * (x[:, 1] - 1.0)))
     (step,) = fc.solve(model, 1)
     (found,) = fc.contact_resultants(model, [step], "plane")
@@ -112,8 +111,7 @@ def test_in_space_the_moment_has_three_components():
 
 
 def test_the_area_of_hertz_lies_between_the_brackets_of_the_radius():
-    case = elastic_model(fc.generate.half_spheres(size=2.0), "axisymmetric", E=20_000.0, A1A2="x")
-    case.prescribe("A2B2", y=-2.0)
+    case = elastic_model(fc.generate.half_spheres(size=2.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
     case.prescribe("A1B1", y=2.0)
     case.add_contact("hertz", secondary="CONT1", primary="CONT2")
     steps = fc.solve(case, 4)

@@ -13,8 +13,7 @@ FORMULATIONS = ("node_to_segment", "continuous", "mortar")
 def pressed_block(formulation, friction, push, steps=4, nu=0.0):
     """A block pressed on a wide one and pushed sideways by its rigid top."""
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3), element="quad4")
-    model = elastic_model(mesh, "plane_strain", nu=nu, LOWER_BOTTOM="xy")
-    model.prescribe("UPPER_TOP", x=push, y=-1e-4)
+    model = elastic_model(mesh, "plane_strain", nu=nu, LOWER_BOTTOM="xy", UPPER_TOP={"x": push, "y": -1e-4})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, friction=friction)
     return fc.solve(model, fc.linear_ramp(steps))
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -18,9 +18,7 @@ def pressed(element, size, swap, multipliers="standard"):
     mesh = fc.generate.cylinder_on_block(element, R=50.0, size=6.0, contact_size=size)
     model = elastic_model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")
-    model.fix("AXIS", "x")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("CYLINDER_TOP", y=-1.0)
+    supported(model, AXIS="x", BLOCK_BOTTOM="y", CYLINDER_TOP={"y": -1.0})
     sides = ("CONT_BLOCK", "CONT_CYLINDER")[:: 1 if swap else -1]
     model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation="mortar", multipliers=multipliers)
     last = fc.solve(model, fc.linear_ramp(1))[-1]
@@ -47,8 +45,7 @@ def test_swapping_the_sides_in_space():
         mesh = fc.generate.sphere_on_block(
             "hex8", size=12.5, contact_size=2.0, contact_radius=6.0, block_size=(30.0, 30.0)
         )
-        model = elastic_model(mesh, "3d", SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y")
-        model.prescribe("SPHERE_TOP", y=-0.5)
+        model = elastic_model(mesh, "3d", SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.5})
         sides = ("CONT_BLOCK", "CONT_SPHERE")[:: 1 if swap else -1]
         model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation="mortar")
         forces.append(fc.solve(model, fc.linear_ramp(1), linear_solver="direct")[-1].contact["pair"].force[1])

@@ -15,8 +15,7 @@ MESHES = {"A": "data/meshes/forma04a.med", "B": "data/meshes/forma04b.med", "C":
 
 
 def half_spheres(mesh, **options):
-    model = elastic_model(fc.read_mesh(MESHES[mesh]), "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
+    model = elastic_model(fc.read_mesh(MESHES[mesh]), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
     model.prescribe("A1B1", y=2.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
@@ -24,8 +23,7 @@ def half_spheres(mesh, **options):
 
 def ball_on_block(element, **options):
     mesh = fc.generate.sphere_on_block(element, contact_size=4.0, contact_radius=8.0)
-    model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y")
-    model.prescribe("SPHERE_TOP", y=-2.0)
+    model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -2.0})
     model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
     return model
 
@@ -33,8 +31,7 @@ def ball_on_block(element, **options):
 def ball_on_ball(element, **options):
     """Half a sphere on a rigid one."""
     mesh = fc.generate.sphere_octant(element, contact_size=4.0, contact_radius=8.0)
-    model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z")
-    model.prescribe("SPHERE_TOP", y=-1.0)
+    model = elastic_model(mesh, E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -1.0})
     ball = fc.obstacles.Sphere(centre=(0.0, -60.0, 0.0), R=60.0)
     model.add_obstacle("hertz", secondary="CONT_SPHERE", obstacle=ball, **options)
     return model
@@ -44,8 +41,7 @@ def blocks(mesh, **options):
     """A block drawn over a wider one."""
     sizes = {"size_lower": (14.0, 4.0), "size_upper": (6.0, 3.0), "shift": 4.0}
     mesh = fc.generate.block_on_block(mesh, **sizes, divisions_lower=(14, 4), divisions_upper=(9, 4))
-    model = elastic_model(mesh, LOWER_BOTTOM="xy")
-    model.prescribe("UPPER_TOP", x=0.05, y=-0.05)
+    model = elastic_model(mesh, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
     model.add_contact("hertz", secondary="CONT_UPPER", primary="CONT_LOWER", **options)
     return model
 

@@ -20,8 +20,7 @@ def lines(points, element, group="TOOL"):
 
 
 def half_sphere(obstacle, formulation="continuous", element="quad4"):
-    model = elastic_model(quarter_disc(element), "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A1B1", y=2.0)
+    model = elastic_model(quarter_disc(element), "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     model.add_obstacle("tool", secondary="CONT1", obstacle=obstacle, formulation=formulation)
     return fc.solve(model, fc.linear_ramp(2))[-1]
 
@@ -67,8 +66,7 @@ def test_a_meshed_plane_in_three_dimensions_is_a_plane(facet):
     tool = box((2.5, 1.0, 2.5), (3, 1, 4), facet, (0.0, -1.0, 0.0))
 
     def pressed(obstacle):
-        model = elastic_model(ball, "3d", SYMMETRY_X="x", SYMMETRY_Z="z")
-        model.prescribe("SPHERE_TOP", y=-0.04)
+        model = elastic_model(ball, "3d", SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -0.04})
         model.add_obstacle("floor", secondary="CONT_SPHERE", obstacle=obstacle)
         return fc.solve(model, fc.linear_ramp(1))[-1]
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
@@ -268,9 +268,7 @@ def test_the_force_converges_to_that_of_the_finite_bodies(forma04):
 
 def sphere_model(mesh, swap=False, length=1.0, pressure=1.0, **options):
     model = elastic_model(mesh.replace(points=mesh.points * length), "3d", E=20_000.0 * pressure, SYMMETRY_X="x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("SPHERE_TOP", y=-0.5 * length)
+    supported(model, SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.5 * length})
     sides = ("CONT_BLOCK", "CONT_SPHERE") if swap else ("CONT_SPHERE", "CONT_BLOCK")
     model.add_contact(
         "hertz", secondary=sides[0], primary=sides[1], formulation="mortar", multipliers="dual", **options

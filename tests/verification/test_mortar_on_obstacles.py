@@ -12,9 +12,7 @@ QUADRATIC = ["tet10", "hex20", "wedge15"]
 def drawn(element, by, friction=0.3, **options):
     """A block pressed on a rigid plane and drawn along it by its top, with uniform pressure."""
     mesh = fc.generate.box((2.0, 1.0, 0.5), (3, 2, 1), element)
-    model = elastic_model(mesh, "3d", nu=0.0)
-    model.prescribe("ZMAX", x=by, y=0.0, z=-0.01)
-    model.prescribe("ZMIN", x=by, y=0.0)
+    model = elastic_model(mesh, "3d", nu=0.0, ZMAX={"x": by, "y": 0.0, "z": -0.01}, ZMIN={"x": by, "y": 0.0})
     plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     model.add_obstacle("plane", secondary="ZMIN", obstacle=plane, friction=friction, **options)
     return model
@@ -88,9 +86,7 @@ def test_a_turning_obstacle_drags_with_the_torque_of_full_friction():
     off = []
     for cells in (4, 8):
         mesh = fc.generate.box((2.0, 2.0, 0.5), (cells, cells, 1), "hex20", (-1.0, -1.0, 0.0))
-        model = elastic_model(mesh, "3d", nu=0.0)
-        model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
-        model.prescribe("ZMIN", x=0.0, y=0.0)
+        model = elastic_model(mesh, "3d", nu=0.0, ZMAX={"x": 0.0, "y": 0.0, "z": -0.01}, ZMIN={"x": 0.0, "y": 0.0})
         plane = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
         rotation = {"angle": 0.1, "centre": (0.0, 0.0, 0.0), "axis": (0.0, 0.0, 1.0)}
         model.add_obstacle("plane", secondary="ZMIN", obstacle=plane, friction=0.3, rotation=rotation)

@@ -71,8 +71,7 @@ def test_friction_is_not_softened_by_a_penalty(formulation):
     """What sticks stays where it stuck, step after step: a penalty acts along the normal alone."""
     found = {}
     for penalty in (1e5, None):
-        model = elastic_model(blocks(), "plane_strain", nu=0.0, LOWER_BOTTOM="xy")
-        model.prescribe("UPPER_TOP", x=1e-4, y=-0.02)
+        model = elastic_model(blocks(), "plane_strain", nu=0.0, LOWER_BOTTOM="xy", UPPER_TOP={"x": 1e-4, "y": -0.02})
         touching(model, formulation, friction=0.5, penalty=penalty, normals="averaged")
         found[penalty] = fc.solve(model, fc.Ramp((1.0, 2.0, 3.0, 4.0), ((0.0, 0.0), (1.0, 1.0), (4.0, 1.0))))
     steps = found[1e5]
@@ -85,8 +84,7 @@ def test_friction_is_not_softened_by_a_penalty(formulation):
 
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
 def test_a_penalty_against_an_obstacle(formulation):
-    model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x")
-    model.prescribe("TOP", y=-0.01)
+    model = elastic_model(fc.generate.block((10.0, 5.0), (4, 2), "quad4"), "plane_strain", LEFT="x", TOP={"y": -0.01})
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, formulation=formulation, penalty=1e5)
     contact = fc.solve(model, fc.linear_ramp(1))[-1].contact["floor"]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -124,8 +124,7 @@ def test_springs_join_the_nodes_of_two_groups(element, kind):
     assert model.springs[0].stiffness.tolist() == [30.0] * n
     for group in ("LOW", "UP"):
         model.fix(group, "x")
-    model.fix("LOW", "y")
-    model.prescribe("UP", y=-0.01)
+    supported(model, LOW="y", UP={"y": -0.01})
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     assert step.reaction[mesh.points_of("UP"), 1].sum() == pytest.approx(-30.0 * n * 0.01, rel=1e-12)
     np.testing.assert_allclose(model.springs[0].tension(step.displacement), -0.3, rtol=1e-12)
@@ -143,8 +142,7 @@ def test_columns_and_springs_in_series():
     model.mesh = mesh.with_groups(points=groups)
     model.add_spring("A_INNER", "B_INNER", y=50.0, x=10.0)  # shares of 1/4 and 1/8: the pressure stays uniform
     model.add_spring("A_ENDS", "B_ENDS", y=25.0, x=10.0)
-    model.fix("BOTTOM", "y")
-    model.fix("LEFT", "x")
+    supported(model, BOTTOM="y", LEFT="x")
     model.add_traction("TOP2", y=-1.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     exact = -(2 * 1.0 * 1.0 / 1000.0 + 2.0 / 200.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from two_bodies import YOUNG, blocks, boxes
 
 import fastcontact as fc
@@ -130,8 +130,7 @@ def test_supported_nodes_shear_it_too():
     model.supports = [
         support for support in model.supports if support.component != 0 or support.group == "LOWER_BOTTOM"
     ]
-    model.prescribe("UPPER", ramp=SIDEWAYS, x=0.004)
-    model.fix("LOWER", "x")
+    supported(model, UPPER={"ramp": SIDEWAYS, "x": 0.004}, LOWER="x")
     contact = solved(model)[2].contact["pair"]
     np.testing.assert_allclose(contact.shear[:, 0], -STIFFNESS * 0.004, rtol=1e-9)
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 from stepping import Stepping
 
 import fastcontact as fc
@@ -118,8 +118,7 @@ def test_a_stiff_body_that_moves_until_it_just_touches(solver, kinematics):
     model = fc.Model(mesh, kinematics)
     model.add_material(fc.LinearElastic(1e3, 0.3), "ABLOCK")
     model.add_material(fc.LinearElastic(2e5, 0.3), "BBLOCK")
-    model.fix("ABOTTOM", "xy")
-    model.prescribe("BTOP", x=0.0, y=-1.0)
+    supported(model, ABOTTOM="xy", BTOP={"x": 0.0, "y": -1.0})
     model.add_contact("c", secondary="BBOTTOM", primary="ATOP")
     with pytest.warns(fc.FastcontactWarning, match="by round-off of a stiff body"):
         touching = fc.solve(model, [0.05 + 1e-8], linear_solver=solver)[-1].contact["c"].force[1]
@@ -144,8 +143,7 @@ def test_bodies_that_only_move_have_no_forces_to_balance(solver):
 def test_a_body_that_slides_on_one_at_rest_has_no_forces_to_balance(formulation, solver):
     """What round-off of the one exerts on the other is no force, though nothing cancels it there."""
     model = elastic_model(fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(4, 2)), "plane_strain")
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", x=0.5, y=0.0)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.5, "y": 0.0})
     model.add_contact("c", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation, kind="bilateral")
     step = solved(model, solver)
     upper = model.mesh.points_of("UPPER")
@@ -191,9 +189,7 @@ def test_a_lowered_tolerance_is_remembered():
 @pytest.mark.parametrize("criteria", [{"geometry": 1e-2}, {"relative": 1e-2}])
 def test_what_loose_criteria_leave_is_told_with_its_number(criteria):
     mesh = fc.generate.half_spheres("tri3", size=5.0)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=+2.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")
     solver = "direct" if "geometry" in criteria else "pyamg"
     text = "still changed by" if "geometry" in criteria else "forces are out of balance by"

@@ -19,8 +19,7 @@ def started(related=False, friction=0.0, name="direct"):
     if name not in linear.SOLVERS:
         pytest.skip(f"{name} is not installed")
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), radial_sizes=(3.0, 9.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A1B1", y=2.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     if related:
         model.couple("CONT2", "y")
     model.prescribe("A2B2", y=-2.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
@@ -104,8 +104,7 @@ def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
     monkeypatch.setattr(cone_newton, "PATIENCE", 0)
     monkeypatch.setattr(dense, "LARGEST", 0)
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))
-    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
-    model.prescribe("UPPER_TOP", x=1e-3, y=-1e-4)
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP={"x": 1e-3, "y": -1e-4})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3)
     with pytest.raises(
         fc.ConvergenceError, match=r"contact with friction did not converge .* of the largest force\..*0\.3"
@@ -115,8 +114,7 @@ def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
 
 def spheres(friction=0.0):
     model = elastic_model(fc.generate.half_spheres("tri3", size=8.0), "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=2.0)
+    supported(model, A2B2={"y": -2.0}, A1B1={"y": 2.0})
     model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
     return model
 

@@ -15,9 +15,7 @@ from fastcontact.analysis.criteria import Criteria
 @pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
 def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-0.5)
-    model.prescribe("A1B1", y=+0.5)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
 
     def solved():

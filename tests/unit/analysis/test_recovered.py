@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.analysis.problem import prepare
@@ -61,8 +61,7 @@ def test_closed_once_is_remembered_beside_the_other_side(formulation):
 
 def test_linear_solutions_without_contact_are_counted():
     model = two_blocks()
-    model.prescribe("U_TOP", x=0.0, y=-0.01)
-    model.fix("U_BOTTOM", "y")
+    supported(model, U_TOP={"x": 0.0, "y": -0.01}, U_BOTTOM="y")
     (step,) = fc.solve(model, fc.linear_ramp(1), linear_solver="direct")
     assert step.iterations["linear_iterations"] >= 1
 

@@ -6,6 +6,7 @@ import weakref
 
 import numpy as np
 import pytest
+from models import supported
 
 import fastcontact as fc
 from fastcontact.analysis import step_halving
@@ -15,9 +16,7 @@ from fastcontact.analysis import step_halving
 def model():
     found = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3), "axisymmetric")
     found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    found.fix("A1A2", "x")
-    found.prescribe("A2B2", y=-0.5)
-    found.prescribe("A1B1", y=+0.5)
+    supported(found, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
     found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
     return found
 

@@ -18,9 +18,7 @@ def pressed(element, **options):
     """Return the model of a block under a ball."""
     mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=0.5, size=2.5)
     up = "xyz"[mesh.dim - 1]
-    model = elastic_model(mesh, "axisymmetric" if mesh.dim == 2 else "3d", E=2e5)
-    model.fix("BOTTOM", up)
-    model.fix("SYMMETRY_X", "x")
+    model = elastic_model(mesh, "axisymmetric" if mesh.dim == 2 else "3d", E=2e5, BOTTOM=up, SYMMETRY_X="x")
     if mesh.dim == 3:
         model.fix("SYMMETRY_Y", "y")
     ball = fc.obstacles.Sphere((0.0,) * (mesh.dim - 1) + (50.0,), 50.0)

@@ -62,8 +62,7 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
         cells = 16 * level
         shoe = bent(element, (48.0, 50.0), (cells, 2 * level), (-0.4 * np.pi, -0.6 * np.pi))
         hollow = bent(element, (50.0, 54.0), (2 * cells, 4 * level), (-0.3 * np.pi, -0.7 * np.pi))
-        model = elastic_model(united(SHOE_=shoe, HOLLOW_=hollow), "plane_strain", E=E, nu=NU)
-        model.fix("HOLLOW_TOP", "xy")
+        model = elastic_model(united(SHOE_=shoe, HOLLOW_=hollow), "plane_strain", E=E, nu=NU, HOLLOW_TOP="xy")
 
         def moved(X, axis):
             turned = X @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -82,8 +81,7 @@ def test_sides_that_mix_linear_and_quadratic_facets():
         return union(*(fc.generate.block((1.0, 1.0), (4, 4), e, (1.1 * k, y)) for k, e in enumerate(elements)))
 
     mesh = united(LOW_=row(-1.0, "quad4", "quad8"), UP_=row(0.0, "quad8", "tri3"))
-    model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy")
-    model.prescribe("UP_TOP", x=0.0, y=-0.02)
+    model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy", UP_TOP={"x": 0.0, "y": -0.02})
     model.add_contact("pair", secondary="UP_BOTTOM", primary="LOW_TOP")
     np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -76,8 +76,7 @@ def test_points_and_sectors_are_whole_numbers():
 @pytest.mark.parametrize("state", ["strain", "stress", "temperature"])
 def test_large_strains_without_stress_are_told(state):
     model = plate()
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    supported(model, LEFT="x", BOTTOM="y")
     if state == "strain":
         model.add_initial_strain(xx=-0.5)
     elif state == "stress":
@@ -92,8 +91,7 @@ def test_large_strains_without_stress_are_told(state):
 
 def test_small_ones_are_not():
     model = plate()
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    supported(model, LEFT="x", BOTTOM="y")
     model.add_temperature(100.0)
     assert fc.solve(model, 1)[-1].warnings == ()
 

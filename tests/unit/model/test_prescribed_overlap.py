@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, block_on_block, box
@@ -50,9 +50,7 @@ def test_a_side_pushed_into_a_floor_is_refused(mesh, kinematics, side, formulati
 @pytest.mark.parametrize("sides", [("CONT_UPPER", "CONT_LOWER"), ("CONT_LOWER", "CONT_UPPER")])
 def test_both_sides_prescribed(sides, friction, formulation):
     def pressed(by):
-        model = elastic_model(block_on_block())
-        model.fix("CONT_LOWER", "xy")
-        model.fix("CONT_UPPER", "x")
+        model = elastic_model(block_on_block(), CONT_LOWER="xy", CONT_UPPER="x")
         model.prescribe("CONT_UPPER", y=-by)
         model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, friction=friction)
         return model
@@ -67,8 +65,7 @@ def test_both_sides_prescribed(sides, friction, formulation):
 
 def shifted(by, mesh=None, **options):
     """A block moved by `by` into a wall at its left, by its top alone."""
-    model = elastic_model(mesh or block((1.0, 1.0), (3, 4)))
-    model.prescribe("TOP", x=-by, y=0.0)
+    model = elastic_model(mesh or block((1.0, 1.0), (3, 4)), TOP={"x": -by, "y": 0.0})
     wall = fc.obstacles.HalfSpace((0.0, 0.0), (1.0, 0.0))
     model.add_obstacle("wall", secondary="LEFT", obstacle=wall, **options)
     model.check()
@@ -107,8 +104,7 @@ def test_the_worst_instant_counts():
 
 
 def test_an_obstacle_that_moves_into_held_nodes():
-    model = elastic_model(box((1.0, 1.0, 1.0), (2, 2, 2)))
-    model.fix("XMIN", "xyz")
+    model = elastic_model(box((1.0, 1.0, 1.0), (2, 2, 2)), XMIN="xyz")
     model.add_obstacle("plate", secondary="ZMIN", obstacle=floor(3), motion={"z": 0.05})
     model.check()
     (text,) = told(model)
@@ -127,9 +123,7 @@ def test_an_interference_between_nodes_that_are_held_on_both_sides():
 
 @pytest.mark.parametrize("secondary", ["CONT_LOWER", "CONT_UPPER"])
 def test_a_tool_of_prescribed_nodes_is_right(secondary):
-    model = elastic_model(block_on_block())
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER", x=0.0, y=-0.02)
+    model = elastic_model(block_on_block(), LOWER_BOTTOM="xy", UPPER={"x": 0.0, "y": -0.02})
     primary = {"CONT_LOWER": "CONT_UPPER", "CONT_UPPER": "CONT_LOWER"}[secondary]
     model.add_contact("pair", secondary=secondary, primary=primary)
     model.check()
@@ -138,8 +132,7 @@ def test_a_tool_of_prescribed_nodes_is_right(secondary):
 
 def test_an_overlap_before_any_load_is_that_of_the_mesh():
     mesh = block((1.0, 1.0), (2, 2))
-    model = elastic_model(mesh)
-    model.fix("BOTTOM", "xy")
+    model = elastic_model(mesh, BOTTOM="xy")
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor(2, 0.01))
     model.check()
     assert not told(model)
@@ -148,9 +141,7 @@ def test_an_overlap_before_any_load_is_that_of_the_mesh():
 @pytest.mark.parametrize("kind", ["tied", "bilateral"])
 def test_supports_that_tear_what_is_tied(kind):
     def torn(by):
-        model = elastic_model(block_on_block())
-        model.fix("CONT_LOWER", "xy")
-        model.fix("CONT_UPPER", "x")
+        model = elastic_model(block_on_block(), CONT_LOWER="xy", CONT_UPPER="x")
         model.prescribe("CONT_UPPER", y=by)
         model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", kind=kind)
         return model
@@ -161,9 +152,7 @@ def test_supports_that_tear_what_is_tied(kind):
 
 
 def test_tied_sides_may_not_be_shifted_along_each_other():
-    model = elastic_model(block_on_block())
-    model.fix("CONT_LOWER", "xy")
-    model.fix("CONT_UPPER", "y")
+    model = elastic_model(block_on_block(), CONT_LOWER="xy", CONT_UPPER="y")
     model.prescribe("CONT_UPPER", x=0.03)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", kind="tied")
     with pytest.raises(fc.ModelError, match=r"off 'CONT_LOWER', contact 'pair', by up to 0\.03 "):
@@ -173,8 +162,7 @@ def test_tied_sides_may_not_be_shifted_along_each_other():
 def test_relations_that_hold_nodes_inside_are_told_at_the_end():
     model = elastic_model(block((1.0, 1.0), (2, 2)))
     model.couple("BOTTOM", "y")
-    model.prescribe("BOTTOM_LEFT", y=-0.1)
-    model.fix("LEFT", "x")
+    supported(model, BOTTOM_LEFT={"y": -0.1}, LEFT="x")
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor(2))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

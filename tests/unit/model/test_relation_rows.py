@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case
@@ -89,9 +89,7 @@ def test_a_smooth_mandrel_holds_a_ring_and_lame_tells_the_pressure():
         angle, radius = 0.5 * np.pi * (1 - square.points[:, 0]), 1.0 + square.points[:, 1]
         mesh = square.replace(points=np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]))
         model = model_of(mesh)
-        model.fix("BOTTOM", "normal")
-        model.fix("LEFT", "x")
-        model.fix("RIGHT", "y")
+        supported(model, BOTTOM="normal", LEFT="x", RIGHT="y")
         model.add_pressure("TOP", 2.0)
         step = last(model)
         inside = mesh.points_of("BOTTOM")
@@ -112,8 +110,7 @@ def test_a_value_may_vary_along_the_surface_and_have_its_own_history():
     mesh = block(2)
     axes, along = model_of(mesh), model_of(mesh)
     for model in (axes, along):
-        model.fix("LEFT", "x")
-        model.fix("BOTTOM", "y")
+        supported(model, LEFT="x", BOTTOM="y")
     ramp = [(0, 0), (0.5, 1), (1, 0.25)]
 
     def depth(x):
@@ -150,8 +147,7 @@ def test_a_part_that_repeats_itself_keeps_its_ends_together(dim):
     model.prescribe(top, y=-0.3)
     model.prescribe("BOTTOM_LEFT" if dim == 2 else "XMIN", **({"x": 0.0}))
     if dim == 3:
-        model.fix("ZMIN", "z")
-        model.fix("ZMAX", "z")
+        supported(model, ZMIN="z", ZMAX="z")
     step = last(model)
     stiff = E * (1 - NU) / ((1 + NU) * (1 - 2 * NU))
     np.testing.assert_allclose(step.stress[:, 1], -0.1 * stiff, rtol=1e-10)
@@ -162,8 +158,7 @@ def test_ends_may_be_strained_by_a_value():
     mesh = block(2)
     model = model_of(mesh)
     model.relate_groups("RIGHT", "LEFT", "x", value=0.02)
-    model.fix("BOTTOM", "y")
-    model.fix("BOTTOM_LEFT", "x")
+    supported(model, BOTTOM="y", BOTTOM_LEFT="x")
     step = last(model)
     np.testing.assert_allclose(step.stress[:, 0], 0.01 * E / (1 - NU**2), rtol=1e-10)
 
@@ -196,8 +191,7 @@ def test_what_cannot_be_related_is_refused(call, words):
 
 def test_a_support_that_contradicts_a_normal_one_is_told():
     model = model_of(block(2))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    supported(model, LEFT="x", BOTTOM="y")
     model.prescribe("BOTTOM", normal=0.1)
     with pytest.raises(fc.ModelError, match="the displacement normal prescribed on 'BOTTOM' contradicts the supports"):
         last(model)

@@ -113,10 +113,7 @@ def test_a_facet_that_stands_in_a_group_twice_is_loaded_once(mesh):
 
 def test_a_load_that_supports_take_up_is_told(mesh):
     def lost(**force):
-        model = elastic_model(mesh)
-        model.fix("UPPER_TOP", "y")
-        model.fix("UPPER_LEFT", "x")
-        model.fix("LOWER_BOTTOM", "xy")
+        model = elastic_model(mesh, UPPER_TOP="y", UPPER_LEFT="x", LOWER_BOTTOM="xy")
         model.add_force("UPPER_TOP", **force)
         return [text for text in model_warnings(model, fc.linear_ramp(1)) if "the supports carry all of it" in text]
 
@@ -159,10 +156,7 @@ def test_splitting_does_no_harm_where_nodes_carry_forces(mesh):
 @pytest.mark.parametrize("formulation", ["node_to_segment", "mortar"])
 def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation):
     """What the warning advises is right, and what is silent is right, too."""
-    model = elastic_model(mesh)
-    model.fix("LOWER_BOTTOM", "y")
-    model.fix("LOWER_LEFT", "x")
-    model.fix("UPPER_LEFT", "x")
+    model = elastic_model(mesh, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x")
     model.add_pressure("UPPER_TOP", 1.0)
     if formulation == "mortar":
         model.add_contact("all", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation)
@@ -170,10 +164,7 @@ def test_one_pair_of_both_halves_has_the_pressure_of_the_press(mesh, formulation
         matching = parts(
             parts(block_on_block(divisions_lower=(6, 2), divisions_upper=(6, 2)), "CONT_UPPER"), "CONT_LOWER"
         )
-        model = elastic_model(matching)
-        model.fix("LOWER_BOTTOM", "y")
-        model.fix("LOWER_LEFT", "x")
-        model.fix("UPPER_LEFT", "x")
+        model = elastic_model(matching, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x")
         model.add_pressure("UPPER_TOP", 1.0)
         for half in ("LEFT", "RIGHT"):
             side = f"CONT_UPPER_{half}"
@@ -193,10 +184,7 @@ def test_pairs_share_the_force_of_a_common_node_by_area(solver, friction, swappe
     points = even.points.copy()
     points[:, 0] = points[:, 0] ** 2 / points[:, 0].max()
     mesh = parts(parts(fc.Mesh(points, even.cells, even.cell_groups, even.point_groups), "CONT_UPPER"), "CONT_LOWER")
-    model = elastic_model(mesh)
-    model.fix("LOWER_BOTTOM", "y")
-    model.fix("LOWER_LEFT", "x")
-    model.fix("UPPER_LEFT", "x")
+    model = elastic_model(mesh, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x")
     model.add_pressure("UPPER_TOP", 1.0)
     for half in ("RIGHT", "LEFT") if swapped else ("LEFT", "RIGHT"):
         options = {} if friction is None else {"friction": friction}

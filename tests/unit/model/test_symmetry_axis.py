@@ -3,7 +3,7 @@
 import logging
 
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, half_spheres
@@ -13,8 +13,7 @@ def spheres(mesh, held, **contact):
     model = elastic_model(mesh, "axisymmetric", E=20_000.0)
     if held:
         model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=-0.2)
-    model.prescribe("A1B1", y=0.2)
+    supported(model, A2B2={"y": -0.2}, A1B1={"y": 0.2})
     model.add_contact("c", secondary="CONT1", primary="CONT2", **contact)
     return fc.solve(model, fc.linear_ramp(1))[-1]
 

@@ -23,8 +23,7 @@ SCREEN = 4000
 
 @pytest.fixture(scope="module")
 def model():
-    found = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x")
-    found.prescribe("A2B2", y=-2.0)
+    found = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
     found.prescribe("A1B1", y=2.0)
     found.add_contact("hertz & co", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
     return found

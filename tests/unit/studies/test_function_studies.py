@@ -5,7 +5,7 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -31,8 +31,7 @@ def overlap(size, friction=0.0):
     """Half-spheres, loaded by Hertz."""
     sizes = {"arc_sizes": (size, 4 * size), "radial_sizes": (size, 4 * size), "segments": 8}
     model = elastic_model(fc.generate.half_spheres("quad4", **sizes), "axisymmetric", E=20_000.0, nu=NU, A1A2="x")
-    model.prescribe("A2B2", y=-0.5)
-    model.prescribe("A1B1", y=0.5)
+    supported(model, A2B2={"y": -0.5}, A1B1={"y": 0.5})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", friction=friction)
     return fc.solve(model, 1)
 
