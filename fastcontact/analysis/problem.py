@@ -36,9 +36,9 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ContactError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
+from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
-from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.ramp import PartHistory, Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import FreeMotions, free_motions
 

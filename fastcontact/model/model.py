@@ -22,8 +22,8 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
+from fastcontact.model.contact_pair import check_turns
 from fastcontact.model.description import sentences
-from fastcontact.model.obstacle_rotation import check_turns
 from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed

@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 import fastcontact as fc
 from fastcontact import generate
 from fastcontact.errors import MeshError, ModelError
-from fastcontact.mesh.generate._smooth import delaunay, edges_of, stars_of
 from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
-from fastcontact.mesh.generate._triangulate import filled
+from fastcontact.mesh.generate._triangulate import delaunay, edges_of, filled, stars_of
 from fastcontact.model.ramp import linear_ramp
 
 size = st.floats(0.01, 1.0)
