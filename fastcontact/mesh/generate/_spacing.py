@@ -17,7 +17,7 @@ Curve = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Spacing:
-    """Desired edge length as a function of the distance from a pole.
+    """Desired edge length as a function of the distance from the pole, which is the origin.
 
     The length is `near` within `plateau` of the pole, then grows linearly to `far` at `reach`, and stays there.
 
@@ -25,15 +25,12 @@ class Spacing:
     ----------
     near, far : float
         Edge lengths at the pole and far from it [length].
-    pole : (float, float)
-        Coordinates of the pole [length].
     plateau, reach : float
         Distances from the pole between which the edge length grows [length].
     """
 
     near: float
     far: float
-    pole: tuple[float, float] = (0.0, 0.0)
     plateau: float = 0.0
     reach: float = 1.0
 
@@ -49,7 +46,7 @@ class Spacing:
 
     def __call__(self, points: Array) -> Array:
         """Return the desired edge length (n,) [length] at `points` (n, 2) [length]."""
-        return self.at_distance(np.hypot(points[:, 0] - self.pole[0], points[:, 1] - self.pole[1]))
+        return self.at_distance(np.hypot(points[:, 0], points[:, 1]))
 
 
 def segments_for(length: float, size: float) -> int:

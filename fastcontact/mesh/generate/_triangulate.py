@@ -15,6 +15,7 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh.generate._check import affordable
 from fastcontact.mesh.generate._spacing import Spacing
 from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import corner_angles
 
 # Since no triangulation has equal edges, inner points are placed at a fraction of the longest admissible edge. Attempts with
 # these fractions are made in turn until the best one so far has no angle below the second number [degrees].
@@ -51,7 +52,7 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
     best, best_angle = None, 0.0
     for density, good_angle in _ATTEMPTS:
         points = _attempt(outline, spacing, density)
-        angle = 0.0 if points is None else smallest_angle(points, delaunay(points))
+        angle = 0.0 if points is None else np.degrees(corner_angles(points[delaunay(points)]).min())
         if angle > best_angle:
             best, best_angle = points, angle
         if best is not None and best_angle >= good_angle:
@@ -60,14 +61,6 @@ def triangulated(outline: Array, spacing: Spacing) -> tuple[Array, Indices]:
         f"no triangulation with edges up to {spacing.near:g} at the pole and {spacing.far:g} far from it "
         "was found: change a size slightly, or let it grow over a longer distance"
     )
-
-
-def smallest_angle(points: Array, triangles: Indices) -> float:
-    """Return the smallest angle [degrees] of `triangles` (n_triangles, 3) on `points` (n, 2) [length]."""
-    ahead = points[np.roll(triangles, -1, axis=1)] - points[triangles]
-    behind = points[np.roll(triangles, 1, axis=1)] - points[triangles]
-    cross = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
-    return float(np.degrees(np.arctan2(cross, (ahead * behind).sum(axis=-1)).min()))
 
 
 def _attempt(outline: Array, spacing: Spacing, density: float) -> Array | None:
@@ -163,15 +156,11 @@ def _corner_seeds(outline: Array, spacing: Spacing, density: float) -> Array:
 def _lattice(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
     """Return an equilateral lattice over the box, with one row through the pole."""
     size = density * spacing.far
-    pole = np.asarray(spacing.pole)
-    rows = np.arange(
-        np.floor((low[1] - pole[1]) / (_ROW_HEIGHT * size)), np.ceil((high[1] - pole[1]) / (_ROW_HEIGHT * size)) + 1
-    )
-    columns = np.arange(np.floor((low[0] - pole[0]) / size) - 1, np.ceil((high[0] - pole[0]) / size) + 1)
+    rows = np.arange(np.floor(low[1] / (_ROW_HEIGHT * size)), np.ceil(high[1] / (_ROW_HEIGHT * size)) + 1)
+    columns = np.arange(np.floor(low[0] / size) - 1, np.ceil(high[0] / size) + 1)
     affordable(2.0 * len(rows) * len(columns))
     row, column = np.meshgrid(rows, columns, indexing="ij")
-    x = pole[0] + size * (column + 0.5 * (row % 2))
-    return np.column_stack([x.ravel(), (pole[1] + _ROW_HEIGHT * size * row).ravel()])
+    return np.column_stack([(size * (column + 0.5 * (row % 2))).ravel(), (_ROW_HEIGHT * size * row).ravel()])
 
 
 def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
@@ -180,9 +169,7 @@ def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
     If the spacing is proportional to the distance from the pole this is an equilateral lattice under the conformal map exp,
     so that the triangles stay equilateral.
     """
-    pole = np.asarray(spacing.pole)
-    corners = np.array([[x, y] for x in (low[0], high[0]) for y in (low[1], high[1])]) - pole
-    farthest = np.hypot(corners[:, 0], corners[:, 1]).max()
+    farthest = max(np.hypot(x, y) for x in (low[0], high[0]) for y in (low[1], high[1]))
     rings, radius, shift, total = [], 0.0, 0.0, 0
     while radius < farthest:
         size = density * float(spacing.at_distance(radius))
@@ -193,7 +180,7 @@ def _rings(spacing: Spacing, density: float, low: Array, high: Array) -> Array:
         angle = 2 * np.pi * (np.arange(n) + shift) / n - 0.5 * np.pi
         rings.append(radius * np.column_stack([np.cos(angle), np.sin(angle)]))
         shift = 0.5 - shift
-    return pole + np.vstack(rings)
+    return np.vstack(rings)
 
 
 Size = Callable[[Array], Array]

@@ -10,7 +10,7 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import Circle, Forest, block, circles, quarter_disc, refined, to_quadratic
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import corner_areas, outer_facets
+from fastcontact.mesh.topology import corner_measures, outer_facets
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 MIDDLES = np.array([[0.5, 0.0], [1.0, 0.5], [0.5, 1.0], [0.0, 0.5]])
@@ -58,7 +58,7 @@ def test_arcs_stay_round_and_areas_add_up(name):
 
 
 def area(mesh):
-    return sum(corner_areas(mesh, name).sum() for name in mesh.solids)
+    return sum(corner_measures(mesh, name).sum() for name in mesh.solids)
 
 
 def edge_counts(mesh):
