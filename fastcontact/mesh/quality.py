@@ -188,7 +188,7 @@ def _corners(mesh: Mesh, name: str) -> Array:
 
 
 def corner_angles(corners: Array) -> Array:
-    """Return the corner angles (n_cells, n_corners) of polygons (n_cells, n_corners, dim) [radian]."""
+    """Return the angles (n_cells, n_corners) [radian] of polygons with `corners` (n_cells, n_corners, dim) [length]."""
     ahead = np.roll(corners, -1, axis=1) - corners
     behind = np.roll(corners, 1, axis=1) - corners
     cosine = (ahead * behind).sum(axis=2)

@@ -13,7 +13,7 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, quarter_disc, sphere_octant
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.model.body_overlap_kernels import winding_numbers
+from fastcontact.model.body_overlap import winding_numbers
 
 SOLIDS_3D = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5")
 
@@ -61,8 +61,7 @@ def test_at_sharp_edges_and_tips_the_sign_is_that_of_the_winding_number(angle, s
     flat = Mesh(mesh.points, {"tri3": triangles}, cell_groups={"SHELL": np.arange(len(triangles))})
     points = np.random.default_rng(seed).uniform([-1.3, -1.3, -0.1], [1.3, 1.3, 1.3], (300, 3))
     distance, _ = MeshedSurface(flat, "SHELL").distance(points)
-    number = np.empty(len(points))
-    winding_numbers(points, mesh.points[triangles], number)
+    number = winding_numbers(points, mesh.points[triangles])
     assert np.array_equal(distance < 0, number > 0.5)
 
 

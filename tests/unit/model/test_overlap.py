@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, sphere_octant, union
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.model.body_overlap import _depths, penetration
-from fastcontact.model.body_overlap_kernels import winding_numbers
+from fastcontact.model.body_overlap import _depths, penetration, winding_numbers
 
 SOLIDS = ("hex8", "hex20", "hex27", "tet4", "tet10", "wedge6", "wedge15", "pyramid5", "pyramid13")
 
@@ -56,8 +55,7 @@ def test_near_sharp_edges_the_winding_number_decides(angle, seed):
     points = np.random.default_rng(seed).uniform([-1.2, -1.2, -0.1], [1.2, 1.2, 1.1], (200, 3))
     depth, _ = _depths(points, shell(mesh))
     triangles = mesh.points[outer_facets(mesh)["quad4"]][:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3, 3)
-    number = np.empty(len(points))
-    winding_numbers(points, triangles, number)
+    number = winding_numbers(points, triangles)
     assert np.abs(number - np.round(number)).max() < 1e-9
     # Bilinear facets bulge a little beyond their triangles.
     clear = np.abs(depth) > 2e-2
@@ -141,8 +139,8 @@ def star(random, n):
 @given(st.integers(0, 10_000))
 def test_lines_wind_around_what_a_ray_leaves_once(seed):
     random = np.random.default_rng(seed)
-    lines, points, number = star(random, 12), random.uniform(-1.2, 1.2, (60, 2)), np.empty(60)
-    winding_numbers(points, lines, number)
+    lines, points = star(random, 12), random.uniform(-1.2, 1.2, (60, 2))
+    number = winding_numbers(points, lines)
     (x, y), ((ax, ay), (bx, by)) = points.T[..., None], lines.transpose(1, 2, 0)
     crossed = ((ay > y) != (by > y)) & (ax + (y - ay) * (bx - ax) / (by - ay) > x)
     assert np.abs(number - np.abs(np.round(number))).max() < 1e-12

@@ -50,8 +50,8 @@ def test_segments_follow_the_size_function(near, far, plateau):
 
 
 def test_the_size_function_is_flat_then_linear_then_flat():
-    spacing = Spacing(1.0, 3.0, pole=(1.0, 0.0), plateau=2.0, reach=6.0)
-    points = np.array([[1.0, 0.0], [3.0, 0.0], [1.0, 4.0], [7.0, 0.0], [100.0, 0.0]])
+    spacing = Spacing(1.0, 3.0, plateau=2.0, reach=6.0)
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 4.0], [6.0, 0.0], [99.0, 0.0]])
     assert spacing(points).tolist() == [1.0, 1.0, 2.0, 3.0, 3.0]
 
 
