@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pressed_blocks import pressed
 from scipy.sparse import csr_array
-from test_coupled_pivots import mass_equations
+from test_grouped_pivots import mass_equations
 
 import fastcontact as fc
 from fastcontact.analysis.load_step import load_step
