@@ -13,7 +13,6 @@ from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.loads import check_number
 from fastcontact.errors import ModelError, check_known
-from fastcontact.model.pair_options import clearance_ramp, friction_ramp
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
 # Force on an obstacle by component, None for prescribed components; empty without any force.
@@ -61,12 +60,12 @@ class ContactPair:
     @cached_property
     def clearance_ramp(self) -> Table | None:
         """Ramp of the clearance; None if it is constant."""
-        return clearance_ramp(self.name, self.options)
+        return table_of(self.options.get("clearance_ramp"), f"the clearance_ramp of contact '{self.name}'")
 
     @cached_property
     def friction_ramp(self) -> Table | None:
         """Ramp of the coefficient of friction; None if it is constant."""
-        return friction_ramp(self.name, self.options)
+        return table_of(self.options.get("friction_ramp"), f"the friction_ramp of contact '{self.name}'")
 
     @property
     def opposite(self) -> str:

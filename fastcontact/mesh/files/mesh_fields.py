@@ -81,7 +81,9 @@ def read_field(
     row = 0 if instant is None else row_of(instant, of_file.times, name)
     if over == "cells":
         middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
-        return at_cells(of_file, middles, mesh, name)[row][:, None]
+        numbers = np.arange(len(middles))
+        rows, _ = _nearest(of_file, middles, numbers, mesh, ("cell", "cells"), name)
+        return _known(of_file.values[:, rows], middles, numbers, "cell", name)[row][:, None]
     wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
     values = at_points_of(of_file, mesh, wanted, name)[row]
     return np.where(np.isfinite(values), values, values[wanted].mean())
@@ -110,15 +112,6 @@ def row_of(instant: float, times: Array | None, name: str, error: type[Fastconta
         among = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
         raise error(f"{name} has no instant {instant:g}, {among}")
     return row
-
-
-def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
-    """Return the values (n_instants, n_cells) of a field at cells of a mesh, by their `middles` (n_cells, dim) [length].
-
-    Raises MeshError, with the `name` of the field, if a cell has no value, or the file has no cell at its position.
-    """
-    rows, _ = _nearest(field, middles, np.arange(len(middles)), mesh, ("cell", "cells"), name)
-    return _known(field.values[:, rows], middles, np.arange(len(middles)), "cell", name)
 
 
 def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Array:
