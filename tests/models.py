@@ -1,5 +1,8 @@
 """Models shared by many tests."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 
 import fastcontact as fc
@@ -53,3 +56,8 @@ class DenseCompliance:
 
     def apply(self, multiplier):
         return self.C @ multiplier
+
+
+def reference(name):
+    """Return the stored values of a theory, with their source."""
+    return json.loads((Path(__file__).parents[1] / "data" / "reference" / f"{name}.json").read_text())

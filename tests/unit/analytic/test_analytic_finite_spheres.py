@@ -1,17 +1,15 @@
 """Finite-body solution of two half spheres: table, interpolation, relation to Hertz."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from models import reference
 
 from fastcontact.analytic import finite_half_spheres, finite_spheres
 from fastcontact.errors import ModelError
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/finite_half_spheres.json").read_text())
+REFERENCE = reference("finite_half_spheres")
 QUANTITIES = ("force", "pressure_max", "radius")
 
 

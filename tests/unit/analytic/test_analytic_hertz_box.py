@@ -1,15 +1,14 @@
 """Exact Hertz solution in a box: tables, boundary conditions, force."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from models import reference
 
 from fastcontact.analytic import hertz_box
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/hertz_box.json").read_text())
+REFERENCE = reference("hertz_box")
 KINEMATICS = ["plane_strain", "plane_stress", "axisymmetric"]
 
 

@@ -1,14 +1,12 @@
 """Thick shells and press fits: tables, equilibrium, Hooke's law, continuity."""
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
+from models import reference
 
 from fastcontact.analytic import press_fit_cylinders, press_fit_spheres, thick_cylinder, thick_sphere
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/press_fit.json").read_text())
+REFERENCE = reference("press_fit")
 NAMES = ("inner_radius", "interface_radius", "outer_radius", "E_inner", "nu_inner", "E_outer", "nu_outer")
 
 

@@ -1,17 +1,16 @@
 """Pin in a hole: table, balance, and displacements due to the pressure."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from models import reference
 
 from fastcontact.analytic import hertz_line, persson_limit_angle, persson_pin
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/persson_pin.json").read_text())
+REFERENCE = reference("persson_pin")
 
 
 @pytest.mark.parametrize("row", REFERENCE["rows"])

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from models import reference
 from pairwise import first_of
 from scipy.integrate import quad
 from scipy.special import ellipk, ellipkm1
@@ -184,7 +185,7 @@ def test_stick_ratio_has_its_limits():
     assert ratios == sorted(ratios)
 
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/receding_layer.json").read_text())
+REFERENCE = reference("receding_layer")
 
 
 def layer(ratio, load, **more):
