@@ -1,19 +1,27 @@
 """Models shared by many tests."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 
 import fastcontact as fc
 
 
 def elastic_model(mesh, kinematics=None, E=1000.0, nu=0.3, **held):
-    """Return a model of one elastic material, with groups held along axes: ``elastic_model(mesh, ZMIN="xyz")``.
+    """Return a model of one elastic material with supports, as for `supported`: ``elastic_model(mesh, ZMIN="xyz")``.
 
     Meshes of the plane are in plane strain unless told otherwise.
     """
     model = fc.Model(mesh, kinematics or ("3d" if mesh.dim == 3 else "plane_strain"))
     model.add_material(fc.LinearElastic(E=E, nu=nu))
-    for group, axes in held.items():
-        model.fix(group, axes)
+    return supported(model, **held)
+
+
+def supported(model, **held):
+    """Fix groups along axes, or prescribe displacements: ``supported(model, BOTTOM="y", TOP={"y": -0.1})``."""
+    for group, given in held.items():
+        model.prescribe(group, **given) if isinstance(given, dict) else model.fix(group, given)
     return model
 
 
@@ -48,3 +56,8 @@ class DenseCompliance:
 
     def apply(self, multiplier):
         return self.C @ multiplier
+
+
+def reference(name):
+    """Return the stored values of a theory, with their source."""
+    return json.loads((Path(__file__).parents[1] / "data" / "reference" / f"{name}.json").read_text())

@@ -37,9 +37,9 @@ from fastcontact.errors import ContactError
 from fastcontact.linear import choice
 from fastcontact.linear.protocol import TOLERANCE, LinearSolver
 from fastcontact.linear.sparse_rows import sum_of_blocks
+from fastcontact.model.contact_pair import angle_at
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
 from fastcontact.model.model import Model
-from fastcontact.model.obstacle_rotation import angle_at
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import PartHistory, Ramp, Table, combined, multiplier
 from fastcontact.model.rigid_motions import FreeMotions, free_motions

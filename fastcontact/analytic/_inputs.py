@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fastcontact.arrays import REFUSAL, Array, is_masked
-from fastcontact.errors import ModelError, unknown
+from fastcontact.errors import ModelError, check_known
 
 # Largest magnitude of an input. Its cube is finite in double precision.
 LARGEST = 1e60
@@ -81,8 +82,7 @@ def exactly_one(**given: float | None) -> tuple[str, float]:
 
 def one_of(name: str, value: str, known: tuple[str, ...]) -> str:
     """Return `value` if it is one of the `known` words; otherwise raise ModelError."""
-    if not isinstance(value, str) or value not in known:
-        raise ModelError(unknown(name, str(value), known))
+    check_known(name, value, known, ModelError)
     return value
 
 
@@ -160,6 +160,21 @@ def effective_radius(R1: float, R2: float, names: tuple[str, str] = ("R1", "R2")
     return 1.0 / (1.0 / R1 + 1.0 / R2)
 
 
-def plane_kinematics(kinematics: str) -> str:
+def in_plane(kinematics: str) -> str:
     """Return `kinematics` if it is "plane_strain" or "plane_stress"; otherwise raise ModelError."""
     return one_of("kinematics", kinematics, PLANE)
+
+
+def by_power_laws(laws: Mapping[str, tuple[float, float]], name: str, value: float) -> dict[str, float]:
+    """Return all quantities ``coefficient * radius**exponent`` of a contact from the value of one of them.
+
+    `laws` contains the coefficient and the exponent of each quantity by its name.
+
+    Examples
+    --------
+    >>> by_power_laws({"radius": (1.0, 1.0), "area": (3.0, 2.0)}, "area", 12.0)
+    {'radius': 2.0, 'area': 12.0}
+    """
+    coefficient, exponent = laws[name]
+    radius = (value / coefficient) ** (1.0 / exponent)
+    return {key: factor * radius**power for key, (factor, power) in laws.items()} | {name: value}

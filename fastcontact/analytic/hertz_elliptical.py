@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one
-from fastcontact.analytic._power_laws import by_power_laws
+from fastcontact.analytic._inputs import Bodies, array, by_power_laws, effective_radius, exactly_one
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact.analytic import _half_plane
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
-from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, plane_kinematics, poisson
-from fastcontact.analytic._power_laws import by_power_laws
+from fastcontact.analytic._inputs import Bodies, array, by_power_laws, effective_radius, exactly_one, in_plane, poisson
 from fastcontact.arrays import Array
 
 
@@ -167,4 +166,4 @@ def hertz_line(
     (6.2146, 3585.36)
     """
     load = exactly_one(force=force, radius=radius, pressure_max=pressure_max)
-    return _solve(Bodies(E1, nu1, E2, nu2), plane_kinematics(kinematics), effective_radius(R1, R2), *load)
+    return _solve(Bodies(E1, nu1, E2, nu2), in_plane(kinematics), effective_radius(R1, R2), *load)

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike
 
 from fastcontact.analytic import _half_space
 from fastcontact.analytic._half_space import VonMisesMaximum, von_mises
-from fastcontact.analytic._inputs import Bodies, array, effective_radius, exactly_one, poisson
-from fastcontact.analytic._power_laws import by_power_laws
+from fastcontact.analytic._inputs import Bodies, array, by_power_laws, effective_radius, exactly_one, poisson
 from fastcontact.arrays import Array
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, not_negative, number, plane_kinematics, poisson, positive
+from fastcontact.analytic._inputs import array, in_plane, not_negative, number, poisson, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -132,7 +132,7 @@ def thick_cylinder(
     >>> round(float(tube.hoop_stress(1.0)), 9)  # (b^2 + a^2) / (b^2 - a^2)
     1.666666667
     """
-    plane_kinematics(kinematics)
+    in_plane(kinematics)
     return LameShell(inner_radius, outer_radius, inner_pressure, outer_pressure, E, nu, kinematics)
 
 
@@ -231,7 +231,7 @@ def press_fit_cylinders(
     >>> round(fit.pressure, 4)
     86.5385
     """
-    plane_kinematics(kinematics)
+    in_plane(kinematics)
     radii = inner_radius, interface_radius, outer_radius
     return _pair((E_inner, nu_inner), (E_outer, nu_outer), radii, interference, kinematics)
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import array, exactly_one, not_negative, plane_kinematics, poisson, positive
+from fastcontact.analytic._inputs import array, exactly_one, in_plane, not_negative, poisson, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
@@ -136,7 +136,7 @@ def persson_pin(
     from scipy.optimize import brentq
 
     modulus = positive("E", E)
-    if plane_kinematics(kinematics) == "plane_strain":
+    if in_plane(kinematics) == "plane_strain":
         modulus /= 1.0 - poisson("nu", nu) ** 2
     R, gap = positive("R", R), not_negative("clearance", clearance)
     name, value = exactly_one(force=force, contact_angle=contact_angle)

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fastcontact.analytic._inputs import Bodies, array, not_negative, plane_kinematics, positive
+from fastcontact.analytic._inputs import Bodies, array, in_plane, not_negative, positive
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
 
-_TERMS = (
-    80  # terms of the Chebyshev series, with which half-width and pressure have errors below 1e-6 in the range below
-)
+# Terms of the Chebyshev series, with which half-width and pressure have errors below 1e-6 in the range below.
+_TERMS = 80
 _LARGEST_RATIO = 100.0  # largest ratio of the moduli; beyond it the contact is so wide that the layer acts as a beam
 _LARGEST_LOAD = 10.0  # largest ratio of the half-width of the load to the thickness of the layer
 
@@ -167,7 +166,7 @@ def receding_layer(
     0.857
     """
     bodies = Bodies(E1, nu1, E2, nu2)
-    plane_kinematics(kinematics)
+    in_plane(kinematics)
     h, P = positive("thickness", thickness), positive("force", force)
     a = not_negative("load_half_width", load_half_width) / h
     ratio = _modulus_ratio(bodies, kinematics)

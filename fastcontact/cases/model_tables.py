@@ -19,12 +19,11 @@ from fastcontact.elasticity.materials import CONSTANTS, LinearElastic, Material,
 from fastcontact.elasticity.nonlinear_materials import ElasticPlastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from fastcontact.elasticity.varying_constants import Tabulated
 from fastcontact.errors import OTHER_WORDS, CaseError, check_known, unknown
-from fastcontact.mesh.companion_groups import OPPOSITE
 from fastcontact.mesh.files.mesh_fields import read_field
 from fastcontact.mesh.files.mesh_files import read_mesh
 from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.generate.transform import with_reference_points
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
@@ -160,7 +159,8 @@ def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any],
         for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first one is the model
             kinds = toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
-                known |= AXES
+                initial = add in (Model.add_initial_stress, Model.add_initial_strain)
+                known |= dict.fromkeys(COMPONENTS, kinds) if initial else AXES
             else:
                 known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
                 needed += [key] * (parameter.default is parameter.empty)

@@ -16,8 +16,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Indices, Numbers
 from fastcontact.contact.facing_facets import Facing, OuterFacets, facing
 from fastcontact.errors import ContactError, FileError
-from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.mesh.topology import bodies
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import LARGEST, Table, check_number, listed
 from fastcontact.elasticity.material_axes import Axes, checked_axes, frames, rotations
 from fastcontact.elasticity.varying_constants import Cells, Varying, positions, wrapped
-from fastcontact.errors import ModelError
+from fastcontact.errors import ModelError, check_known
 from fastcontact.round_off import ROUND_OFF
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
@@ -100,6 +100,8 @@ def initial_state(
     """Return the initial state of `kind` given by the names of its components; ModelError if it is not admissible."""
     label = f"the initial {kind} of {listed(groups)}"
     components: dict[int, Any] = {}
+    for component in given:
+        check_known(f"component of {label}", component, COMPONENTS, ModelError)
     for number, component in enumerate(COMPONENTS):
         value = wrapped(given.get(component))
         if value is None:

@@ -17,7 +17,11 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError, unknown
 from fastcontact.mesh import elements
-from fastcontact.mesh.facet_search import added, facets_with_nodes
+
+# Suffixes of the names of groups that accompany another group: facets on the other side of a cut along the group, and the
+# point whose displacement is the rotation of a reference point.
+OPPOSITE = " opposite"
+ROTATION = " rotation"
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
@@ -305,7 +309,7 @@ class Mesh:
                 f"the function of facet group '{name}' returned {chosen.dtype} of shape {chosen.shape}: it must return True "
                 f"or False for each point, shape ({self.n_points},)"
             )
-        facets = facets_with_nodes(self.solids, chosen, between, None if of is None else self._cells_inside(name, of))
+        facets = _facets_with_nodes(self.solids, chosen, between, None if of is None else self._cells_inside(name, of))
         if not facets:
             inside = f" of '{of}'" if of else ""
             raise MeshError(
@@ -339,7 +343,7 @@ class Mesh:
             rows[name] = {}
             for kind, block in facets.items():
                 block = np.asarray(block, np.int32)
-                cells[kind], rows[name][kind] = added(cells.get(kind, block[:0]), block)
+                cells[kind], rows[name][kind] = _added(cells.get(kind, block[:0]), block)
         starts = starts_of(cells)
 
         def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
@@ -355,3 +359,53 @@ class Mesh:
             self.cells_of(member)
             cells.append(self.cell_groups[member])
         return self.with_groups(cells={name: np.concatenate(cells)})
+
+
+def _facets_with_nodes(
+    solids: Mapping[str, AnyArray], chosen: Mask, between: bool, among: Mapping[str, Mask] | None = None
+) -> dict[str, AnyArray]:
+    """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all chosen, by facet element.
+
+    Each facet appears once, with the orientation of its first cell. This is outward for facets of a single cell.
+
+    Parameters
+    ----------
+    solids : mapping of str to ndarray of int (n_cells, n_nodes)
+        Connectivity by element type.
+    chosen : ndarray of bool (n_points,)
+        Whether each point is chosen.
+    between : bool
+        If True, return the facets between two cells; if False, the facets of a single cell.
+    among : mapping of str to ndarray of bool (n_cells,), optional
+        Whether the facets of each cell are considered; by default those of all cells.
+    """
+    candidates: dict[str, list[AnyArray]] = {}
+    flags: dict[str, list[Mask]] = {}
+    for name, block in solids.items():
+        element, counted = elements.get(name), np.ones(len(block), bool) if among is None else among[name]
+        for facet, kind in zip(element.facets, element.facet_elements, strict=True):
+            nodes = block[:, list(facet)]
+            inside = chosen[nodes].all(axis=1)
+            candidates.setdefault(kind, []).append(nodes[inside])
+            flags.setdefault(kind, []).append(counted[inside])
+    facets_by_kind, n_cells = {}, 2 if between else 1
+    for kind, blocks in candidates.items():
+        facets, is_among = np.concatenate(blocks), np.concatenate(flags[kind])
+        _, first, group, count = np.unique(
+            np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
+        )
+        count_among = np.bincount(group.ravel(), is_among, len(count))
+        rows = np.sort(first[(count == n_cells) & (count_among == n_cells)])
+        if len(rows):
+            facets_by_kind[kind] = facets[rows]
+    return facets_by_kind
+
+
+def _added(block: AnyArray, facets: AnyArray) -> tuple[AnyArray, Indices]:
+    """Return a block of facets with the missing facets appended, and the row of each of the `facets` in it."""
+    both = np.concatenate([block, facets])
+    _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
+    row = first[facet.ravel()]  # row of the first facet with the same nodes
+    new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
+    place = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
+    return np.concatenate([block, both[new]]), place[row[len(block) :]].astype(np.intp)

@@ -83,9 +83,10 @@ def quality(mesh: Mesh) -> MeshQuality:
     >>> round(quality(mesh).smallest_angle, 9), quality(mesh).measure
     (45.0, 0.5)
     """
-    angles = [_angles(_corners(mesh, name)).ravel() for name in mesh.cells if elements.get(name).dim == 2]
+    angles = [corner_angles(_corners(mesh, name)).ravel() for name in mesh.cells if elements.get(name).dim == 2]
     angle = np.concatenate(angles) if angles else np.array([np.nan])
-    lengths = [_edge_lengths(mesh, name) for name in mesh.solids]
+    ends = [mesh.points[block[:, elements.get(name).edges]] for name, block in mesh.solids.items()]
+    lengths = [np.linalg.norm(x[:, :, 1] - x[:, :, 0], axis=2) for x in ends]
     length = np.concatenate([block.ravel() for block in lengths]) if lengths else np.array([np.nan])
     with np.errstate(divide="ignore", invalid="ignore"):
         aspects = [(block.max(axis=1) / block.min(axis=1)).max() for block in lengths]
@@ -133,7 +134,7 @@ def poorest_cell(mesh: Mesh) -> str:
         even, flat = low / high, measure / longest**3
         faults = [(even, even, EVEN, "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh")]
         if mesh.dim == 2:
-            angle = np.degrees(_angles(_corners(mesh, name)).max(axis=1))
+            angle = np.degrees(corner_angles(_corners(mesh, name)).max(axis=1))
             faults.append((-angle, angle, -WIDE, "it has an angle of {:.1f} degrees; move its nodes or remesh"))
         else:
             faults.append((flat, flat, THICK, "its volume is only {:.1e} of its longest edge cubed; remesh there"))
@@ -186,8 +187,8 @@ def _corners(mesh: Mesh, name: str) -> Array:
     return np.asarray(mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]])
 
 
-def _angles(corners: Array) -> Array:
-    """Return the corner angles (n_cells, n_corners) of polygons (n_cells, n_corners, dim) [radian]."""
+def corner_angles(corners: Array) -> Array:
+    """Return the angles (n_cells, n_corners) [radian] of polygons with `corners` (n_cells, n_corners, dim) [length]."""
     ahead = np.roll(corners, -1, axis=1) - corners
     behind = np.roll(corners, 1, axis=1) - corners
     cosine = (ahead * behind).sum(axis=2)
@@ -197,12 +198,6 @@ def _angles(corners: Array) -> Array:
     # For either orientation of the cell the angles are interior angles, which exceed 180 degrees at re-entrant corners.
     sine *= np.where(sine.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     return np.arctan2(sine, cosine) % (2 * np.pi)
-
-
-def _edge_lengths(mesh: Mesh, name: str) -> Array:
-    """Return the lengths (n_cells, n_edges) of the straight edges of the cells [length]."""
-    ends = mesh.points[mesh.cells[name][:, elements.get(name).edges]]
-    return np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2)
 
 
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:

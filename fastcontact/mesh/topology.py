@@ -30,27 +30,17 @@ Further = ParamSpec("Further")
 IN_LINE = 1e-6
 
 
-def corner_areas(mesh: Mesh, name: str) -> Array:
-    """Return the signed area (n_cells,) [length^2] of the polygons of the corners of the 2D cells of type `name`."""
-    corners = mesh.points[mesh.cells[name][:, : elements.get(name).n_corners]]
-    x, y = corners[..., 0], corners[..., 1]
-    return 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+def corner_measures(mesh: Mesh, name: str) -> Array:
+    """Return the signed area [length^2] or volume [length^3] (n_cells,) of linear cells with the corners of cells of a type.
 
-
-def corner_volumes(mesh: Mesh, name: str) -> Array:
-    """Return the signed volume (n_cells,) [length^3] of the linear cells with the corners of the 3D cells of type `name`.
-
-    Faces with four corners are bilinear. The quadrature of the linear element is exact for this volume.
+    Faces with four corners are bilinear. The quadrature of the linear element is exact for this measure.
     """
     linear = elements.get(elements.get(name).linear)
     _, gradients, weights = linear.tables
     corners = mesh.points[mesh.cells[name][:, : linear.n_nodes]]
-    volumes = np.zeros(len(corners))
     # Adding one quadrature point at a time limits the memory to a few arrays of length n_cells.
-    for gradient, weight in zip(gradients, weights, strict=True):
-        a, b, c = np.moveaxis(np.einsum("cni,nj->cij", corners, gradient), 2, 0)
-        volumes += weight * np.einsum("ci,ci->c", np.cross(a, b), c)
-    return volumes
+    jacobians = (np.einsum("cni,nj->cij", corners, gradient) for gradient in gradients)
+    return np.asarray(sum(w * np.linalg.det(J) for w, J in zip(weights, jacobians, strict=True)))
 
 
 @typed(MeshError)
@@ -60,10 +50,9 @@ def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     The nodes of 2D cells are then ordered counter-clockwise, and the normals of the facets of 3D cells point outward.
     MeshError if an inverted cell lies on the same side of a facet as its neighbour, because the mesh is folded there.
     """
-    measure = corner_areas if mesh.dim == 2 else corner_volumes
     cells, turned = dict(mesh.cells), 0
     for name in mesh.solids:
-        inside_out = measure(mesh, name) < 0
+        inside_out = corner_measures(mesh, name) < 0
         if inside_out.any():
             block = mesh.cells[name].copy()
             block[inside_out] = block[inside_out][:, elements.get(name).reversed]

@@ -97,14 +97,28 @@ def _depths(points: Array, kinds: list[Array], selected: list[Mask] | None = Non
     inside = height < 0
     unsure = np.flatnonzero((np.abs(height) < 0.999 * closest.distance) & (closest.distance > ON_SURFACE * size))
     if len(unsure):
-        from fastcontact.model import body_overlap_kernels
-
         pieces = [corners[:, _flat_pieces(corners)].reshape(-1, *2 * corners.shape[2:]) for corners in kinds]
-        number = np.empty(len(unsure))
-        body_overlap_kernels.winding_numbers(np.ascontiguousarray(points[unsure]), np.concatenate(pieces), number)
-        inside[unsure] = number > 0.5
+        inside[unsure] = winding_numbers(points[unsure], np.concatenate(pieces)) > 0.5
     depth = np.where(inside & (closest.distance > ON_SURFACE * size), closest.distance, 0.0)
     return depth, np.flatnonzero(np.concatenate(selected))[closest.facet]
+
+
+def winding_numbers(points: Array, pieces: Array) -> Array:
+    """Return the winding number (n,) [-] of a closed surface around each of `points` (n, dim) [length]: 1 inside, 0 outside.
+
+    It is the sum of the angles, or solid angles (Van Oosterom and Strackee, 1983, eq. 8), of the `pieces` (m, dim, dim)
+    [length] of the surface, lines or triangles, divided by a full angle. Angles are positive for outward normals.
+    """
+    turns = np.empty(len(points))
+    for i, point in enumerate(points):
+        arms = pieces - point
+        products = np.einsum("mid,mjd->mij", arms, arms)
+        sine, cosine = np.linalg.det(arms), products[:, 0, 1]
+        if arms.shape[2] == 3:  # half the solid angle
+            r = np.sqrt(np.diagonal(products, axis1=1, axis2=2))
+            cosine = r.prod(axis=1) + sum(products[:, k, k - 1] * r[:, k - 2] for k in range(3))
+        turns[i] = np.arctan2(sine, cosine).sum() / (2.0 * np.pi)
+    return turns
 
 
 def _flat_pieces(corners: Array) -> Indices:

@@ -25,22 +25,17 @@ def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
     """Raise ModelError, with names of bodies and motions, if bodies or their parts at hinges have rigid-body motions."""
     if not len(motions):
         return
-    total = len(motions)
+    total, hinges = len(motions), ""
+    if len(motions.hinges):
+        hinges = (
+            f". Parts of bodies hang together at {len(motions.hinges)} nodes only (first: {node_at(mesh, motions.hinges[0])}"
+            "): merge whole facets there, or leave the parts separate and define the contact"
+        )
     listing = "; ".join(f"{name}: {', '.join(motions_of_body)}" for name, motions_of_body in motions.by_body().items())
     raise ModelError(
         f"{total} rigid-body motion{'s are' if total > 1 else ' is'} not supported: {listing}. "
         "Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"
-        f"{_hinges(mesh, motions)}"
-    )
-
-
-def _hinges(mesh: Mesh, motions: FreeMotions) -> str:
-    """Return further advice for parts of bodies that can rotate about nodes."""
-    if not len(motions.hinges):
-        return ""
-    return (
-        f". Parts of bodies hang together at {len(motions.hinges)} nodes only (first: {node_at(mesh, motions.hinges[0])}): "
-        "merge whole facets there, or leave the parts separate and define the contact"
+        f"{hinges}"
     )
 
 

@@ -1,16 +1,19 @@
-"""The user's description of a contact pair."""
+"""The user's description of a contact pair, and rotations of rigid obstacles and supports: checks and ramps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+from fastcontact._tools.argument_types import finite_vector
 from fastcontact.contact.obstacles import Obstacle
 from fastcontact.contact.obstacles.rigid_side import Rotation
-from fastcontact.model.pair_options import clearance_ramp, friction_ramp
-from fastcontact.model.ramp import Table
+from fastcontact.elasticity.loads import check_number
+from fastcontact.errors import ModelError, check_known
+from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
 # Force on an obstacle by component, None for prescribed components; empty without any force.
 Driving = tuple[float | None, ...]
@@ -57,12 +60,12 @@ class ContactPair:
     @cached_property
     def clearance_ramp(self) -> Table | None:
         """Ramp of the clearance; None if it is constant."""
-        return clearance_ramp(self.name, self.options)
+        return table_of(self.options.get("clearance_ramp"), f"the clearance_ramp of contact '{self.name}'")
 
     @cached_property
     def friction_ramp(self) -> Table | None:
         """Ramp of the coefficient of friction; None if it is constant."""
-        return friction_ramp(self.name, self.options)
+        return table_of(self.options.get("friction_ramp"), f"the friction_ramp of contact '{self.name}'")
 
     @property
     def opposite(self) -> str:
@@ -73,3 +76,68 @@ class ContactPair:
 def method(formulation: str, options: Mapping[str, Any]) -> str:
     """Return a formulation and the kind of its multipliers, if options specify one."""
     return f"{formulation} with {options['multipliers']} multipliers" if "multipliers" in options else formulation
+
+
+KEYS = ("angle", "centre", "axis", "ramp")
+# Largest rotation in a step with sliding, in which the path of a point is approximated by an arc [radian].
+LARGEST_TURN = 1.0
+
+
+def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
+    """Return a rotation, called `caption` in messages, and its ramp; None without a rotation or without a separate ramp.
+
+    Raises ModelError if they are not admissible.
+    """
+    if given is None:
+        return None, None
+    for key in given:
+        check_known(f"key of {caption}", key, KEYS, ModelError)
+    if kinematics == "axisymmetric":
+        raise ModelError(
+            f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: use a "
+            "three-dimensional model"
+        )
+    dim = 3 if kinematics == "3d" else 2
+    for key in ("angle", "centre", "axis")[:dim]:
+        if key not in given:
+            raise ModelError(f"{caption} needs '{key}'")
+    if dim == 2 and given.get("axis") is not None:
+        raise ModelError(f"{caption}: in the plane it is about z, counter-clockwise: leave out the axis")
+    check_number(f"the angle of {caption}", given["angle"])
+    axis = _vector(f"the axis of {caption}", given["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
+    if not any(axis):
+        raise ModelError(f"the axis of {caption} has no length")
+    rotation = Rotation(_vector(f"the centre of {caption}", given["centre"], dim), axis, float(given["angle"]))  # type: ignore[arg-type]
+    return rotation, table_of(given.get("ramp"), f"the ramp of {caption}")
+
+
+def _vector(name: str, values: Sequence[float], size: int) -> tuple[float, ...]:
+    vector = finite_vector(values, size)
+    if vector is None:
+        raise ModelError(f"{name} must be {size} finite numbers, not {values!r}")
+    return tuple(vector.tolist())
+
+
+def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
+    """Return the rotation of the obstacle of a pair at an instant [radian]."""
+    if pair.rotation is None:
+        return 0.0
+    ramp_of_rotation = pair.ramp if pair.rotation_ramp is None else pair.rotation_ramp
+    return multiplier(ramp_of_rotation, ramp, instant) * pair.rotation.angle
+
+
+def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
+    """Raise ModelError if an obstacle with friction rotates too far in a load step for the path of slip to be known."""
+    for pair in pairs:
+        if pair.rotation is None or not pair.options.get("friction"):
+            continue
+        before = 0.0
+        for instant in ramp.instants:
+            angle = angle_at(pair, ramp, instant)
+            turn = abs(angle - before)
+            if turn > LARGEST_TURN:
+                raise ModelError(
+                    f"obstacle '{pair.name}' turns by {turn:.3g} radian in the step to {instant:g}, more than "
+                    f"{LARGEST_TURN:g}: with friction use at least {math.ceil(turn / LARGEST_TURN)} steps instead"
+                )
+            before = angle

@@ -14,12 +14,11 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.elasticity.loads import Load, Table, Traction, check_number
+from fastcontact.elasticity.loads import Load, Table, Traction, check_number, check_points
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
-from fastcontact.errors import MeshError, ModelError, check_known
+from fastcontact.errors import ModelError, check_known
 from fastcontact.linear.sparse_rows import nodal_rows
-from fastcontact.mesh.companion_groups import ROTATION
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import ROTATION, Mesh
 from fastcontact.round_off import ROUND_OFF, TINY
 
 Term = tuple[int, int, float]  # point, component, coefficient
@@ -150,8 +149,7 @@ class SpreadForce(Load):
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
             raise ModelError(f"{self.name}: in axisymmetry a force cannot act at a point: use a varying traction")
-        if not len(mesh.points_of(self.group)):
-            raise MeshError(f"{self.name}: the group is empty")
+        check_points(mesh, self.group, f"{self.name} acts nowhere")
         self.spread.check(self.name, mesh.dim)
         self.vector(mesh, kinematics)
 
@@ -186,8 +184,7 @@ class Moment(Load):
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
             raise ModelError(f"{self.name}: no moment can act on an axisymmetric model (zero over the circle)")
-        if not len(mesh.points_of(self.group)):
-            raise MeshError(f"{self.name}: the group is empty")
+        check_points(mesh, self.group, f"{self.name} acts nowhere")
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
         moment = np.zeros(1 if mesh.dim == 2 else 3)

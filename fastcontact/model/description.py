@@ -44,11 +44,10 @@ def sentences(model: Any) -> Iterator[str]:
             continue
         value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
         where = temperature.name.removeprefix("the temperature of ")
-        if temperature.times:
-            when = f", at {len(temperature.times)} instants from {temperature.times[0]:g} to {temperature.times[-1]:g}"
-            yield f"Temperature: {value} over {temperature.reference:g} in {where}{when}."
-            continue
-        yield f"Temperature: {value} over {temperature.reference:g} in {where}{_history(temperature.ramp)}."
+        when, times = _history(temperature.ramp), temperature.times
+        if times:
+            when = f", at {len(times)} instants from {times[0]:g} to {times[-1]:g}"
+        yield f"Temperature: {value} over {temperature.reference:g} in {where}{when}."
     for load in model.heat_loads:
         history = _history(load.ramp)
         if isinstance(load, TemporaryHeat) and load.temporary:

@@ -52,10 +52,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
         "the list of contact pairs": [pair.name for pair in model.contact],
-        **{
-            f"contact '{pair.name}'": _without(_without(pair, "surface_smoothing"), "conductance")
-            for pair in model.contact
-        },
+        **{f"contact '{pair.name}'": _without(pair, "surface_smoothing", "conductance") for pair in model.contact},
         **{f"{SMOOTHING} '{pair.name}'": True for pair in model.contact if model.bind(pair).smoothing},
         **{f"the option {name}": value for name, value in (options or {}).items()},
     }
@@ -73,7 +70,7 @@ def formulation_behind(model: Model, name: str, digest: str | None) -> str | Non
     Pairs without a formulation had other defaults in earlier versions.
     """
     (pair,) = (candidate for candidate in model.contact if candidate.name == name)
-    plain = _without(_without(pair, "surface_smoothing"), "multipliers")
+    plain = _without(pair, "surface_smoothing", "multipliers")
     for formulation, options in _choices():
         other = dataclasses.replace(plain, formulation=formulation, options={**plain.options, **options})
         if _digest(other, model.mesh) == digest:
@@ -81,9 +78,9 @@ def formulation_behind(model: Model, name: str, digest: str | None) -> str | Non
     return None
 
 
-def _without(pair: ContactPair, option: str) -> ContactPair:
+def _without(pair: ContactPair, *options: str) -> ContactPair:
     """Return a pair without an option."""
-    return dataclasses.replace(pair, options={key: value for key, value in pair.options.items() if key != option})
+    return dataclasses.replace(pair, options={key: value for key, value in pair.options.items() if key not in options})
 
 
 def _choices() -> Iterable[tuple[str, dict[str, str]]]:

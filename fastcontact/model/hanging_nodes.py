@@ -6,20 +6,18 @@ Where a coarse and a fine mesh meet, only common nodes are connected. The other 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices, Mask, Numbers
-from fastcontact.contact.search.box_tree_kernels import build, tree_order
-from fastcontact.contact.search.closest import TOGETHER
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
 from fastcontact.mesh.elements import Element
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import bodies, outer_facets
-from fastcontact.model import hanging_nodes_kernels
 from fastcontact.model.rigid_motions import node_at
 
 if TYPE_CHECKING:
@@ -28,8 +26,6 @@ if TYPE_CHECKING:
 # Nodes nearer to a facet than this, in facet lengths, lie on it; nodes as near to one of its nodes coincide with that node.
 # Fine facets of an arc deviate more from a coarse facet; there the facets at all corners of the coarse one exclude a slit.
 NEAR, ON_ARC = 0.02, 0.1
-# Largest number of facets that face a node at such a distance.
-MOST = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +77,8 @@ def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: N
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     """Return nodes (m,) that lie on facets (m,) of their own body without belonging to them, and all outer facets."""
+    from scipy.spatial import cKDTree
+
     outer = _outer(mesh)
     if not len(outer.size):
         return np.empty(0, np.intp), np.empty(0, np.intp), outer
@@ -91,16 +89,17 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     length = np.linalg.norm(outward, axis=1)
     outward /= np.where(length > 0.0, length, 1.0)[:, None]
     reach = ON_ARC * outer.size + outer.rise
-    order = tree_order(outer.centre, TOGETHER)
-    x = mesh.points[outer.corners[order]]
-    tree = build(x.min(axis=1) - reach[order, None], x.max(axis=1) + reach[order, None])
     nodes = np.flatnonzero(length > 0.0)
-    facets = np.full((len(nodes), MOST), -1)
-    hanging_nodes_kernels.facing_facets(
-        mesh.points, nodes, outward, outer.nodes, outer.centre, outer.normal, reach, tree, order, facets
-    )
-    row, column = np.nonzero(facets >= 0)
-    node, facet = nodes[row], facets[row, column]
+    spokes = np.linalg.norm(mesh.points[outer.corners] - outer.centre[:, None], axis=2).max(axis=1)
+    near = cKDTree(mesh.points[nodes]).query_ball_point(outer.centre, spokes + 2.0 * reach)
+    facet = np.repeat(np.arange(len(near)), [len(members) for members in near])
+    node = nodes[np.fromiter(chain.from_iterable(near), np.intp, len(facet))]
+    height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
+    facing = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5
+    facing &= (np.abs(height) <= reach[facet]) & (outer.nodes[facet] != node[:, None]).all(axis=1)
+    node, facet = node[facing], facet[facing]
+    order = np.lexsort((facet, node))
+    node, facet = node[order], facet[order]
     _, body = bodies(mesh)
     same_body = body[node] == body[outer.corners[facet, 0]]
     node, facet = node[same_body], facet[same_body]

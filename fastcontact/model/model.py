@@ -6,7 +6,7 @@ A `Value` is a number, or a function from reference positions (n, dim) [length] 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -22,8 +22,8 @@ from fastcontact.elasticity.temperature import Temperature
 from fastcontact.errors import ModelError
 from fastcontact.heat.loads import TemporaryHeat
 from fastcontact.model.checks import check_motions, check_overlap, check_penetration, check_ramps, check_supports
+from fastcontact.model.contact_pair import check_turns
 from fastcontact.model.description import sentences
-from fastcontact.model.obstacle_rotation import check_turns
 from fastcontact.model.parts.base import Support
 from fastcontact.model.parts.supports import ModelSupports
 from fastcontact.model.prescribed_overlap import Supports, check_prescribed
@@ -31,9 +31,9 @@ from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, resisting, unstopped
 
-# Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
 # Types of items that may act in some load steps only.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
+# Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
 PUBLIC = (
     "check", "contact", "couple", "describe", "fix", "fix_temperature", "internal_forces", "kinematics", "loads", "materials",
     "mesh", "prescribe", "relate", "relate_groups", "strain", "supports", "units",
@@ -148,14 +148,7 @@ class Model(ModelSupports):
         self._log_axis()
         forces = self.forces_by_ramp()
         self.thermal_forces_by_ramp()
-        for begin in self._changes():
-            acting = self._acting(begin)
-            try:
-                acting.check_heat()
-                if self.conducts and not acting.conducts:
-                    raise ModelError("no load of heat acts, so that nothing determines temperatures: add a film")
-            except ModelError as error:
-                raise _in_steps_after(begin, error) from None
+        self._check_changes(self._check_heat_of)
         if ramp is not None:
             items: list[Support | Load | MultiPointConstraint | Temperature | InitialState] = [
                 *self.supports, *self.loads, *self.relations, *self.temperatures, *self.initial_states,
@@ -180,11 +173,21 @@ class Model(ModelSupports):
         check_overlap(
             self.mesh, self.kinematics, [(p.secondary, p.primary) for p in self.contact if p.obstacle is None]
         )
+        driving = list(self.force_driven.forces(forces).values())
+        self._check_changes(lambda acting: acting._check_motions(fixed, driving))
+
+    def _check_changes(self, check: Callable[[Model], None]) -> None:
+        """Check the model with the items that act in each part of the load steps."""
         for begin in self._changes():
             try:
-                self._acting(begin)._check_motions(fixed, list(self.force_driven.forces(forces).values()))
+                check(self._acting(begin))
             except ModelError as error:
-                raise _in_steps_after(begin, error) from None
+                raise ModelError(f"in the load steps after {begin:g}: {error}" if begin else str(error)) from None
+
+    def _check_heat_of(self, acting: Model) -> None:
+        acting.check_heat()
+        if self.conducts and not acting.conducts:
+            raise ModelError("no load of heat acts, so that nothing determines temperatures: add a film")
 
     def _acting(self, begin: float) -> Model:
         """Return the model with only those items that act in the load step that begins at the load factor `begin`."""
@@ -231,8 +234,3 @@ def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Arr
     fixing = [driven.constraints(pair.name, model.bind(pair).constraints(at_rest), still) for pair in model.contact]
     rows = [resisting(constraints, factor)[0] @ motions.displacement for constraints in fixing]
     return np.vstack([*rows, np.empty((0, len(motions)))])
-
-
-def _in_steps_after(begin: float, error: ModelError) -> ModelError:
-    """Return `error` with the addition that it concerns the load steps after the load factor `begin`."""
-    return ModelError(f"in the load steps after {begin:g}: {error}") if begin else error

@@ -19,7 +19,7 @@ from fastcontact.contact.surface import Surface
 from fastcontact.elasticity.loads import Value, check_number, check_value, evaluated
 from fastcontact.errors import ContactError, check_known
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.model.ramp import History, Table, table_of
+from fastcontact.model.ramp import History, table_of
 
 
 class FormulationOptions(TypedDict, total=False):
@@ -89,7 +89,7 @@ def pair_options(
     _check_obstacle_temperature(name, options, against_obstacle)
     if "clearance_ramp" in options and not {"clearance", "clearance_primary"} & set(options):
         raise ContactError(f"contact '{name}' has a clearance_ramp, but no clearance that it could multiply")
-    clearance_ramp(name, options)
+    table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
     _check_friction_ramp(name, options)
     return PairOptions(
         _function(f"the clearance of contact '{name}'", options.get("clearance")),
@@ -258,23 +258,13 @@ def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
 
 def _check_friction_ramp(name: str, options: Mapping[str, Any]) -> None:
     """Raise ContactError for a ramp of friction without a coefficient of friction, or with negative multipliers."""
-    table = friction_ramp(name, options)
+    table = table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
     if table is not None and not options.get("friction"):
         raise ContactError(f"contact '{name}' has a friction_ramp, but no friction that it could multiply")
     if table is not None and min(factor for _, factor in table) < 0.0:
         raise ContactError(
             f"the friction_ramp of contact '{name}' has negative multipliers: coefficients are 0 or more"
         )
-
-
-def friction_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the ramp of the coefficient of friction of contact pair `name`, None if it is constant."""
-    return table_of(options.get("friction_ramp"), f"the friction_ramp of contact '{name}'")
-
-
-def clearance_ramp(name: str, options: Mapping[str, Any]) -> Table | None:
-    """Return the ramp of the clearance of contact pair `name`, None if it is constant."""
-    return table_of(options.get("clearance_ramp"), f"the clearance_ramp of contact '{name}'")
 
 
 def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side: Surface) -> Mask | None:

@@ -14,8 +14,7 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import Pose
 from fastcontact.contact.pairing import Candidates, gap_rows, rows_along
 from fastcontact.errors import ModelError
-from fastcontact.model.contact_pair import ContactPair
-from fastcontact.model.obstacle_rotation import angle_at
+from fastcontact.model.contact_pair import ContactPair, angle_at
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.round_off import LENGTH_ROUND_OFF
 

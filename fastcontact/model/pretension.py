@@ -14,8 +14,7 @@ from fastcontact.arrays import Array, Indices
 from fastcontact.elasticity.loads import Load, Table, check_number
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.errors import ModelError
-from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.relation_rows import along, less_first, matched, normals_of
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 

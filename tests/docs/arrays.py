@@ -141,7 +141,7 @@ def _items(section: str) -> Iterator[tuple[str, str, str]]:
         head, _, text = item.partition("\n")
         names, _, kind = head.partition(" : ")
         if names:
-            yield names.strip(), kind, text
+            yield names.strip(" *"), kind, text
 
 
 def is_array(annotation: Any, module: Any) -> bool:

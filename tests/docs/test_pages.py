@@ -1,10 +1,16 @@
-"""Every code block of README and docs runs, and the commands of a page make its pictures."""
+"""Every code block, command and notebook of README and docs runs, and the page on a load step names its modules."""
 
+import json
 import re
+import sys
 import warnings
+from pathlib import Path
 
 import pages
 import pytest
+
+import fastcontact as fc
+from fastcontact.analysis import load_step as page
 
 PAGES = pages.pages()
 RUN = [page for page in PAGES if any(map(pages.runnable, pages.blocks(page)))]
@@ -95,3 +101,51 @@ def test_blocks_are_found_with_their_files_and_needs(tmp_path):
         ["fastcontact", "c"],
     ]
     assert [pages.runnable(block) for block in found] == [True, True, False, True, True]
+
+
+@pytest.mark.filterwarnings("ignore::fastcontact.errors.FastcontactWarning")
+def test_the_page_names_every_module_that_its_example_runs(root, monkeypatch):
+    text = (root / "docs" / "contribute" / "load-step.md").read_text(encoding="utf-8")
+    example = re.search(r"```python\n(.*?)```", text, re.DOTALL).group(1)
+    package, modules, load_step = Path(fc.__file__).parent, set(), page.load_step
+
+    def called(frame, event, _):
+        path = Path(frame.f_code.co_filename)
+        if event == "call" and path.is_relative_to(package):
+            modules.add(f"fastcontact/{path.relative_to(package).as_posix()}")
+
+    def traced(*arguments):
+        modules.clear()  # the last step counts: kernels are loaded and tables are made by then
+        sys.setprofile(called)
+        try:
+            return load_step(*arguments)
+        finally:
+            sys.setprofile(None)
+
+    monkeypatch.setattr(page, "load_step", traced)
+    exec(compile(example, "load-step.md", "exec"), {})
+    named = set(re.findall(r"fastcontact/[\w/]+\.py", text))
+    assert sorted(modules - named) == []
+    assert all((package.parent / name).is_file() for name in named)
+    assert len(modules) > 40
+
+
+NOTEBOOKS = sorted((pages.DOCS / "notebooks").glob("*.ipynb"))
+
+
+@pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
+def test_a_notebook_runs(notebook, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found, names = json.loads(notebook.read_text(encoding="utf-8")), {}
+    assert (found["nbformat"], found["nbformat_minor"]) == (4, 5)
+    code = [cell for cell in found["cells"] if cell["cell_type"] == "code"]
+    assert all(cell["outputs"] == [] and cell["execution_count"] is None for cell in code)
+    assert "".join(code[0]["source"]).startswith("%pip install")
+    for number, cell in enumerate(code[1:], start=1):
+        exec(compile("".join(cell["source"]), f"{notebook.name}, code cell {number}", "exec"), names)
+
+
+def test_there_are_notebooks_and_a_page_leads_to_each():
+    text = "".join(page.read_text(encoding="utf-8") for page in pages.pages())
+    assert len(NOTEBOOKS) >= 3
+    assert all(f"notebooks/{notebook.name}" in text for notebook in NOTEBOOKS)

@@ -13,10 +13,9 @@ KERNEL_TESTS = (
     "tests/unit/linear/test_linear_multigrid.py",
     "tests/unit/_jit/test_norms.py",
     "tests/unit/linear/test_grouped_pivots.py",
-    "tests/unit/linear/test_layered_pivots.py",
     "tests/unit/contact/test_box_tree.py",
     "tests/unit/contact/test_search.py",
-    "tests/unit/contact/test_search_3d.py",
+    "tests/unit/contact/test_search.py",
     "tests/unit/linear/test_symmetric_factors.py",
 )
 

@@ -8,6 +8,7 @@ import nonlinear
 import numpy as np
 import pytest
 from drawing import drawn
+from models import supported
 from outcome import BOUNDS, SAME, figures, outcome, told, unfit
 from stepping import watching
 from wording import WORDS
@@ -113,8 +114,7 @@ def rubbing():
     mesh = fc.generate.block_on_block(divisions_lower=(6, 3), divisions_upper=(5, 3))
     model = fc.Model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", x=0.05, y=-0.05)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.05, "y": -0.05})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.2)
     with watching() as watched:
         step = fc.solve(model, 1)[-1]
@@ -206,8 +206,7 @@ def moved_freely():
     mesh = fc.generate.block_on_block(divisions_lower=(3, 2), divisions_upper=(2, 2))
     model = fc.Model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(1000.0, 0.3))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", x=0.1, y=0.3)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.1, "y": 0.3})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER")
     with watching() as watched, pytest.warns(fc.FastcontactWarning):
         step = fc.solve(model, 1)[-1]

@@ -14,8 +14,7 @@ WRONG = (None, "5", 5, [1, 2], {"a": 1}, object(), [None], 1j)
 
 
 def model(contact=True):
-    found = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x")
-    found.prescribe("A2B2", y=-2.0)
+    found = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
     found.prescribe("A1B1", y=2.0)
     if contact:
         found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")

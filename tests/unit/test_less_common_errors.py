@@ -11,7 +11,7 @@ import h5py
 import meshio
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact._tools import paths
@@ -236,8 +236,7 @@ def two_materials(path):
     found = fc.Model(mesh, "plane_strain")
     found.add_material(fc.LinearElastic(E=1.0, nu=0.3), "SOFT")
     found.add_material(fc.LinearElastic(E=10.0, nu=0.3), "HARD")
-    found.fix("BOTTOM", "xy")
-    found.prescribe("TOP", y=-0.01)
+    supported(found, BOTTOM="xy", TOP={"y": -0.01})
     with fc.ResultWriter(path, found) as out:
         return fc.solve(found, 1, on_step=out.write)[0]
 
@@ -307,8 +306,7 @@ def test_two_materials_that_vary_inside_their_cells():
         found = fc.Model(mesh, "plane_strain")
         for group in ("ONE", "TWO"):
             found.add_material(fc.LinearElastic(E=E, nu=0.3), group)
-        found.fix("BOTTOM", "xy")
-        found.prescribe("TOP", y=-0.01, x=0.02)
+        supported(found, BOTTOM="xy", TOP={"y": -0.01, "x": 0.02})
         results.append(fc.solve(found, 1)[0])
     np.testing.assert_allclose(results[1].displacement, results[0].displacement, rtol=1e-10, atol=1e-16)
 
@@ -317,8 +315,7 @@ def test_iterations_that_do_not_get_there_name_other_solvers(monkeypatch):
     from fastcontact.linear.solvers import pyamg
 
     monkeypatch.setattr(pyamg, "MAX_ITERATIONS", 1)
-    found = elastic_model(fc.generate.block(divisions=(8, 8)), "plane_strain", BOTTOM="xy")
-    found.prescribe("TOP", y=-0.01, x=0.02)
+    found = elastic_model(fc.generate.block(divisions=(8, 8)), "plane_strain", BOTTOM="xy", TOP={"y": -0.01, "x": 0.02})
     with pytest.raises(fc.ConvergenceError, match=r"do not reach .*: use amg or direct"):
         fc.solve(found, 1, linear_solver="pyamg")
 

@@ -88,7 +88,11 @@ def block(kind: str, law: str, moves, nlgeom=True, count: int = 10) -> Case:
 def strip(kind: str, law: str, load: str) -> Case:
     """Return a slender strip that a force or a pressure bends by large rotations."""
     if kind.startswith("C3D"):
-        mesh, side, face = fc.generate.box((10.0, 1.0, 0.2), (20, 1, 1), element=ELEMENTS[kind], name="BLOCK"), "XMIN", "ZMAX"
+        mesh, side, face = (
+            fc.generate.box((10.0, 1.0, 0.2), (20, 1, 1), element=ELEMENTS[kind], name="BLOCK"),
+            "XMIN",
+            "ZMAX",
+        )
         end, up = "XMAX", 3
     else:
         mesh, side, face, end, up = fc.generate.block((10.0, 0.2), (20, 1), ELEMENTS[kind]), "LEFT", "TOP", "RIGHT", 2
@@ -214,7 +218,9 @@ def by_calculix(name: str) -> list[dict]:
     with tempfile.TemporaryDirectory() as folder:
         (Path(folder) / "run.inp").write_text(given.text, encoding="utf-8")
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-        done = subprocess.run([CCX, "run"], cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        done = subprocess.run(
+            [CCX, "run"], cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
+        )
         assert "Job finished" in done.stdout, done.stdout[-1500:]
         return read_dat((Path(folder) / "run.dat").read_text(encoding="utf-8"), given, kind_of(name))
 
@@ -231,7 +237,8 @@ def here(name: str) -> list[dict]:
     model, found = read.model, []
     # The same discretisation: CalculiX does not project the dilatation.
     model.materials[:] = [
-        (replace(law, volumetric="plain") if isinstance(law, fc.ElasticPlastic) else law, group) for law, group in model.materials
+        (replace(law, volumetric="plain") if isinstance(law, fc.ElasticPlastic) else law, group)
+        for law, group in model.materials
     ]
     bodies = NonlinearBodies(model.mesh, model.kinematics, model.strain, model.material_field())
     for step in read.solve():
@@ -244,7 +251,9 @@ def here(name: str) -> list[dict]:
         found.append(
             {
                 "displacement": step.displacement[given.looked],
-                "force": np.array([step.reaction[model.mesh.points_of(name)].sum(axis=0)[along] for name in given.sets]),
+                "force": np.array(
+                    [step.reaction[model.mesh.points_of(name)].sum(axis=0)[along] for name in given.sets]
+                ),
                 "stress": stress[given.cells[0]][order] if has_points(kind) else np.zeros((0, 4)),
             }
         )

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -32,8 +32,7 @@ def one_step(model, **options):
 def test_uniform_pressure_gives_a_uniform_stress(element, kinematics):
     mesh = fc.generate.block((2.0, 3.0), (3, 4), element, distortion=0.2 if element in PLANE[:3] else 0.0)
     model = model_on(mesh, kinematics)
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
+    supported(model, LEFT="x", BOTTOM="y")
     model.add_pressure("TOP", 5.0)
     model.add_pressure("RIGHT", 2.0)
     last = one_step(model)
@@ -73,8 +72,7 @@ def test_a_thick_cylinder_converges_to_lame(element, order, kinematics):
     for n in sizes:
         mesh = ring(element, n)
         model = model_on(mesh, kinematics)
-        model.fix("BOTTOM", "y")
-        model.fix("TOP", "x")
+        supported(model, BOTTOM="y", TOP="x")
         model.add_pressure("LEFT", 10.0)  # the bore
         u = one_step(model).displacement
         r = np.linalg.norm(mesh.points, axis=1)
@@ -186,8 +184,7 @@ def test_a_relation_with_a_right_hand_side_and_its_reactions():
     """Two halves pulled apart by a given amount: the relation's forces are equal and opposite."""
     mesh = fc.generate.block_on_block("quad4", divisions_lower=(4, 2), divisions_upper=(4, 2))
     model = model_on(mesh, "plane_stress")
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_TOP", "xy")
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP="xy")
     lower, upper = mesh.points_of("CONT_LOWER"), mesh.points_of("CONT_UPPER")
     order = [points[np.argsort(mesh.points[points, 0])] for points in (lower, upper)]
     for a, b in zip(*order, strict=True):
@@ -208,8 +205,7 @@ def test_a_relation_with_a_right_hand_side_and_its_reactions():
 def test_loads_with_their_own_histories():
     mesh = fc.generate.block((2.0, 1.0), (3, 2), "quad8")
     model = model_on(mesh, "plane_strain")
-    model.fix("BOTTOM", "y")
-    model.fix("LEFT", "x")
+    supported(model, BOTTOM="y", LEFT="x")
     model.add_pressure("TOP", 5.0, ramp=[(0, 0), (1, 1), (3, 1)])
     model.add_pressure("RIGHT", 2.0, ramp=[(0, 0), (1, 0), (2, 1), (3, 0)])
     steps = fc.solve(model, fc.Ramp((0.5, 1.0, 2.0, 3.0), ((0, 0), (3, 7))))
@@ -235,8 +231,7 @@ def driven_by_force(mesh, formulation, force, gap=0.0, **load):
     points = mesh.points.copy()
     if gap:
         points[mesh.points_of("SPHHAU"), 1] += gap
-    model = elastic_model(mesh.replace(points=points), "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A1B1", y=2.0)
+    model = elastic_model(mesh.replace(points=points), "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     model.couple("A2B2", "y")
     model.add_force("A2B2", y=-force, **load)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
@@ -335,9 +330,7 @@ def floating_block(push, friction):
     mesh = fc.generate.block_on_block()
     points = mesh.points.copy()
     points[mesh.points_of("UPPER"), 1] += 0.1
-    model = elastic_model(mesh.replace(points=points), "plane_strain")
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_LEFT", "x")
+    model = elastic_model(mesh.replace(points=points), "plane_strain", LOWER_BOTTOM="xy", UPPER_LEFT="x")
     model.add_contact("below", secondary="CONT_UPPER", primary="CONT_LOWER", friction=friction)
     top = float(points[:, 1].max()) + 0.1
     model.add_obstacle(

@@ -3,6 +3,7 @@
 import warnings
 
 import pytest
+from models import supported
 
 import fastcontact as fc
 
@@ -82,8 +83,7 @@ def test_a_force_beyond_the_limit_load_is_told_as_such(strain: str) -> None:
     mesh = fc.generate.block((1.0, 1.0), (2, 2))
     model = fc.Model(mesh, "plane_strain", strain=strain)
     model.add_material(PERFECT)
-    model.fix("BOTTOM", "y")
-    model.fix("LEFT", "x")
+    supported(model, BOTTOM="y", LEFT="x")
     model.add_traction("TOP", y=2.0 * PERFECT.yield_stress)
     with pytest.raises(
         fc.ConvergenceError, match=r"largest plastic strain is .* may bear no larger forces: prescribe disp"
@@ -102,8 +102,7 @@ def test_sides_that_overlap_at_the_start_are_told_where_the_motion_is_along_them
     ]
     model = fc.Model(fc.generate.union(*bodies), "plane_strain")
     model.add_material(STEEL)
-    model.fix("LEFT0", "xy")
-    model.prescribe("RIGHT1", x=0.0, y=-0.5)
+    supported(model, LEFT0="xy", RIGHT1={"x": 0.0, "y": -0.5})
     model.add_contact("bead", secondary="LEFT1", primary="RIGHT0")
     with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")

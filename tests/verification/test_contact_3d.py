@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -40,8 +40,7 @@ def pressed(mesh, formulation, swap=False, push=0.01, **options):
     for name in ("LOWER", "UPPER"):
         model.fix(f"{name}_XMIN", "x")
         model.fix(f"{name}_YMIN", "y")
-    model.fix("LOWER_ZMIN", "z")
-    model.prescribe("UPPER_ZMAX", z=-push)
+    supported(model, LOWER_ZMIN="z", UPPER_ZMAX={"z": -push})
     sides = ("UPPER_ZMIN", "LOWER_ZMAX") if swap else ("LOWER_ZMAX", "UPPER_ZMIN")
     model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
     return model
@@ -97,8 +96,7 @@ def test_meshes_that_do_not_match_transmit_the_force():
 
 
 def sphere_model(mesh, formulation, swap=False, push=0.5, **options):
-    model = elastic_model(mesh, "3d", E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z")
-    model.prescribe("SPHERE_TOP", y=-push)
+    model = elastic_model(mesh, "3d", E=20_000.0, SYMMETRY_X="x", SYMMETRY_Z="z", SPHERE_TOP={"y": -push})
     sides = ("CONT_BLOCK", "CONT_SPHERE") if swap else ("CONT_SPHERE", "CONT_BLOCK")
     model.add_contact("hertz", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
     return model

@@ -1,4 +1,4 @@
-"""Force-driven rigid obstacles: equal to displacement-driven ones; failures."""
+"""Rigid obstacles that forces drive or that rotate: torques, invariants, failures, refusals."""
 
 import json
 
@@ -11,7 +11,9 @@ import fastcontact as fc
 from fastcontact import obstacles
 from fastcontact.cases.case import read_case
 from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.cli import main
 from fastcontact.contact.formulations import FORMULATIONS
+from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide, Rotation
 from fastcontact.mesh.generate import block, box, quarter_disc
 
 pytestmark = pytest.mark.each_value
@@ -224,3 +226,301 @@ def test_a_force_in_a_case_file_is_checked(tmp_path):
     (tmp_path / "case.toml").write_text(CASE.replace("{ y = -2.0e5 }", '{ y = "down" }'))
     with pytest.raises(fc.CaseError, match=r"'obstacle.plane.force.y' must be of type"):
         read_case(tmp_path / "case.toml")
+
+
+FRICTION, RADIUS = 0.3, 10.0
+PRESS, PRESS_AND_TURN = [(0.0, 0.0), (1.0, 1.0), (9.0, 1.0)], [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0)]
+
+
+def graded_box(divisions):
+    """A box of 6 by 6 by 3 below z = 0, with cells that grow away from the origin."""
+    mesh = box((2.0, 2.0, 1.0), (divisions, divisions, divisions // 2), origin=(-1.0, -1.0, -1.0))
+    return mesh.replace(points=3.0 * np.sign(mesh.points) * np.abs(mesh.points) ** 1.6)
+
+
+def twisted_ball(formulation, divisions=8, angle=0.4, friction=FRICTION, **driving):
+    """A rigid ball pressed on a box and then twisted about the vertical through its centre; by default pressed by 0.1."""
+    model = elastic_model(graded_box(divisions), "3d", ZMIN="xyz")
+    rotation = {"angle": angle, "centre": (0.0, 0.0, RADIUS), "axis": (0.0, 0.0, 2.0), "ramp": PRESS_AND_TURN}
+    model.add_obstacle(
+        "ball", secondary="ZMAX", obstacle=fc.obstacles.Sphere((0.0, 0.0, RADIUS), RADIUS), rotation=rotation,
+        friction=friction, formulation=formulation, ramp=PRESS, **(driving or {"motion": {"z": -0.1}}),
+    )  # fmt: skip
+    return model
+
+
+def normal_forces(contact):
+    return np.einsum("nd,nd->n", contact.force_vectors, contact.normal)
+
+
+PUSHED = {"force": {"z": -240.0}}
+
+
+@pytest.mark.parametrize(
+    ("formulation", "driving"),
+    [
+        ("node_to_segment", {}), ("node_to_segment", PUSHED),
+        *(pytest.param("continuous", driving, marks=pytest.mark.slow) for driving in ({}, PUSHED)),
+    ],
+)  # fmt: skip
+@pytest.mark.filterwarnings("ignore:contact 'ball' has only")
+def test_a_twisted_ball_slides_with_the_torque_of_full_slip(formulation, driving):
+    """Full slip: the integral of mu p r, of Hertz's pressures 3 pi mu P a / 16 (Lubkin, J. Appl. Mech. 18, 1951)."""
+    steps = fc.solve(twisted_ball(formulation, **driving), [1.0, 5.0, 7.0, 9.0])
+    contacts = [step.contact["ball"] for step in steps]
+    assert contacts[0].torque == pytest.approx(0.0, abs=1e-9)
+    assert [contact.obstacle_angle for contact in contacts] == pytest.approx([0.0, 0.2, 0.3, 0.4])
+    last = contacts[-1]
+    radius = np.linalg.norm((last.coordinates + steps[-1].displacement[last.points])[:, :2], axis=1)
+    full_slip = FRICTION * normal_forces(last) @ radius
+    # Nodes stand for the area around them: the force of a continuous contact lies farther in than its nodes, on average.
+    assert last.torque == pytest.approx(full_slip, rel=5e-3 if formulation == "node_to_segment" else 0.06)
+    if driving:
+        assert last.force[2] == pytest.approx(-240.0, rel=1e-8)
+    # On boxes of 8, 14 and 20 such cells a continuous contact lacks 4.6, 3.3 and 2.3 %.
+    hertz = fc.analytic.hertz_point(E1=1000.0, nu1=0.3, R1=np.inf, R2=RADIUS, force=-last.force[2])
+    assert last.torque == pytest.approx(3.0 * np.pi / 16.0 * FRICTION * -last.force[2] * hertz.radius, rel=0.06)
+    # Sliding steadily, the ball puts in the work of friction: torque times angle (0.6, 0.1 and 0.03 % on the three boxes).
+    assert last.dissipation == pytest.approx(last.torque * 0.1, rel=1e-3 if formulation == "node_to_segment" else 8e-3)
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+@pytest.mark.filterwarnings("ignore:contact 'ball' has only")
+def test_without_friction_a_ball_may_turn_as_it_likes(formulation):
+    model = twisted_ball(formulation, friction=0.0, angle=50.0)
+    still, turned = fc.solve(model, [1.0, 9.0])
+    assert turned.displacement == pytest.approx(still.displacement, abs=1e-9)
+    assert turned.contact["ball"].torque == pytest.approx(0.0, abs=1e-9)
+    assert turned.contact["ball"].obstacle_angle == 50.0
+
+
+def spun_disc(
+    formulation="continuous", *, angle=-0.5, motion=(0.0, -0.02), friction=FRICTION, element="quad4", turned=False
+):
+    """A rigid disc of radius 5 above a block, pressed, then spun and moved; `turned`: all of it by 90 degrees."""
+    mesh = block((4.0, 2.0), (24, 8), element, (-2.0, -2.0))
+    flip = np.array([[0.0, 1.0], [-1.0, 0.0]]) if turned else np.eye(2)
+    model = elastic_model(mesh.replace(points=mesh.points @ flip), "plane_strain", BOTTOM="xy")
+    centre = np.array([0.0, 5.0]) @ flip
+    along, down = np.array([motion[0], 0.0]) @ flip, np.array([0.0, motion[1]]) @ flip
+    together = dict(zip("xy", (along + down).tolist(), strict=True))
+    rotation = {"angle": angle, "centre": centre, "ramp": PRESS_AND_TURN}
+    model.add_obstacle(
+        "disc", secondary="TOP", obstacle=fc.obstacles.Sphere(tuple(centre), 5.0), motion=together, rotation=rotation,
+        friction=friction, formulation=formulation, ramp=PRESS,
+    )  # fmt: skip
+    return model
+
+
+@pytest.mark.parametrize(
+    ("formulation", "element"), [("node_to_segment", "quad4"), ("continuous", "quad4"), ("continuous", "quad8")]
+)
+def test_a_spun_disc_slides_everywhere(formulation, element):
+    """All points of it have the same arm, its radius: the torque of full slip is mu P R, with every law of pressure."""
+    steps = fc.solve(spun_disc(formulation, element=element), [1.0, 5.0, 9.0])
+    contact = steps[-1].contact["disc"]
+    assert contact.torque == pytest.approx(-FRICTION * 5.0 * normal_forces(contact).sum(), rel=2e-3)
+    assert contact.dissipation == pytest.approx(-contact.torque * 0.25, rel=2e-3)
+    # The disc turns clockwise and drags the surface below it to the left.
+    assert contact.force[0] == pytest.approx(-FRICTION * normal_forces(contact).sum(), rel=0.02)
+
+
+def test_a_spun_disc_and_its_block_turned_by_a_right_angle():
+    upright, turned = (fc.solve(spun_disc(turned=turned), [1.0, 9.0])[-1] for turned in (False, True))
+    flip = np.array([[0.0, 1.0], [-1.0, 0.0]])
+    assert turned.displacement == pytest.approx(upright.displacement @ flip, abs=1e-8)
+    assert turned.contact["disc"].torque == pytest.approx(upright.contact["disc"].torque, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:.*begins with a penetration")  # which presses it
+def test_a_disc_that_rolls_hardly_needs_a_torque():
+    """Rolling, places of the disc and of the block meet without sliding, but for what pressure strains the block along it.
+
+    That is little where the block hardly changes its volume. A disc that is dragged needs mu P R not to turn.
+    """
+    parts = []
+    for rolling in (1.0, 0.0):
+        model = fc.Model(block((4.0, 2.0), (24, 8), origin=(-2.0, -2.0)), "plane_strain")
+        model.add_material(fc.LinearElastic(E=1000.0, nu=0.48, volumetric="mean_dilatation"))
+        model.fix("BOTTOM", "xy")
+        centre = (-0.2, 5.0 - 0.02)
+        model.add_obstacle(
+            "disc", secondary="TOP", obstacle=fc.obstacles.Sphere(centre, 5.0), motion={"x": 0.4}, friction=FRICTION,
+            rotation={"angle": -0.4 / 5.0 * rolling, "centre": centre},
+        )  # fmt: skip
+        contact = fc.solve(model, 20)[-1].contact["disc"]
+        parts.append(contact.torque / (FRICTION * normal_forces(contact).sum() * 5.0))
+    rolled, dragged = parts
+    assert dragged == pytest.approx(1.0, rel=2e-3)
+    assert abs(rolled) < 0.05
+
+
+def test_a_driven_wheel_rolls_on_by_its_arc():
+    """Pushed down by a force, free to move along, and turned: it goes on by radius times angle, but for a little creep."""
+    model = spun_disc()
+    model.contact.clear()
+    model.add_obstacle(
+        "disc", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, 5.0), 5.0), force={"x": 0.0, "y": -15.0}, ramp=PRESS,
+        rotation={"angle": -0.04, "centre": (0.0, 5.0), "ramp": PRESS_AND_TURN}, friction=FRICTION,
+    )  # fmt: skip
+    contact = fc.solve(model, np.linspace(1.0, 9.0, 17))[-1].contact["disc"]
+    assert contact.force == pytest.approx([0.0, -15.0], abs=1e-6)
+    assert contact.obstacle_displacement[0] == pytest.approx(0.04 * 5.0, rel=0.01)
+    assert abs(contact.torque) < 0.01 * FRICTION * 15.0 * 5.0
+
+
+def test_a_turn_about_a_far_centre_is_a_translation():
+    far, way = 1e7, 0.3
+    found = []
+    for rotation in ({"angle": way / far, "centre": (0.0, far), "ramp": PRESS_AND_TURN}, None):
+        model = elastic_model(block((4.0, 2.0), (8, 4)), "plane_strain", BOTTOM="xy")
+        plane = fc.obstacles.HalfSpace((0.0, 2.0), (0.0, -1.0))
+        if rotation is None:
+            model.add_obstacle(
+                "plane", secondary="TOP", obstacle=plane, motion={"x": way}, friction=0.5, ramp=PRESS_AND_TURN
+            )
+            model.contact[-1].options["clearance"] = -0.02
+        else:
+            model.add_obstacle(
+                "plane", secondary="TOP", obstacle=plane, rotation=rotation, friction=0.5, clearance=-0.02
+            )
+        found.append(fc.solve(model, [1.0, 3.0, 9.0])[-1])
+    turned, moved = found
+    assert turned.displacement == pytest.approx(moved.displacement, abs=1e-6)
+    assert turned.contact["plane"].force == pytest.approx(moved.contact["plane"].force, rel=1e-4)
+
+
+def tool(angle):
+    """A wavy rigid surface of lines above a block, turned by `angle` about (0.5, 3)."""
+    x = np.linspace(-3.0, 3.0, 61)
+    points = np.column_stack([x, 2.35 + 0.1 * np.cos(2.0 * x) - 0.05 * x])
+    turn = Rotation((0.5, 3.0), (0.0, 0.0, 1.0), 1.0).matrix(angle)
+    points = (points - [0.5, 3.0]) @ turn.T + [0.5, 3.0]
+    lines = np.column_stack([np.arange(60), np.arange(1, 61)])
+    surface = fc.Mesh(points, {"line2": lines}, cell_groups={"TOOL": np.arange(60)})
+    return fc.obstacles.MeshedSurface(surface, "TOOL")
+
+
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous"])
+def test_a_turned_tool_presses_as_one_made_so(formulation):
+    """Without friction only the last place counts: a tool turned by the analysis and one that is drawn turned."""
+    found = []
+    for made, turned in ((0.0, 0.12), (0.12, 0.0)):
+        model = elastic_model(block((4.0, 2.0), (20, 8), origin=(-2.0, 0.0)), "plane_strain", BOTTOM="xy")
+        rotation = {"angle": turned, "centre": (0.5, 3.0)}
+        model.add_obstacle(
+            "tool", secondary="TOP", obstacle=tool(made), rotation=rotation, motion={"y": -0.2}, formulation=formulation
+        )
+        found.append(fc.solve(model, 1)[-1])
+    assert found[0].contact["tool"].active.any()
+    assert found[0].displacement == pytest.approx(found[1].displacement, abs=1e-8)
+    assert found[0].contact["tool"].torque == pytest.approx(found[1].contact["tool"].torque, rel=1e-6)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_slip_is_zero_where_a_point_sticks_and_the_arc_where_it_stands_still(dim):
+    axis = (0.0, 0.0, 1.0) if dim == 2 else (1.0, -2.0, 0.5)
+    rotation = Rotation((0.3, -0.2, 0.7)[:dim], axis, 1.0)
+    side = RigidSide(fc.obstacles.Sphere((0.0,) * dim, 1.0), np.zeros(dim), rotation)
+    then, now = Pose(np.full(dim, 0.1), 0.4), Pose(np.array([0.3, -0.2, 0.5])[:dim], 1.1)
+    rng = np.random.default_rng(1)
+    before, centre = rng.normal(size=(5, dim)), np.array(rotation.centre)
+    stuck = (before - centre - then.displacement) @ rotation.matrix(0.7).T + centre + now.displacement
+    moved = now.displacement - then.displacement
+    assert stuck - before - moved == pytest.approx(side.turning(stuck, before, now, then), abs=1e-12)
+    # A point that only goes along with the axis stands still on the way of the turn: the surface passes it along an arc.
+    carried = side.turning(before + moved, before, now, then)
+    arm = before - centre - then.displacement
+    unit = np.array(axis) / np.linalg.norm(axis)
+    across = np.cross(np.pad(unit, (0, 3 - len(unit))), np.pad(arm, ((0, 0), (0, 3 - dim))))[:, :dim]
+    assert carried == pytest.approx(0.7 * across, abs=1e-12)
+
+
+def test_wear_of_a_spun_disc_is_pressure_times_the_arc():
+    model = spun_disc()
+    steps = fc.solve(model, [1.0, 5.0, 9.0])
+    depth = fc.wear(model, steps, "disc", 1e-6)
+    contacts = [step.contact["disc"] for step in steps]
+    sliding = contacts[1].active & contacts[2].active & ~contacts[2].sticking
+    assert sliding.any()
+    expected = 1e-6 * 0.5 * (contacts[1].pressure + contacts[2].pressure) * 5.0 * 0.25
+    assert (depth[2] - depth[1])[sliding] == pytest.approx(expected[sliding], rel=2e-3)
+
+
+def test_an_analysis_goes_on_from_its_file_in_the_middle_of_a_turn(tmp_path):
+    model = spun_disc()
+    whole = fc.solve(model, [1.0, 3.0, 5.0])
+    with fc.ResultWriter(tmp_path / "turn.vtkhdf", model) as out:
+        fc.solve(model, [1.0, 3.0], on_step=out.write)
+    stored = list(fc.open_results(tmp_path / "turn.vtkhdf"))
+    assert stored[-1].contact["disc"].torque == whole[1].contact["disc"].torque
+    assert stored[-1].contact["disc"].obstacle_angle == whole[1].contact["disc"].obstacle_angle == -0.125
+    again = list(fc.solve_steps(model, [1.0, 3.0, 5.0], resume=stored))
+    assert again[-1].displacement == pytest.approx(whole[-1].displacement, abs=1e-10)
+
+
+REFUSED = {
+    "needs 'centre'": {"angle": 1.0},
+    "needs 'angle'": {"centre": (0.0, 0.0)},
+    "in the plane it is about z": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)},
+    "did you mean 'centre'": {"angle": 1.0, "center": (0.0, 0.0)},
+    "not a finite number": {"angle": float("nan"), "centre": (0.0, 0.0)},
+}
+
+
+@pytest.mark.parametrize("message", REFUSED)
+def test_a_rotation_that_makes_no_sense_is_refused(message):
+    model = fc.Model(block(), "plane_strain")
+    ball = fc.obstacles.Sphere((0.5, 3.0), 2.0)
+    with pytest.raises(fc.ModelError, match=message):
+        model.add_obstacle("ball", secondary="TOP", obstacle=ball, rotation=REFUSED[message])
+
+
+def test_axisymmetric_models_have_no_turning_obstacles():
+    model = fc.Model(block(), "axisymmetric")
+    ball = fc.obstacles.Sphere((0.0, 3.0), 2.0)
+    with pytest.raises(fc.ModelError, match="no displacement round its axis"):
+        model.add_obstacle("ball", secondary="TOP", obstacle=ball, rotation={"angle": 1.0, "centre": (0.0, 0.0)})
+
+
+def test_an_axis_without_length_and_too_large_turns_are_refused():
+    model = twisted_ball("node_to_segment", angle=4.0)
+    with pytest.raises(fc.ModelError, match=r"turns by 2 radian in the step to 5, .* at least 2 steps"):
+        fc.solve(model, [1.0, 5.0, 9.0])
+    with pytest.raises(fc.ModelError, match="has no length"):
+        model.add_obstacle(
+            "other", secondary="ZMAX", obstacle=fc.obstacles.Sphere((0.0, 0.0, 3.0), 1.0),
+            rotation={"angle": 1.0, "centre": (0.0, 0.0, 0.0), "axis": (0.0, 0.0, 0.0)},
+        )  # fmt: skip
+
+
+def test_a_case_file_turns_an_obstacle(tmp_path, capsys):
+    text = """
+title = "A spun disc"
+kinematics = "plane_strain"
+mesh = { file = "block.med" }
+material = [{ E = 1000.0, nu = 0.3 }]
+support = [{ group = "BOTTOM", x = 0.0, y = 0.0 }]
+ramp = { instants = [1.0, 2.0, 3.0], table = [[0.0, 0.0], [3.0, 3.0]] }
+[obstacle.disc]
+secondary = "TOP"
+shape = { kind = "sphere", centre = [0.0, 5.0], R = 5.0 }
+motion = { y = -0.02 }
+ramp = [[0.0, 0.0], [1.0, 1.0], [3.0, 1.0]]
+rotation = { angle = -0.5, centre = [0.0, 5.0], ramp = [[0.0, 0.0], [1.0, 0.0], [3.0, 1.0]] }
+friction = 0.3
+"""
+    fc.write_mesh(tmp_path / "block.med", block((4.0, 2.0), (16, 6), origin=(-2.0, -2.0)))
+    path = tmp_path / "disc.toml"
+    path.write_text(text, encoding="utf-8")
+    case = read_case(path)
+    contact = fc.solve(case.model, case.ramp, criteria=case.criteria)[-1].contact["disc"]
+    assert contact.torque == pytest.approx(-0.3 * 5.0 * normal_forces(contact).sum(), rel=5e-3)
+    assert main(["run", str(path), "--json", str(tmp_path / "disc.json")]) == 0
+    told = json.loads((tmp_path / "disc.json").read_text(encoding="utf-8"))["contact"]["disc"]
+    assert told["torque"] == pytest.approx(contact.torque)
+    assert told["obstacle_angle"] == -0.5
+    assert "obstacle 'disc' has turned by -0.5 radian, with a torque of" in capsys.readouterr().out
+    path.write_text(text.replace("angle = -0.5", "angel = -0.5"), encoding="utf-8")
+    with pytest.raises(fc.CaseError, match=r"did you mean 'obstacle\.disc\.rotation\.angle'"):
+        read_case(path)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.mesh import elements
@@ -51,9 +51,7 @@ def test_a_uniform_stress_has_no_error_even_across_materials(element):
     right = mesh.offsets[element] + np.flatnonzero(centres[:, 0] > 0.5)
     model = elastic_model(mesh.with_groups(cells={"RIGHT HALF": right}), "plane_stress", nu=0.0)
     model.add_material(fc.LinearElastic(E=5000.0, nu=0.0), "RIGHT HALF")
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM", "y")
-    model.prescribe("RIGHT", x=0.01)
+    supported(model, LEFT="x", BOTTOM="y", RIGHT={"x": 0.01})
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     found = fc.estimate_error(model, step)
     # sigma_xx is uniform though strains jump; averaged over both materials it would be as well, sigma_yy = 0 too.
@@ -83,8 +81,7 @@ def test_stress_that_jumps_between_materials_is_not_an_error():
     right = mesh.offsets["quad4"] + np.flatnonzero(centres[:, 0] > 0.5)
     model = elastic_model(mesh.with_groups(cells={"RIGHT HALF": right}), "plane_stress", nu=0.0)
     model.add_material(fc.LinearElastic(E=5000.0, nu=0.0), "RIGHT HALF")
-    model.fix("BOTTOM", "y")
-    model.fix("LEFT", "x")
+    supported(model, BOTTOM="y", LEFT="x")
     model.prescribe("TOP", y=0.01)  # both halves stretch alike, the stresses are 10 and 50
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     assert fc.estimate_error(model, step).relative < 1e-10

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import supported
 from pairwise import first_of
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -182,8 +183,7 @@ def tube(element: str, count: int) -> fc.Model:
     mesh = fc.generate.block((1.0, 0.05), (count, 1), element=element, origin=(1.0, 0.0))
     model = fc.Model(mesh, "axisymmetric", strain="finite")
     model.add_material(fc.NeoHookean(E=2.0 * 1.4999, nu=0.4999))
-    model.fix("BOTTOM", "y")
-    model.fix("TOP", "y")
+    supported(model, BOTTOM="y", TOP="y")
     return model
 
 
@@ -301,9 +301,7 @@ def balls(law, strain: str, approach: float, **options):
     mesh = fc.generate.half_spheres(element="quad4")
     model = fc.Model(mesh, "axisymmetric", strain=strain)
     model.add_material(law)
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
-    model.prescribe("A2B2", y=-approach)
+    supported(model, A1A2="x", A1B1="y", A2B2={"y": -approach})
     model.add_contact("pair", secondary="CONT1", primary="CONT2", **options)
     return fc.solve(model, 4), model
 
@@ -328,9 +326,7 @@ def test_two_balls_squeezed_until_contact_is_two_thirds_as_wide(element: str, er
     mesh = fc.generate.half_spheres(element=element, segments=8, arc_sizes=(1.6, 1.6))
     model = fc.Model(mesh, "axisymmetric", strain="finite")
     model.add_material(fc.NeoHookean(E=20_000.0, nu=0.3))
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
-    model.prescribe("A2B2", y=-36.0)
+    supported(model, A1A2="x", A1B1="y", A2B2={"y": -36.0})
     model.add_contact("pair", secondary="CONT1", primary="CONT2")
     contact = fc.solve(model, 4)[-1].contact["pair"]
     assert abs(contact.force[1]) == pytest.approx(25_878_235.0, rel=error)

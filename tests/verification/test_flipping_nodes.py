@@ -10,9 +10,7 @@ from fastcontact.mesh.generate import box, renamed, union
 
 def spheres(**options):
     mesh = fc.generate.half_spheres(element="quad8", segments=16)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-1.0)
-    model.prescribe("A1B1", y=1.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment", **options)
     return fc.solve(model, 1)[-1]
 
@@ -43,8 +41,7 @@ def pressed(element, cells, swapped, friction):
                 mesh.replace(points=points), {group: f"{name}_{group}" for group in mesh.group_names if group != name}
             )
         )
-    model = elastic_model(union(*parts), "3d", LOW_ZMIN="xyz")
-    model.prescribe("UP_ZMAX", x=0.0, y=0.0, z=-0.02)
+    model = elastic_model(union(*parts), "3d", LOW_ZMIN="xyz", UP_ZMAX={"x": 0.0, "y": 0.0, "z": -0.02})
     sides = ("LOW_ZMAX", "UP_ZMIN") if swapped else ("UP_ZMIN", "LOW_ZMAX")
     model.add_contact(
         "pair", secondary=sides[0], primary=sides[1], formulation="node_to_segment", normals="facet", friction=friction

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -125,8 +125,7 @@ def test_fluid_round_a_disc_comes_as_far_as_the_contact_presses_less(element):
     mesh = fc.generate.renamed(mesh, {"CONT1": "ARC", "D1B1": "ARC"})
     model = fc.Model(mesh, kinematics="plane_strain")
     model.add_material(fc.LinearElastic(E=100.0, nu=0.3))
-    model.fix("A1A2", "x")
-    model.fix("A1B1", "y")
+    supported(model, A1A2="x", A1B1="y")
     plate = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     model.add_obstacle("plate", secondary="ARC", obstacle=plate, motion={"y": -0.1}, ramp=HELD)
     model.add_fluid_pressure("plate", 1.5, source="B1", ramp=FLUID)
@@ -143,8 +142,7 @@ def test_fluid_round_a_disc_comes_as_far_as_the_contact_presses_less(element):
 
 
 def test_facets_that_two_fluids_press_on_are_told():
-    model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1.0, nu=0.3)
-    model.fix("TOP", "xy")
+    model = elastic_model(fc.generate.block((2.0, 1.0), (4, 2)), "plane_strain", E=1.0, nu=0.3, TOP="xy")
     for name, height in (("near", -0.1), ("far", -0.2)):
         plane = fc.obstacles.HalfSpace((0.0, height), (0.0, 1.0))
         model.add_obstacle(name, secondary="BOTTOM", obstacle=plane)

@@ -1,5 +1,7 @@
 """The training case on meshes of the generator: close to code_aster's meshes, and converging to the reference."""
 
+import csv
+
 import numpy as np
 import pytest
 from pairwise import first_of
@@ -58,3 +60,93 @@ def test_force_and_pressure_converge_with_the_mesh(forma04):
     sizes = np.abs(errors)
     assert (sizes[-1] < [2e-4, 5e-4]).all()
     assert (sizes[-1] < 0.2 * sizes[0]).all()
+
+
+LINES = ("CONT1", "CONT2")
+FIXED = {"a": -2773.5474109439, "c": -2928.74092725}
+CONVERGED = {"a": -2773.57307445, "c": -2928.76786014}
+FORCE_OF_CODE_ASTER = {"a": 664_075.264, "c": 660_238.472}
+MESH_CONVERGED_FORCE, MESH_CONVERGED_PRESSURE = 659_773.142, 2910.4071
+
+
+@pytest.fixture(scope="module")
+def meshes(cases):
+    return {letter: fc.read_mesh(cases / f"forma04{letter}.med") for letter in "abc"}
+
+
+def code_aster_line(folder, letter, group):
+    """Return (node numbers, displacement, stress) of one contact line."""
+    with open(folder / f"forma04{letter}_{group}.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    number = np.array([int(row["node"]) - 1 for row in rows])
+    displacement = np.array([[float(row[f"DEPL:D{k}"]) for k in "XY"] for row in rows])
+    stress = np.array([[float(row[f"SIEF_NOEU:SI{k}"]) for k in ("XX", "YY", "ZZ", "XY")] for row in rows])
+    return number, displacement, stress
+
+
+@pytest.mark.parametrize(("letter", "tolerance"), [("a", 1e-9), ("c", 1e-8)])
+def test_two_geometry_updates_reproduce_code_aster(letter, tolerance, meshes, code_aster, forma04):
+    model = forma04(meshes[letter])
+    last = fc.solve(model, criteria=fc.Criteria(geometry_updates=2))[-1]
+    assert last.stress[model.mesh.point("C1"), 1] == pytest.approx(FIXED[letter], rel=tolerance)
+    for group in LINES:
+        number, displacement, stress = code_aster_line(code_aster, letter, group)
+        assert np.abs(last.displacement[number] - displacement).max() < 1e-9 * np.abs(displacement).max()
+        assert np.abs(last.stress[number] - stress).max() < 1e-9 * np.abs(stress).max()
+
+
+@pytest.mark.parametrize("letter", first_of(1, ["a", "c"]))
+def test_converged_geometry_does_not_depend_on_the_number_of_steps(letter, meshes, forma04):
+    model = forma04(meshes[letter])
+    one, twenty = (fc.solve(model, fc.linear_ramp(n))[-1] for n in (1, 20))
+    point = model.mesh.point("C1")
+    assert twenty.stress[point, 1] == pytest.approx(CONVERGED[letter], rel=1e-8)
+    assert np.linalg.norm(twenty.contact["hertz"].force) == pytest.approx(FORCE_OF_CODE_ASTER[letter], rel=2e-9)
+    assert np.abs(one.displacement - twenty.displacement).max() < 1e-8 * np.abs(twenty.displacement).max()
+    assert np.abs(one.stress - twenty.stress).max() < 1e-8 * np.abs(twenty.stress).max()
+
+
+def smooth_deviation(contact):
+    """Largest distance of the pressures well inside from a smooth fit, relative to the largest pressure.
+
+    The fit is the pressure of a spherical contact with a free edge times an even quartic. The last closed node is not
+    an interior one: the pressure ends within its facets with a vertical tangent.
+    """
+    r, p = contact.coordinates[:, 0], contact.pressure
+    edge = 0.5 * sum(contact.radius)
+    inside = np.flatnonzero(contact.active)[:-1]
+    x = (r[inside] / edge) ** 2
+    basis = np.sqrt(1 - x)[:, None] * np.stack([np.ones_like(x), x, x * x], axis=1)
+    fit = basis @ np.linalg.lstsq(basis, p[inside], rcond=None)[0]
+    return np.abs(fit - p[inside]).max() / p.max()
+
+
+def test_continuous_contact_on_quadratic_triangles(meshes, forma04):
+    model = forma04(meshes["b"], "continuous", integration="gauss")
+    contact = fc.solve(model)[-1].contact["hertz"]
+    pressure = contact.pressure[np.flatnonzero(contact.points == model.mesh.point("C1"))[0]]
+    assert pressure == pytest.approx(2798.3287, rel=0.03)  # the training case's own check
+    assert pressure == pytest.approx(2876.287, rel=0.005)  # code_aster
+    assert np.linalg.norm(contact.force) == pytest.approx(MESH_CONVERGED_FORCE, rel=5e-4)
+    assert smooth_deviation(contact) < 0.02
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize("integration", ["gauss", "simpson", "node"])
+@pytest.mark.parametrize("letter", ["a", "b", "c"])
+def test_no_integration_rule_leaves_a_multiplier_undetermined(integration, letter, meshes, forma04):
+    model = forma04(meshes[letter], "continuous", integration=integration)
+    contact = fc.solve(model, fc.linear_ramp(2))[-1].contact["hertz"]
+    assert np.linalg.norm(contact.force) == pytest.approx(MESH_CONVERGED_FORCE, rel=0.01)
+    assert contact.pressure_max == pytest.approx(MESH_CONVERGED_PRESSURE, rel=0.05)
+    assert np.abs(contact.multiplier).max() < 1.05 * MESH_CONVERGED_PRESSURE
+    assert contact.multiplier.min() > -0.1 * MESH_CONVERGED_PRESSURE
+
+
+def test_von_mises_is_largest_below_the_surface(meshes, forma04):
+    model = forma04(meshes["c"])
+    last = fc.solve(model, fc.linear_ramp(1))[-1]
+    top = int(np.argmax(last.von_mises))
+    assert last.von_mises[top] == pytest.approx(1738.4852, rel=0.01)
+    assert model.mesh.points[top, 0] == pytest.approx(0.0, abs=1e-9)
+    assert abs(model.mesh.points[top, 1]) == pytest.approx(5.645, abs=0.4)

@@ -23,9 +23,7 @@ FIELDS = [("continuous", {}), ("mortar", {"multipliers": "standard"})]
 
 def spheres(element):
     mesh = fc.generate.half_spheres(element, **MESHES[element])
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=2.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
     return model
 
 

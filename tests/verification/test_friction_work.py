@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from stepping import Stepping
 
 import fastcontact as fc
@@ -36,8 +36,7 @@ def pushed_block(dim, formulation, ratio):
     """Press a block on a rigid base, then push it with `ratio` of its limit against weak springs; return the steps."""
     mesh = blocks(dim)
     up, contact = "xyz"[dim - 1], ("CONT_UPPER", "CONT_LOWER") if dim == 2 else ("UPPER_BOTTOM", "LOWER_TOP")
-    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", E=E, nu=0.0)
-    model.fix("LOWER", "xyz"[:dim])
+    model = elastic_model(mesh, "plane_strain" if dim == 2 else "3d", E=E, nu=0.0, LOWER="xyz"[:dim])
     top = mesh.points_of("UPPER_TOP")
     if dim == 3:
         model.fix("UPPER_TOP", "y")
@@ -165,9 +164,7 @@ def test_works_add_up_however_few_the_steps(formulation, penalty):
     for count in (1, 5):
         model = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 9.0), segments=3), "axisymmetric")
         model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-        model.fix("A1A2", "x")
-        model.prescribe("A2B2", y=-2.0)
-        model.prescribe("A1B1", y=2.0)
+        supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": 2.0})
         model.add_contact("c", secondary="CONT1", primary="CONT2", formulation=formulation, penalty=penalty)
         found.append(fc.solve(model, count)[-1].work)
     for told in found:
@@ -248,9 +245,7 @@ def test_work_of_friction_between_bodies_does_not_depend_on_the_number_of_steps(
         model = fc.Model(fc.generate.half_spheres(element, **size), "axisymmetric")
         model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), groups=["SPHHAU"])
         model.add_material(fc.LinearElastic(E=2e6, nu=0.3), groups=["SPHBAS"])
-        model.fix("A1A2", "x")
-        model.prescribe("A2B2", y=-0.5)
-        model.prescribe("A1B1", y=0.5)
+        supported(model, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": 0.5})
         model.add_contact("pair", secondary="CONT1", primary="CONT2", friction=0.05)
         criteria = fc.Criteria(friction_while_touching=fraction)
         works.append(fc.solve(model, n, criteria=criteria)[-1].work["friction_work"])
@@ -308,8 +303,7 @@ def test_nodes_that_face_nothing_do_not_disturb_the_increments_of_a_step():
         points = mesh.points.copy()
         upper = mesh.points_of("UPPER")
         points[upper, 1] += 0.01 * points[upper, 0]  # nodes close one after another
-        model = elastic_model(mesh.replace(points=points), "plane_strain", E=E)
-        model.fix("LOWER_BOTTOM", "xy")
+        model = elastic_model(mesh.replace(points=points), "plane_strain", E=E, LOWER_BOTTOM="xy")
         model.prescribe("UPPER_TOP", x=0.02, y=-0.03)
         model.add_contact("pair", secondary="CONT_LOWER", primary="CONT_UPPER", friction=FRICTION)
         last = fc.solve(model, fc.linear_ramp(2), linear_solver=solver)[-1]

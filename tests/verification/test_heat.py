@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from models import supported
 from pairwise import first_of
 from scipy.optimize import brentq
 
@@ -274,9 +275,7 @@ def test_hot_hertz_contact_passes_conductance_times_force():
     mesh = fc.generate.half_spheres(size=4.0)
     model = fc.Model(mesh, "axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3, expansion=1e-5, conductivity=1e7))
-    model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=-1.0)
-    model.prescribe("A1B1", y=1.0)
+    supported(model, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
     model.fix_temperature("A2B2", 20.0)
     model.fix_temperature("A1B1", 320.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", conductance=lambda p, g: 0.02 * p)
@@ -291,8 +290,7 @@ def test_free_expansion_by_conduction_is_without_stress():
     mesh = fc.generate.block((2.0, 1.0), (4, 2), "quad8")
     model = fc.Model(mesh, "plane_stress", reference_temperature=20.0)
     model.add_material(fc.LinearElastic(E=2e5, nu=0.3, expansion=1e-5, conductivity=40.0))
-    model.fix("LEFT", "x")
-    model.fix("BOTTOM_LEFT", "y")
+    supported(model, LEFT="x", BOTTOM_LEFT="y")
     model.fix_temperature("BLOCK", 120.0)
     step = fc.solve(model, 2)[-1]
     assert step.displacement[:, 0] == pytest.approx(1e-3 * mesh.points[:, 0], abs=1e-14)
@@ -366,8 +364,7 @@ def test_result_files_and_restarts_hold_the_heat(tmp_path):
 def bar(**constants):
     model = fc.Model(fc.generate.block_on_block("quad4"), "plane_strain")
     model.add_material(fc.LinearElastic(E=1.0, nu=0.3, **constants))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.fix("UPPER_TOP", "xy")
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP="xy")
     return model
 
 
@@ -559,8 +556,7 @@ def test_a_layer_conducts_until_it_breaks_and_a_seal_until_a_fluid_opens_it(law,
     mesh = fc.generate.block_on_block(divisions_lower=(4, 2), divisions_upper=(4, 2))
     model = fc.Model(mesh, kinematics="plane_strain")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.0, conductivity=10.0))
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", x=0.0)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0})
     pulled = [(0, 0), (1, 1e-4), (2, 0.1)] if law != "fluid" else [(0, 0), (1, -0.01), (2, -0.01)]
     model.prescribe("UPPER_TOP", y=1.0, ramp=pulled)
     model.fix_temperature("UPPER_TOP", 100.0, ramp=[(0, 1), (2, 1)])

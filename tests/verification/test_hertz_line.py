@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -65,8 +65,7 @@ def test_a_cylinder_driven_by_its_force_on_an_elastic_block(formulation):
     model = fc.Model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(E=bodies["E1"], nu=bodies["nu1"]), "CYLINDER")
     model.add_material(fc.LinearElastic(E=bodies["E2"], nu=bodies["nu2"]), "BLOCK")
-    model.fix("AXIS", "x")
-    model.fix("BLOCK_BOTTOM", "y")
+    supported(model, AXIS="x", BLOCK_BOTTOM="y")
     model.couple("CYLINDER_TOP", "y")
     model.add_force("CYLINDER_TOP", y=-theory.force / 2)
     model.add_contact("hertz", secondary="CONT_CYLINDER", primary="CONT_BLOCK", formulation=formulation)

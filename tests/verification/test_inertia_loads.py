@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from case_texts import of_block
+from models import supported
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
@@ -23,8 +24,7 @@ def test_a_hanging_body_carries_its_weight(kinematics):
     """The mean stress falls linearly from the top; at nu = 0 it is exact everywhere."""
     model = block(kinematics)
     model.materials[0] = (fc.LinearElastic(E, 0.0, density=RHO), None)
-    model.fix("TOP", "y")
-    model.fix("LEFT", "x")
+    supported(model, TOP="y", LEFT="x")
     model.add_gravity(y=-9810.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     volume = np.pi * 2.0**2 * 3.0 if kinematics == "axisymmetric" else 6.0
@@ -58,8 +58,7 @@ def test_a_rotating_disc():
     r, t = mesh.points.T
     model = fc.Model(mesh.replace(points=np.column_stack([r * np.cos(t), r * np.sin(t)])), "plane_stress")
     model.add_material(fc.LinearElastic(E, NU, density=RHO))
-    model.fix("BOTTOM", "y")
-    model.fix("TOP", "x")
+    supported(model, BOTTOM="y", TOP="x")
     model.add_centrifugal(1000.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     radial, hoop = disc(r, 10.0, 50.0, 1000.0)
@@ -71,8 +70,7 @@ def test_a_rotating_disc():
 def test_a_rotating_cylinder_that_cannot_lengthen():
     """In axisymmetry, plane strain along the axis: the disc with E / (1 - nu^2) and nu / (1 - nu)."""
     model = block("axisymmetric", (40.0, 1.0), origin=(10.0, 0.0))
-    model.fix("TOP", "y")
-    model.fix("BOTTOM", "y")
+    supported(model, TOP="y", BOTTOM="y")
     model.add_centrifugal(1000.0)
     step = fc.solve(model, fc.linear_ramp(1))[-1]
     r, nu = model.mesh.points[:, 0], NU / (1 - NU)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from case_texts import of_block
-from models import elastic_model
+from models import elastic_model, supported
 from test_temperature import ALPHA, RISE, E, free, plane, solved
 from two_bodies import rings
 
@@ -127,8 +127,7 @@ def test_a_shrunk_hub_presses_as_lame_says():
         model = fc.Model(mesh, "plane_strain")
         model.add_material(fc.LinearElastic(1000.0, 0.3), "SHAFT")
         model.add_material(fc.LinearElastic(500.0, 0.25), "HUB")
-        model.fix("XAXIS", "y")
-        model.fix("YAXIS", "x")
+        supported(model, XAXIS="y", YAXIS="x")
         model.add_contact("fit", secondary="HUB_INNER", primary="SHAFT_OUTER", formulation="mortar")
         model.add_initial_strain("HUB", **dict.fromkeys(names, strain), axes=axes)
         last = solved(model)

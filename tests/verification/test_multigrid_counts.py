@@ -25,20 +25,14 @@ def blocks(n, formulation="node_to_segment"):
             "HIGH": fc.generate.box((1.0, 1.0, 1.0), (m, m, m), origin=(0.0, 0.0, 1.0), name="HIGH"),
         }.items()
     ]
-    model = elastic_model(fc.generate.union(*parts))
-    model.fix("ZMIN_LOW", "xyz")
-    model.prescribe("ZMAX_HIGH", x=0.0, y=0.0, z=-0.01)
+    model = elastic_model(fc.generate.union(*parts), ZMIN_LOW="xyz", ZMAX_HIGH={"x": 0.0, "y": 0.0, "z": -0.01})
     model.add_contact("c", secondary="ZMIN_HIGH", primary="ZMAX_LOW", formulation=formulation)
     return model
 
 
 def sphere(size, formulation="node_to_segment"):
     mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=size, contact_size=size / 3, contact_radius=0.2)
-    model = elastic_model(mesh)
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("SPHERE_TOP", y=-0.02)
+    model = elastic_model(mesh, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.02})
     model.add_contact("c", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
     return model
 

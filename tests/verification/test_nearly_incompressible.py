@@ -83,9 +83,7 @@ def hertz(element, nu, coarseness):
     mesh = fc.generate.half_spheres(
         element, arc_sizes=(0.2 * coarseness, 2 * coarseness), segments=int(15 / coarseness)
     )
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, nu=nu, A1A2="x")
-    model.prescribe("A2B2", y=-1.0)
-    model.prescribe("A1B1", y=1.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, nu=nu, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")
     contact = solved(model).contact["hertz"]
     return np.array([np.abs(contact.force[1]), contact.pressure.max()])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.contact.configuration import Configuration
@@ -44,8 +44,7 @@ def test_swapped_sides_agree_where_one_curves_away(element):
         points = low.points.copy()
         points[:, 1] -= 0.6 * points[:, 0] ** 2 * points[:, 1]
         model = elastic_model(named(low.replace(points=points), up), "plane_strain", L_LEFT="x", U_LEFT="x")
-        model.fix("L_BOTTOM", "y")
-        model.prescribe("U_TOP", y=-0.04)
+        supported(model, L_BOTTOM="y", U_TOP={"y": -0.04})
         model.add_contact("pair", secondary=sides[0], primary=sides[1], formulation="mortar")
         force.append(abs(fc.solve(model, fc.linear_ramp(1))[-1].contact["pair"].force[1]))
     assert force[0] == pytest.approx(force[1], rel=0.01)
@@ -96,8 +95,7 @@ def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
     model = elastic_model(mesh, "axisymmetric")
     for group in ("LOWER_LEFT", "UPPER_LEFT"):
         model.fix(group, "x")
-    model.fix("LOWER_BOTTOM", "xy")
-    model.prescribe("UPPER_TOP", y=-0.2)
+    supported(model, LOWER_BOTTOM="xy", UPPER_TOP={"y": -0.2})
     options = {"friction": 0.3} if kind == "friction" else {"kind": kind}
     model.add_contact(
         "pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="continuous", integration="node", **options
@@ -111,8 +109,7 @@ def test_contact_at_the_nodes_holds_the_node_on_the_axis(element, kind):
 
 def test_fewer_points_than_a_parabola_has_nodes_leave_a_line():
     mesh = fc.generate.block_on_block("quad8", divisions_lower=(3, 2), divisions_upper=(3, 2))
-    model = elastic_model(mesh, "plane_strain", nu=0.0, LOWER_BOTTOM="xy")
-    model.prescribe("UPPER_TOP", x=0.0, y=-0.02)
+    model = elastic_model(mesh, "plane_strain", nu=0.0, LOWER_BOTTOM="xy", UPPER_TOP={"x": 0.0, "y": -0.02})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation="mortar", n_gauss=2)
     pair = model.bind(model.contact[0])
     part = pair.unilateral(Configuration.undeformed(mesh.points))

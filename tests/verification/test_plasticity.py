@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from models import supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -90,8 +91,7 @@ def test_a_tube_yields_from_inside(element: str, count: int, bound: float) -> No
     model = fc.Model(mesh, "axisymmetric")
     # Elastically incompressible: then sigma_zz is the mean of the others, as Hill's solution takes it.
     model.add_material(fc.ElasticPlastic(E=1000.0, nu=0.4999, yield_stress=Y))
-    model.fix("BOTTOM", "y")
-    model.fix("TOP", "y")
+    supported(model, BOTTOM="y", TOP="y")
     model.add_pressure("LEFT", 2.0 * k * np.log(radius / inner) + at_front)
     steps = fc.solve(model, [0.5, 0.8, 0.9, 1.0])
     r, stress = mesh.points[:, 0], steps[-1].stress
@@ -159,8 +159,7 @@ def flattened(instants: list[float], size: float):
     mesh = fc.generate.quarter_disc("tri6", R=R, contact_size=size, contact_radius=0.05)
     model = fc.Model(mesh, "axisymmetric")
     model.add_material(fc.ElasticPlastic(E=modulus, nu=ratio, yield_stress=limit))
-    model.fix("A1B1", "y")
-    model.fix("A1A2", "x")
+    supported(model, A1B1="y", A1A2="x")
     flat = fc.obstacles.HalfSpace(point=(0.0, mesh.points[:, 1].max()), normal=(0.0, -1.0))
     model.add_obstacle("flat", secondary="CONT1", obstacle=flat, motion={"y": -at_yield})
     unit = 2.0 / 3.0 * hardness * np.pi * at_yield * R

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from two_bodies import rings
 
 import fastcontact as fc
@@ -26,8 +26,7 @@ def quarter(element, shaft, hub, formulation, swap=False, overlap=0.0, **options
     model = fc.Model(mesh, "plane_strain")
     model.add_material(SHAFT, "SHAFT")
     model.add_material(HUB, "HUB")
-    model.fix("XAXIS", "y")
-    model.fix("YAXIS", "x")
+    supported(model, XAXIS="y", YAXIS="x")
     sides = ("SHAFT_OUTER", "HUB_INNER") if swap else ("HUB_INNER", "SHAFT_OUTER")
     model.add_contact("fit", secondary=sides[0], primary=sides[1], formulation=formulation, **options)
     return model, fc.solve(model, fc.linear_ramp(1))[-1]

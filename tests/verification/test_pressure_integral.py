@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 from pairwise import first_of
 from two_bodies import blocks, boxes, held, touching
 
@@ -202,8 +202,7 @@ def test_barely_covered_faces_have_no_wild_pressure(element, multipliers, carrie
         model = elastic_model(united(L_=low, U_=up), "3d", nu=0.0)
         for group in ("L_YMIN", "L_YMAX", "U_YMIN", "U_YMAX"):
             model.fix(group, "y")
-        model.fix("L_ZMIN", "xz")
-        model.prescribe("U_ZMAX", x=0.0, z=-0.01)
+        supported(model, L_ZMIN="xz", U_ZMAX={"x": 0.0, "z": -0.01})
         steps = solved(touching(model, "mortar", swap=True, multipliers=multipliers))
         check(steps, carried)
         largest.append(steps[-1].contact["pair"].pressure_max)

@@ -14,8 +14,7 @@ FORCE, PRESSURE, RADIUS = 659_773.142, 2910.4071, 10.358557
 
 
 def half_sphere_on_plane(mesh, formulation, **options):
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A1B1", y=2.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
     plane = obstacles.HalfSpace((0.0, 0.0), (0.0, -1.0))
     model.add_obstacle("plane", secondary="CONT1", obstacle=plane, formulation=formulation, **options)
     return model

@@ -7,7 +7,7 @@ of the mesh; Hertz's powers of the force to 7 %.
 from __future__ import annotations
 
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -47,8 +47,7 @@ def test_the_press_fit_of_lame():
     model = fc.Model(mesh, kinematics="plane_stress")
     model.add_material(fc.LinearElastic(E=2e5, nu=0.3), "INNER")
     model.add_material(fc.LinearElastic(E=7e4, nu=0.25), "OUTER")
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
     # So small that the radius at which the parts meet stays the same, as in the formula.
     model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", clearance=-1e-4)
     step = fc.solve(model, 1, criteria=TIGHT)[-1]
@@ -73,8 +72,7 @@ def ball_on_plane(force: float, size: float) -> fc.Model:
     model = fc.Model(mesh, kinematics="axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
-    model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=0.0)
+    supported(model, A1A2="x", A2B2={"y": 0.0})
     model.add_pressure("A1B1", force)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2")
     return model
@@ -102,10 +100,7 @@ def test_prescribed_displacements_scale_forces_with_moduli():
     model = fc.Model(mesh, kinematics="3d")
     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3), "SPHERE")
     model.add_material(fc.LinearElastic(E=3000.0, nu=0.2), "BLOCK")
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("SPHERE_TOP", y=-0.3)
+    supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.3})
     model.add_contact("c", secondary="CONT_SPHERE", primary="CONT_BLOCK")
     step = fc.solve(model, 1, criteria=TIGHT)[-1]
     for quantity in (("contact_force", "c", "y"), ("pressure_max", "c"), ("reaction", "SPHERE_TOP", "y")):

@@ -4,17 +4,14 @@ The stick zone is that of solutions by boundary elements in which shear changes 
 literature, which leaves that out, is up to half as large again.
 """
 
-import json
-from pathlib import Path
-
 import numpy as np
 import pytest
 from graded import graded_block, lines
-from models import elastic_model
+from models import elastic_model, reference
 
 import fastcontact as fc
 
-REFERENCE = json.loads((Path(__file__).parents[2] / "data/reference/punch_2d.json").read_text())["stick"]
+REFERENCE = reference("punch_2d")["stick"]
 E, DEPTH = 1000.0, 1e-3
 EXTENT = 1000.0  # of the body: its far sides are felt as 1 / EXTENT
 

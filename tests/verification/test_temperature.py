@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from case_texts import of_block
+from models import supported
 from two_bodies import rings
 
 import fastcontact as fc
@@ -28,8 +29,7 @@ def free(mesh, kinematics, material):
     if kinematics == "axisymmetric":
         model.fix("A", "y")
         return model
-    model.fix("A", "xyz"[: mesh.dim])
-    model.fix("B", "yz"[: mesh.dim - 1])
+    supported(model, A="xyz"[: mesh.dim], B="yz"[: mesh.dim - 1])
     if mesh.dim == 3:
         model.fix("C", "z")
     return model
@@ -120,8 +120,7 @@ def test_a_heated_shaft_in_a_hub():
     model = fc.Model(mesh, "plane_strain")
     model.add_material(fc.LinearElastic(1000.0, 0.3, expansion=ALPHA), "SHAFT")
     model.add_material(fc.LinearElastic(500.0, 0.25, expansion=ALPHA), "HUB")
-    model.fix("XAXIS", "y")
-    model.fix("YAXIS", "x")
+    supported(model, XAXIS="y", YAXIS="x")
     model.add_contact("fit", secondary="HUB_INNER", primary="SHAFT_OUTER", formulation="mortar")
     model.add_temperature(RISE, "SHAFT")
     last = solved(model)

@@ -1,7 +1,7 @@
 """Pairs of small bodies for tests of contact options: blocks, boxes, rings."""
 
 import numpy as np
-from models import elastic_model, united
+from models import elastic_model, supported, united
 
 import fastcontact as fc
 from fastcontact.mesh.generate import block, box, renamed, union
@@ -31,13 +31,11 @@ def held(mesh, kinematics="plane_strain", approach=0.02):
         for side in "LU":
             model.fix(f"{side}_XMIN", "x")
             model.fix(f"{side}_YMIN", "y")
-        model.fix("L_ZMIN", "z")
-        model.prescribe("U_ZMAX", z=-approach)
+        supported(model, L_ZMIN="z", U_ZMAX={"z": -approach})
     else:
         for side in ("LOWER", "UPPER"):
             model.fix(f"{side}_LEFT", "x")
-        model.fix("LOWER_BOTTOM", "y")
-        model.prescribe("UPPER_TOP", y=-approach)
+        supported(model, LOWER_BOTTOM="y", UPPER_TOP={"y": -approach})
     return model
 
 

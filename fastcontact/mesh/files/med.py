@@ -328,7 +328,10 @@ def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Arra
     or cell.
     """
     with opened(path) as file:
-        group, name, mesh = _field_and_mesh(file, path, field)
+        check_known("field", field, list(file["CHA"]) if "CHA" in file else [], FileError, f"'{path}': ")
+        group = file["CHA"][field]
+        name = decoded(bytes(attribute(group, "MAI")))
+        mesh = file.get(f"ENS_MAA/{name}")
         if mesh is None and not at_points:
             raise FileError(f"field '{field}' of '{path}' is on the mesh '{name}', which is in another file")
         instants = sorted((e for e in group.values() if "PDT" in e.attrs and _supports(e, at_points)), key=_order)
@@ -363,14 +366,6 @@ def _middles(path: PathLike, field: str, step: Any, points: Array, support: str)
     if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)):
         raise FileError(f"a cell of '{path}' refers to a missing point: write the file anew")
     return np.asarray(points[nodes].mean(axis=1))
-
-
-def _field_and_mesh(file: Any, path: PathLike, field: str) -> tuple[Any, str, Any]:
-    """Return the group of a field, the name of its mesh, and the group of the mesh, None if it is in another file."""
-    names = list(file["CHA"]) if "CHA" in file else []
-    check_known("field", field, names, FileError, f"'{path}': ")
-    name = decoded(bytes(attribute(file["CHA"][field], "MAI")))
-    return file["CHA"][field], name, file.get(f"ENS_MAA/{name}")
 
 
 def _read_instant(file: Any, support: Any, n_values: int, n_components: int) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +14,7 @@ from fastcontact._tools.hdf5 import check_size, opened, values
 from fastcontact._tools.neighbours import nearest
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
-from fastcontact.errors import FastcontactError, FileError, MeshError, check_known, unknown
+from fastcontact.errors import FastcontactError, FileError, MeshError, ModelError, check_known, unknown
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.mesh import Mesh
 
@@ -80,7 +81,9 @@ def read_field(
     row = 0 if instant is None else row_of(instant, of_file.times, name)
     if over == "cells":
         middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
-        return at_cells(of_file, middles, mesh, name)[row][:, None]
+        numbers = np.arange(len(middles))
+        rows, _ = _nearest(of_file, middles, numbers, mesh, ("cell", "cells"), name)
+        return _known(of_file.values[:, rows], middles, numbers, "cell", name)[row][:, None]
     wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
     values = at_points_of(of_file, mesh, wanted, name)[row]
     return np.where(np.isfinite(values), values, values[wanted].mean())
@@ -109,15 +112,6 @@ def row_of(instant: float, times: Array | None, name: str, error: type[Fastconta
         among = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
         raise error(f"{name} has no instant {instant:g}, {among}")
     return row
-
-
-def at_cells(field: FileField, middles: Array, mesh: Mesh, name: str) -> Array:
-    """Return the values (n_instants, n_cells) of a field at cells of a mesh, by their `middles` (n_cells, dim) [length].
-
-    Raises MeshError, with the `name` of the field, if a cell has no value, or the file has no cell at its position.
-    """
-    rows, _ = _nearest(field, middles, np.arange(len(middles)), mesh, ("cell", "cells"), name)
-    return _known(field.values[:, rows], middles, np.arange(len(middles)), "cell", name)
 
 
 def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Array:
@@ -236,6 +230,38 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
     if not len(field):
         raise FileError(f"field '{name}' of '{path}' has no instant")
     return FileField(times, np.asarray(field, np.float64).reshape(field.shape[:2]), places)
+
+
+def read_temperatures(
+    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, wanted: Indices, instant: float | None
+) -> tuple[Array, Array | None]:
+    """Return a field (n_instants, n_points) at the `wanted` (k,) of int points, elsewhere NaN, and its times (n_instants,).
+
+    Temperatures are in the unit of the file [temperature], times are load factors [-] or None.
+
+    Raises
+    ------
+    FileError, MeshError, ModelError
+        If a file cannot be read or lacks the field, a wanted point has no value, or there is no such instant.
+    """
+    files = [file] if isinstance(file, (str, os.PathLike)) else list(file)
+    if not files:
+        raise ModelError("no file is given for the temperature")
+    fields, times = [], []
+    for path in files:
+        field_of_file = read_file_field(path, field, "points")
+        values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
+        if len(files) > 1 and len(values) > 1:
+            raise ModelError(
+                f"'{path}' has {len(values)} instants: each of several files must have one, or give a single file"
+            )
+        fields.append(values)
+        times.append(field_of_file.times)
+    values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
+    if instant is None:
+        return values, time
+    row = row_of(instant, time, f"field '{field}' of '{files[0]}'", ModelError)
+    return values[row : row + 1], None
 
 
 def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:

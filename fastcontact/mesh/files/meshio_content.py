@@ -178,11 +178,7 @@ def merged(blocks: Iterable[Block]) -> list[Block]:
 
 def without_duplicates(block: Block) -> Block:
     """Return the block with duplicate cells, and their groups, merged."""
-    if not len(block.nodes):
-        return block
     _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
-    if len(first) == len(block.nodes):
-        return block
     unique = np.sort(first)
     position = np.searchsorted(unique, first)[inverse.reshape(-1)]
     groups = {name: np.unique(position[rows]) for name, rows in block.groups.items()}

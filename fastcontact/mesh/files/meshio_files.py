@@ -244,9 +244,7 @@ def _with_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
 
 
 def _flags(members: AnyArray, count: int) -> Numbers:
-    flags = np.zeros(count, np.int32)
-    flags[members] = 1
-    return flags
+    return np.bincount(members, minlength=count).astype(np.int32)
 
 
 def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:

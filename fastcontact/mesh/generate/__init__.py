@@ -15,10 +15,9 @@ from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.generate.cut import cut
 from fastcontact.mesh.generate.forest import Forest
 from fastcontact.mesh.generate.half_planes import crowned_blocks, graded_block, punched_block
-from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc
+from fastcontact.mesh.generate.half_spheres import half_spheres, quarter_disc, rings
 from fastcontact.mesh.generate.quadratic import Circle, to_quadratic
 from fastcontact.mesh.generate.refine import circles, linearised, refined
-from fastcontact.mesh.generate.rings import rings
 from fastcontact.mesh.generate.sphere import sphere_octant, sphere_on_block
 from fastcontact.mesh.generate.transform import (
     merge_points,

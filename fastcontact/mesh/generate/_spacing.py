@@ -1,22 +1,23 @@
-"""Positions of nodes on straight lines and arcs with equal segments, geometric segments, or segments by a size function."""
+"""Positions of nodes on lines and arcs with segments of given or varying size, and structured blocks between four sides."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fastcontact.arrays import Array
-from fastcontact.mesh.generate._check import segments
+from fastcontact.arrays import Array, Indices
+from fastcontact.mesh.generate._check import affordable, segments
+from fastcontact.mesh.mesh import Mesh
 
 Curve = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
 class Spacing:
-    """Desired edge length as a function of the distance from a pole.
+    """Desired edge length as a function of the distance from the pole, which is the origin.
 
     The length is `near` within `plateau` of the pole, then grows linearly to `far` at `reach`, and stays there.
 
@@ -24,15 +25,12 @@ class Spacing:
     ----------
     near, far : float
         Edge lengths at the pole and far from it [length].
-    pole : (float, float)
-        Coordinates of the pole [length].
     plateau, reach : float
         Distances from the pole between which the edge length grows [length].
     """
 
     near: float
     far: float
-    pole: tuple[float, float] = (0.0, 0.0)
     plateau: float = 0.0
     reach: float = 1.0
 
@@ -48,7 +46,7 @@ class Spacing:
 
     def __call__(self, points: Array) -> Array:
         """Return the desired edge length (n,) [length] at `points` (n, 2) [length]."""
-        return self.at_distance(np.hypot(points[:, 0] - self.pole[0], points[:, 1] - self.pole[1]))
+        return self.at_distance(np.hypot(points[:, 0], points[:, 1]))
 
 
 def segments_for(length: float, size: float) -> int:
@@ -114,3 +112,54 @@ def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> A
 def arc(centre: Sequence[float], radius: float, angles: Array) -> Array:
     """Return points (n, 2) [length] of a circle at `angles` (n,) [radian] from its topmost point, clockwise."""
     return np.asarray(centre, float) + radius * np.column_stack([np.sin(angles), np.cos(angles)])
+
+
+SIDES = ("BOTTOM", "RIGHT", "TOP", "LEFT")
+
+
+def rectangular(x: Array, y: Array) -> Array:
+    """Return the grid (n + 1, m + 1, 2) [length] of the coordinates `x` (n + 1,) [length] and `y` (m + 1,) [length]."""
+    affordable(len(x) * len(y))
+    return np.stack(np.meshgrid(x, y, indexing="ij"), axis=2)
+
+
+def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
+    """Return the grid (n + 1, m + 1, 2) [length] between four sides by bilinear blending; it has exactly their nodes.
+
+    It is the bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The
+    sides are `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length], with the relative abscissae `u` (n + 1,) [-] of
+    their nodes from 0 to 1, and `right` (m + 1, 2) [length] and `left` (m + 1, 2) [length], with `v` (m + 1,) [-].
+    """
+    affordable(len(u) * len(v))
+    U, V = u[:, None, None], v[None, :, None]
+    between_rows = (1 - V) * bottom[:, None] + V * top[:, None]
+    between_columns = (1 - U) * left[None] + U * right[None]
+    corners = (1 - U) * ((1 - V) * bottom[0] + V * top[0]) + U * ((1 - V) * bottom[-1] + V * top[-1])
+    grid = between_rows + between_columns - corners
+    grid[:, 0], grid[:, -1], grid[0], grid[-1] = bottom, top, left, right
+    return grid
+
+
+def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
+    """Return the linear mesh of a grid, its cells in the group `solid`.
+
+    The `grid` (n + 1, m + 1, 2) [length] is right-handed: the first index runs to the right, the second up. `sides` maps
+    BOTTOM, RIGHT, TOP, LEFT to names of groups of lines; with `triangles`, each quadrangle is divided in two along
+    alternating diagonals.
+    """
+    n, m = grid.shape[0] - 1, grid.shape[1] - 1
+    numbers = np.arange((n + 1) * (m + 1)).reshape(n + 1, m + 1)
+    quads = np.stack([numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]], axis=2)
+    name, block = ("tri3", _cut(quads)) if triangles else ("quad4", quads.reshape(-1, 4))
+    nodes = {"BOTTOM": numbers[:, 0], "RIGHT": numbers[-1], "TOP": numbers[::-1, -1], "LEFT": numbers[0, ::-1]}
+    lines = {side: np.column_stack([nodes[side][:-1], nodes[side][1:]]) for side in sides}
+    mesh = Mesh(grid.reshape(-1, 2), {name: block}, {solid: np.arange(len(block))})
+    return mesh.with_facets({group: {"line2": lines[side]} for side, group in sides.items()})
+
+
+def _cut(quads: Indices) -> Indices:
+    """Return the triangles (2 n m, 3) into which diagonals divide quadrangles (n, m, 4), alternating like a chessboard."""
+    i, j = np.indices(quads.shape[:2])
+    rising = quads[..., [[0, 1, 2], [0, 2, 3]]]
+    falling = quads[..., [[0, 1, 3], [1, 2, 3]]]
+    return np.where(((i + j) % 2 == 0)[..., None, None], rising, falling).reshape(-1, 3)

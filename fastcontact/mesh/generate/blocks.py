@@ -10,9 +10,17 @@ import numpy as np
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
 from fastcontact.errors import MeshError
-from fastcontact.mesh.generate._blocks import SIDES, rectangular, structured
 from fastcontact.mesh.generate._check import FACES, TRIANGLES, count, each, number, one_of, positive, within
-from fastcontact.mesh.generate._spacing import Spacing, divided, geometric, segments_for, straight
+from fastcontact.mesh.generate._spacing import (
+    SIDES,
+    Spacing,
+    divided,
+    geometric,
+    rectangular,
+    segments_for,
+    straight,
+    structured,
+)
 from fastcontact.mesh.generate._triangulate import filled
 from fastcontact.mesh.generate.half_spheres import quarter_disc
 from fastcontact.mesh.generate.quadratic import in_element

@@ -12,8 +12,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.companion_groups import OPPOSITE
-from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.mesh import OPPOSITE, Mesh
 
 Facet = frozenset[int]
 

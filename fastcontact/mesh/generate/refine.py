@@ -159,13 +159,6 @@ def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
     return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
 
 
-def _edge_nodes(name: str) -> list[list[int]]:
-    """Return the local node numbers of each edge of an element, the two corners first."""
-    element = elements.get(name)
-    middle = [[element.n_corners + k] if element.order == 2 else [] for k in range(len(element.edges))]
-    return [[*edge, *middle[k]] for k, edge in enumerate(element.edges)]
-
-
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
     """Return the facets in the group of a curve whose nodes all lie on the curve, as one array for each element type."""
     facets = [block[all_on(mesh, curve, block)] for block in facets_of(mesh, curve).values()]
@@ -203,8 +196,10 @@ def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
         inside[members] = True
         joining = [members]
         for name, point, cells, rows in new.sources if len(members) > 1 else ():
-            edge, block = _pattern(name).on_edge[point], mesh.cells[name][cells]
-            nodes = block[:, _edge_nodes(name)[edge]] if edge >= 0 else block
+            edge, nodes, element = _pattern(name).on_edge[point], mesh.cells[name][cells], elements.get(name)
+            if edge >= 0:
+                middle = [element.n_corners + edge] if element.order == 2 else []
+                nodes = nodes[:, [*element.edges[edge], *middle]]
             joining.append(rows[inside[nodes].all(axis=1)])
         groups[group] = np.concatenate(joining)
     return groups

@@ -14,9 +14,8 @@ from fastcontact._tools.neighbours import close_pairs
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
-from fastcontact.mesh.companion_groups import ROTATION
 from fastcontact.mesh.generate._check import number, one_of
-from fastcontact.mesh.mesh import Mesh, starts_of
+from fastcontact.mesh.mesh import ROTATION, Mesh, starts_of
 
 Groups = dict[str, AnyArray]
 Names = Mapping[str, str | None] | Callable[[str], str | None]

@@ -293,13 +293,6 @@ class ModelBase:
         self._check_all_have_material(numbers)
         return numbers
 
-    def averaged_materials(self) -> Mask:
-        """Return for each matrix of moduli (n_moduli,) whether its cells have a mean dilatation.
-
-        In plane stress no cell has a mean dilatation, because elements do not lock there.
-        """
-        return self.material_field().averaged
-
     def _check_material(self, index: int, group: str | None, numbers: Numbers) -> None:
         """Raise ModelError if cells already have a different material, unless that one was assigned to all cells."""
         new = self.materials[index][0]

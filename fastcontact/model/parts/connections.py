@@ -191,12 +191,10 @@ class ModelConnections(ModelInitialStates):
         first: str,
         second: str,
         *,
-        x: float = 0.0,
-        y: float = 0.0,
-        z: float = 0.0,
         free: str = "",
         translation: Sequence[float] | None = None,
         ramp: History = None,
+        **components: float,
     ) -> None:
         """Model one period of a periodic structure, whose two ends have equal displacements up to a uniform difference.
 
@@ -208,9 +206,6 @@ class ModelConnections(ModelInitialStates):
         ----------
         first, second : str
             Groups of the two ends, whose nodes coincide after a translation.
-        x, y, z : float
-            Displacement of the second end relative to the first one at multiplier 1, that is the mean strain times the
-            length of the period [length].
         free : str
             Components, such as ``"x"`` or ``"xy"``, in which the uniform relative displacement of the ends is unknown and
             results from the loads.
@@ -218,6 +213,9 @@ class ModelConnections(ModelInitialStates):
             Vector from the first end to the second one; by default it joins the centres of their bounding boxes [length].
         ramp : Ramp or iterable of (float, float), optional
             History of x, y and z; by default that of the analysis.
+        **components : float
+            Displacement ``x``, ``y`` and ``z`` of the second end relative to the first one at multiplier 1, that is the mean
+            strain times the length of the period, by default zero [length].
 
         Raises
         ------
@@ -234,10 +232,10 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_periodicity("LEFT", "RIGHT", x=0.001)
         """
         name = f"the periodicity of '{first}' and '{second}'"
-        components = {key: value for key, value in {"x": x, "y": y, "z": z}.items() if value != 0.0}
-        for key, value in components.items():
+        given = {key: value for key, value in components.items() if value != 0.0}
+        for key, value in given.items():
             check_number(f"{key} of {name}", value)
-        jump: Any = axes_of(name, components, self.mesh.dim) if components else {}
+        jump: Any = axes_of(name, given, self.mesh.dim) if given else {}
         loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
         if any(axis in jump for axis in loose):
             raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
@@ -410,13 +408,11 @@ class ModelConnections(ModelInitialStates):
         group: str | int,
         to: str | int | None = None,
         *,
-        x: float | None = None,
-        y: float | None = None,
-        z: float | None = None,
         axial: float | None = None,
         transverse: float | None = None,
         direction: Sequence[float] | None = None,
         translation: Sequence[float] | None = None,
+        **components: float | None,
     ) -> None:
         """Connect the nodes of a group by springs to the ground or to other nodes.
 
@@ -428,8 +424,6 @@ class ModelConnections(ModelInitialStates):
             Name of a group or number of a point; without it the springs are fixed to the ground. Each node of `group` is
             connected to the node of this group with which it coincides after `translation`. If one of the two groups has a
             single node, this node is connected to all nodes of the other group.
-        x, y, z : float
-            Stiffness of each spring along the axes [force / length]; in axisymmetry integrated over the full circle.
         axial, transverse : float
             Stiffness of each spring along the line between its two nodes, and along every direction normal to this line
             [force / length]. The line keeps its direction in the reference configuration.
@@ -438,6 +432,9 @@ class ModelConnections(ModelInitialStates):
         translation : sequence of float (dim,), optional
             Vector that maps the first group onto the second; by default it joins the centres of their bounding boxes
             [length].
+        **components : float
+            Stiffness ``x``, ``y`` and ``z`` of each spring along the axes [force / length]; in axisymmetry integrated over
+            the full circle.
 
         Raises
         ------
@@ -452,11 +449,10 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_spring("TOP_LEFT", "BOTTOM_RIGHT", axial=50.0)
         """
         name = f"the spring on '{group}'" if to is None else f"the spring between '{group}' and '{to}'"
-        components = {"x": x, "y": y, "z": z}
         stiffness = {"axial": axial, "transverse": transverse}
         along = {key: value for key, value in stiffness.items() if value is not None}
         vector = self._direction(name, along, to is not None, direction)
-        axes = {} if along and set(components.values()) == {None} else axes_of(name, components, self.mesh.dim)
+        axes = {} if along and {*components.values()} <= {None} else axes_of(name, components, self.mesh.dim)
         for value in [*axes.values(), *along.values()]:
             check_number(f"the stiffness of {name}", value)
             if not value > 0:

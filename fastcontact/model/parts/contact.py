@@ -26,9 +26,8 @@ from fastcontact.contact.side_checks import check_obstacle, check_sides
 from fastcontact.contact.surface import Surface, surface
 from fastcontact.elasticity.loads import Value, axes_of, check_number
 from fastcontact.errors import ContactError, ModelError, check_known
-from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method
+from fastcontact.model.contact_pair import ContactPair, Driving, FluidPressure, method, rotation_of
 from fastcontact.model.force_driven_obstacles import ForceDrivenObstacles
-from fastcontact.model.obstacle_rotation import rotation_of
 from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions, pair_options
 from fastcontact.model.parts.connections import ModelConnections
 from fastcontact.model.periodicity import same_place

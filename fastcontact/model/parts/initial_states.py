@@ -133,7 +133,7 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_temperature_file("furnace.med", "TEMP", reference=20.0)  # doctest: +SKIP
         """
-        from fastcontact.model.temperature_files import read_temperatures
+        from fastcontact.mesh.files.mesh_fields import read_temperatures
 
         names = self._solid_groups(groups, ": it has no temperature")
         reference = self.reference_temperature if reference is None else reference
@@ -155,14 +155,9 @@ class ModelInitialStates(ModelLoads):
         self,
         groups: Sequence[str] | str | None = None,
         *,
-        xx: Constant | None = None,
-        yy: Constant | None = None,
-        zz: Constant | None = None,
-        xy: Constant | None = None,
-        yz: Constant | None = None,
-        xz: Constant | None = None,
         axes: Axes = None,
         ramp: History = None,
+        **components: Constant | None,
     ) -> None:
         """Prescribe an initial stress in groups of solid cells.
 
@@ -173,14 +168,14 @@ class ModelInitialStates(ModelLoads):
         ----------
         groups : str or sequence of str, optional
             Groups of solid cells; by default all solid cells.
-        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
-            Components of the stress at multiplier 1, by default zero: numbers, functions of position or arrays, as
-            described for the parameter E of `LinearElastic` [pressure].
         axes : sequence or callable, optional
             Axes of the components: unit vectors in rows (3, 3) [-], or a function of position, as described for
             `Orthotropic`; by default the axes of the mesh.
         ramp : Ramp or iterable of (float, float), optional
             History of the stress; by default the full stress acts from the first step on.
+        **components : float, callable or ndarray (n,)
+            Components ``xx``, ``yy``, ``zz``, ``xy``, ``yz`` and ``xz`` of the stress at multiplier 1, by default zero:
+            numbers, functions of position or arrays, as described for the parameter E of `LinearElastic` [pressure].
 
         Raises
         ------
@@ -193,21 +188,15 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_stress(xx=lambda points: 100.0 * (1.0 - 2.0 * points[:, 1]))
         """
-        components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("stress", groups, components, axes, ramp)
 
     def add_initial_strain(
         self,
         groups: Sequence[str] | str | None = None,
         *,
-        xx: Constant | None = None,
-        yy: Constant | None = None,
-        zz: Constant | None = None,
-        xy: Constant | None = None,
-        yz: Constant | None = None,
-        xz: Constant | None = None,
         axes: Axes = None,
         ramp: History = None,
+        **components: Constant | None,
     ) -> None:
         """Prescribe a stress-free strain, for example shrinkage, swelling or misfit, in groups of solid cells.
 
@@ -215,15 +204,15 @@ class ModelInitialStates(ModelLoads):
         ----------
         groups : str or sequence of str, optional
             Groups of solid cells; by default all solid cells.
-        xx, yy, zz, xy, yz, xz : float, callable or ndarray (n,), optional
-            Components of the strain at multiplier 1, by default zero: numbers, functions of position or arrays, as
-            described for the parameter E of `LinearElastic`. The components xy, yz and xz are engineering shear strains,
-            which are twice the components of the strain tensor [-].
         axes : sequence or callable, optional
             Axes of the components: unit vectors in rows (3, 3) [-], or a function of position, as described for
             `Orthotropic`; by default the axes of the mesh.
         ramp : Ramp or iterable of (float, float), optional
             History of the strain; by default the full strain acts from the first step on.
+        **components : float, callable or ndarray (n,)
+            Components ``xx``, ``yy``, ``zz``, ``xy``, ``yz`` and ``xz`` of the strain at multiplier 1, by default zero:
+            numbers, functions of position or arrays, as described for the parameter E of `LinearElastic`. The components xy,
+            yz and xz are engineering shear strains, which are twice the components of the strain tensor [-].
 
         Raises
         ------
@@ -236,7 +225,6 @@ class ModelInitialStates(ModelLoads):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_initial_strain("BLOCK", xx=-0.002, yy=-0.002, zz=-0.002)  # shrinkage
         """
-        components = {"xx": xx, "yy": yy, "zz": zz, "xy": xy, "yz": yz, "xz": xz}
         self._add_initial("strain", groups, components, axes, ramp)
 
     def _add_initial(

@@ -57,25 +57,17 @@ class ModelLoads(ModelHeat):
         """
         self._add(Pressure(group, value, table_of(ramp, f"the ramp of the pressure on '{group}'")))
 
-    def add_traction(
-        self,
-        group: str,
-        *,
-        x: Value | None = None,
-        y: Value | None = None,
-        z: Value | None = None,
-        ramp: History = None,
-    ) -> None:
+    def add_traction(self, group: str, *, ramp: History = None, **components: Value | None) -> None:
         """Apply a traction, that is a force per unit reference area, to a group of facets.
 
         Parameters
         ----------
         group : str
-        x, y, z : float or callable
-            Components of the traction at multiplier 1: numbers, or functions from reference positions (n, dim) [length] to
-            tractions (n,) [pressure].
         ramp : Ramp or iterable of (float, float), optional
             History of the traction; by default that of the analysis.
+        **components : float or callable
+            Components ``x``, ``y`` and ``z`` of the traction at multiplier 1: numbers, or functions from reference positions
+            (n, dim) [length] to tractions (n,) [pressure].
 
         Examples
         --------
@@ -83,17 +75,11 @@ class ModelLoads(ModelHeat):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_traction("TOP", x=1.0, y=-5.0)
         """
-        axes = axes_of(f"the traction on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        axes = axes_of(f"the traction on '{group}'", components, self.mesh.dim)
         self._add(Traction(group, axes, table_of(ramp, f"the ramp of the traction on '{group}'")))
 
     def add_body_force(
-        self,
-        groups: Sequence[str] | str | None = None,
-        *,
-        x: Value | None = None,
-        y: Value | None = None,
-        z: Value | None = None,
-        ramp: History = None,
+        self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: Value | None
     ) -> None:
         """Apply a body force to groups of solid cells.
 
@@ -101,11 +87,11 @@ class ModelLoads(ModelHeat):
         ----------
         groups : str or sequence of str, optional
             Groups of solid cells; by default all solid cells.
-        x, y, z : float or callable
-            Components of the force per unit volume at multiplier 1: numbers, or functions from reference positions (n, dim)
-            [length] to numbers (n,) [force / length^3].
         ramp : Ramp or iterable of (float, float), optional
             History of the force; by default that of the analysis.
+        **components : float or callable
+            Components ``x``, ``y`` and ``z`` of the force per unit volume at multiplier 1: numbers, or functions from
+            reference positions (n, dim) [length] to numbers (n,) [force / length^3].
 
         Examples
         --------
@@ -115,17 +101,11 @@ class ModelLoads(ModelHeat):
         >>> model.add_body_force("BLOCK", x=lambda points: 1e-6 * points[:, 0])
         """
         names = group_names(groups)
-        axes = axes_of("the body force", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        axes = axes_of("the body force", components, self.mesh.dim)
         self._add(BodyForce(names, axes, table_of(ramp, "the ramp of the body force")))
 
     def add_gravity(
-        self,
-        groups: Sequence[str] | str | None = None,
-        *,
-        x: float | None = None,
-        y: float | None = None,
-        z: float | None = None,
-        ramp: History = None,
+        self, groups: Sequence[str] | str | None = None, *, ramp: History = None, **components: float | None
     ) -> None:
         """Apply the weight of groups of solid cells, from the densities of their materials.
 
@@ -133,11 +113,11 @@ class ModelLoads(ModelHeat):
         ----------
         groups : str or sequence of str, optional
             Groups of solid cells; by default all solid cells.
-        x, y, z : float
-            Components of the gravitational acceleration at multiplier 1, in units consistent with the other quantities: for
-            example -9810 with N, mm, MPa, tonnes and seconds [length / time^2].
         ramp : Ramp or iterable of (float, float), optional
             History of the acceleration; by default that of the analysis.
+        **components : float
+            Components ``x``, ``y`` and ``z`` of the gravitational acceleration at multiplier 1, in units consistent with the
+            other quantities: for example -9810 with N, mm, MPa, tonnes and seconds [length / time^2].
 
         Examples
         --------
@@ -149,7 +129,7 @@ class ModelLoads(ModelHeat):
         >>> model.add_gravity(y=-9810.0)
         """
         names = group_names(groups)
-        axes = axes_of("gravity", {"x": x, "y": y, "z": z}, self.mesh.dim)
+        axes = axes_of("gravity", components, self.mesh.dim)
         self._add(Gravity(names, axes, table_of(ramp, "the ramp of gravity")))
 
     def add_centrifugal(
@@ -234,24 +214,18 @@ class ModelLoads(ModelHeat):
         self,
         group: str,
         *,
-        x: Value | None = None,
-        y: Value | None = None,
-        z: Value | None = None,
         distribute: bool | None = None,
         at: Sequence[float] | None = None,
         weighting: str = "uniform",
         radius: float | None = None,
         ramp: History = None,
+        **components: Value | None,
     ) -> None:
         """Apply a force to a group.
 
         Parameters
         ----------
         group : str
-        x, y, z : float or callable
-            Components of the force at multiplier 1 [force]: numbers or, for forces on nodes, functions from reference
-            positions (n, dim) [length] to forces (n,). In axisymmetry they are integrated over the full circle, and a
-            radial force on facets raises an error.
         distribute : bool, optional
             If True, the components are the resultant, which is applied as a uniform traction to the facets of the group.
             If False, the components act on every node of the group. The default is True for a group of facets and False
@@ -267,6 +241,10 @@ class ModelLoads(ModelHeat):
             Distance from `at` beyond which no force acts [length]; by default the distance of the farthest node.
         ramp : Ramp or iterable of (float, float), optional
             History of the force; by default that of the analysis.
+        **components : float or callable
+            Components ``x``, ``y`` and ``z`` of the force at multiplier 1 [force]: numbers or, for forces on nodes, functions
+            from reference positions (n, dim) [length] to forces (n,). In axisymmetry they are integrated over the full
+            circle, and a radial force on facets raises an error.
 
         Examples
         --------
@@ -277,14 +255,15 @@ class ModelLoads(ModelHeat):
         >>> model.add_force("TOP", y=-100.0, at=(0.25, 1.0))  # an eccentric resultant
         """
         self.mesh.points_of(group)
+        table = table_of(ramp, f"the ramp of the force on '{group}'")
+        axes = axes_of(f"the force on '{group}'", components, self.mesh.dim)
         spread = spread_of(f"the force on '{group}'", at, weighting, radius)
         if spread is not None:
             if distribute is False:
                 raise ModelError(
                     f"the force on '{group}' acts through a point or on every node: leave out 'at' or 'distribute'"
                 )
-            axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
-            self._add(SpreadForce(group, axes, spread, table_of(ramp, f"the ramp of the force on '{group}'")))  # type: ignore[arg-type]
+            self._add(SpreadForce(group, axes, spread, table))
             return
         if distribute is None and group in self.mesh.cell_groups and self.mesh.cells_of(group, dim=self.mesh.dim):
             raise ModelError(
@@ -293,24 +272,15 @@ class ModelLoads(ModelHeat):
             )
         if distribute is None:
             distribute = group in self.mesh.cell_groups and bool(self.mesh.cells_of(group, dim=self.mesh.dim - 1))
-        if distribute and any(callable(component) for component in (x, y, z)):
+        if distribute and any(map(callable, axes.values())):
             raise ModelError(
                 f"the total force on '{group}' must be a number: a function of position gives the force on each node, with "
                 "distribute=False; or use add_traction"
             )
         kind: type[TotalForce] | type[NodalForce] = TotalForce if distribute else NodalForce
-        axes = axes_of(f"the force on '{group}'", {"x": x, "y": y, "z": z}, self.mesh.dim)
-        self._add(kind(group, axes, table_of(ramp, f"the ramp of the force on '{group}'")))
+        self._add(kind(group, axes, table))
 
-    def add_moment(
-        self,
-        group: str,
-        *,
-        x: float | None = None,
-        y: float | None = None,
-        z: float | None = None,
-        ramp: History = None,
-    ) -> None:
+    def add_moment(self, group: str, *, ramp: History = None, **components: float | None) -> None:
         """Apply a moment to a reference point or to a group.
 
         Parameters
@@ -318,10 +288,10 @@ class ModelLoads(ModelHeat):
         group : str
             Name of a reference point or of a group. On a group of facets the moment is applied by forces in proportion to
             tributary area and distance from the centroid, whose resultant is zero.
-        x, y, z : float
-            Components of the moment at multiplier 1 [force times length]; in 2D only z.
         ramp : Ramp or iterable of (float, float), optional
             History of the moment; by default that of the analysis.
+        **components : float
+            Components ``x``, ``y`` and ``z`` of the moment at multiplier 1 [force times length]; in 2D only ``z``.
 
         Examples
         --------
@@ -330,10 +300,9 @@ class ModelLoads(ModelHeat):
         >>> model.add_moment("TOP", z=20.0)
         """
         name = f"the moment on '{group}'"
-        components = {"x": x, "y": y, "z": z}
-        if self.mesh.dim == 2 and (x is not None or y is not None):
-            raise ModelError(f"{name}: in two dimensions a moment has the component z only")
         axes = axes_of(name, components, 3)
+        if self.mesh.dim == 2 and set(axes) != {2}:
+            raise ModelError(f"{name}: in two dimensions a moment has the component z only")
         self._add(Moment(group, axes, table_of(ramp, f"the ramp of {name}")))
 
     def _add(self, load: Load) -> None:

@@ -19,7 +19,7 @@ from fastcontact.elasticity.material_axes import Axes, checked_axes, frames
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint
 from fastcontact.elasticity.symmetry_axis import axis_nodes
 from fastcontact.errors import ModelError
-from fastcontact.model.obstacle_rotation import rotation_of
+from fastcontact.model.contact_pair import rotation_of
 from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.parts.contact import ModelContact
 from fastcontact.model.ramp import History, PartHistory, Table, table_of

@@ -12,6 +12,7 @@ import sys
 
 import numpy as np
 import pytest
+from models import supported
 
 import fastcontact as fc
 from fastcontact._jit import cache, decorators, interpreting
@@ -95,19 +96,14 @@ def both(kernel, compared):
 
 def axisymmetric(element, formulation):
     model = fc.Model(fc.generate.half_spheres(element, size=12.0), "axisymmetric")
-    model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=-0.1)
-    model.prescribe("A1B1", y=0.1)
+    supported(model, A1A2="x", A2B2={"y": -0.1}, A1B1={"y": 0.1})
     model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation=formulation)
     return model
 
 
 def ball(element, formulation):
     model = fc.Model(fc.generate.sphere_on_block(element, R=1.0, size=0.5, contact_size=0.3, contact_radius=0.2), "3d")
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("SPHERE_TOP", y=-0.02)
+    supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -0.02})
     model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", formulation=formulation)
     return model
 

@@ -1,7 +1,10 @@
-"""Cached kernels are compiled again if a kernel of another file that they call has changed."""
+"""Cached kernels: compiled again after changes, the same bits in every process, messages."""
 
+import importlib
+import io
 import logging
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
@@ -11,7 +14,8 @@ import numba
 import pytest
 from pairwise import first_of
 
-from fastcontact._jit import cache, decorators
+import fastcontact
+from fastcontact._jit import cache, compiling, decorators
 
 jitted = pytest.mark.skipif(not decorators.compiled(), reason="kernels are not compiled")
 CALLER = """
@@ -157,3 +161,158 @@ def test_a_file_that_is_damaged_or_of_others_costs_a_compilation_and_a_line(writ
     assert str(path.parent) in told[0]
     if harm != "a folder":
         assert asked(written, CALLED) == (2.0, 1)
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What a process that has compiled nothing yet says when two kernels are compiled, given its error output."""
+    monkeypatch.setattr(compiling, "_reported", False)
+    monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
+    monkeypatch.setattr(compiling.log, "handlers", [])  # those of other tests may be closed
+    monkeypatch.setattr(compiling.log, "propagate", False)
+    level = compiling.log.level
+    compiling.log.setLevel(logging.WARNING)
+
+    def saying(stream):
+        monkeypatch.setattr(sys, "stderr", stream)
+        compiling.notify()
+        compiling.notify()
+        return stream.getvalue()
+
+    yield saying
+    compiling.log.setLevel(level)
+
+
+def test_one_line_at_a_terminal(told):
+    assert told(Terminal()) == f"fastcontact: {compiling.TEXT}\n"
+
+
+def test_one_line_in_a_notebook(told, monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipykernel", compiling)
+    assert told(io.StringIO()) == f"fastcontact: {compiling.TEXT}\n"
+
+
+def test_nothing_where_nobody_waits(told, monkeypatch):
+    monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
+    assert told(io.StringIO()) == ""
+
+
+def test_nothing_without_error_output(told, monkeypatch):
+    told(io.StringIO())
+    monkeypatch.setattr(sys, "stderr", None)
+    monkeypatch.setattr(compiling, "listeners", [compiling.tell_who_waits])
+    compiling.notify()
+    assert compiling.listeners == []
+
+
+def test_nothing_in_a_process_that_works_for_another(told, monkeypatch):
+    monkeypatch.setattr(compiling.multiprocessing, "parent_process", object)
+    assert told(Terminal()) == ""
+
+
+def test_nothing_where_the_log_tells_it(told):
+    compiling.log.setLevel(logging.INFO)
+    assert told(Terminal()) == ""
+
+
+def test_nothing_where_another_listener_tells_it(told):
+    heard = []
+    compiling.listeners.append(lambda: heard.append(1))
+    assert told(Terminal()) == ""
+    assert heard == [1, 1]
+
+
+# Facets of a sphere.
+QUESTION = """
+import hashlib
+import numpy as np
+from fastcontact._jit import interpreting
+from fastcontact.contact.formulations._cut_faces_kernels import planes
+
+interpreting.SECONDS = -1.0  # not Python in the place of the kernel
+a, b = np.meshgrid(np.linspace(0.0, 0.2, 22), np.linspace(0.0, 0.2, 22), indexing="ij")
+points = np.stack([np.sin(a), 1.0 - np.cos(a) * np.cos(b), np.cos(a) * np.sin(b)], axis=-1)
+corners = np.stack([points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2).reshape(-1, 4, 3).copy()
+origin, axes = np.zeros((len(corners), 3)), np.zeros((len(corners), 3, 3))
+planes(corners, 4, origin, axes)
+print(hashlib.sha256(axes.tobytes()).hexdigest(), sum(planes.compiled.stats.cache_hits.values()))
+"""
+
+
+def test_the_process_that_compiles_has_the_bits_of_another_of_fewer_threads(tmp_path):
+    answers = []
+    for threads in "21":
+        environment = {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_NUM_THREADS": threads, "NUMBA_DISABLE_JIT": "0"}
+        done = subprocess.run(
+            [sys.executable, "-c", QUESTION], capture_output=True, text=True, check=True, env=os.environ | environment
+        )
+        answers.append(done.stdout.split())
+    assert [hits for _, hits in answers] == ["0", "1"]
+    assert answers[0][0] == answers[1][0]
+
+
+def kernels():
+    """Every kernel of the package by its name, with its module."""
+    found = {}
+    for module in pkgutil.walk_packages(fastcontact.__path__, "fastcontact."):
+        if module.name.endswith("_kernels"):
+            values = vars(importlib.import_module(module.name)).items()
+            compiled = {f"{module.name}.{name}": getattr(one, "compiled", one) for name, one in values}
+            found |= {name: one for name, one in compiled.items() if hasattr(one, "targetoptions")}
+    return found
+
+
+def test_kernels_round_every_operation_unless_there_is_one_copy_of_them():
+    """Kernels that others call are compiled once by themselves and once within those."""
+    found = kernels()
+    free = {name: one for name, one in found.items() if one.targetoptions["fastmath"]}
+    assert len(found) > 100
+    assert 0 < len(free) < 10
+    for name, one in free.items():
+        called = [part for part in one.py_func.__globals__.values() if hasattr(part, "targetoptions")]
+        assert not {part.py_func.__name__ for part in called} & set(one.py_func.__code__.co_names), name
+        users = [
+            other
+            for other, kernel in found.items()
+            if any(part is one for part in kernel.py_func.__globals__.values())
+            and one.py_func.__name__ in kernel.py_func.__code__.co_names
+        ]
+        assert not users, (name, users)
+
+
+WHOLE = """
+import hashlib, sys
+import fastcontact as fc
+
+mesh = fc.generate.sphere_on_block("hex8", R=1.0, size=0.3, contact_size=0.1, contact_radius=0.2)
+model = fc.Model(mesh, "3d")
+model.add_material(fc.LinearElastic(E=20000.0, nu=0.3))
+model.fix("BLOCK_BOTTOM", "xyz")
+model.fix("SYMMETRY_X", "x")
+model.fix("SYMMETRY_Z", "z")
+model.prescribe("SPHERE_TOP", y=-0.01)
+model.add_contact("pair", secondary="CONT_SPHERE", primary="CONT_BLOCK", friction=0.2)
+digest = hashlib.sha256()
+for solver in ("direct", "amg"):
+    for step in fc.solve(model, fc.linear_ramp(2), linear_solver=solver):
+        digest.update(step.displacement.tobytes())
+        digest.update(step.stress.tobytes())
+print(digest.hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_a_run_that_compiles_has_the_bits_of_later_ones(tmp_path):
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
+    answers = [
+        subprocess.run(
+            [sys.executable, "-c", WHOLE], capture_output=True, text=True, check=True, env=environment, timeout=1500
+        ).stdout
+        for _ in range(2)
+    ]
+    assert answers[0] == answers[1]

@@ -1,5 +1,8 @@
-"""Work shared by threads: ranges cover everything, with the same bits for any number of threads."""
+"""Work shared by threads: the same bits for any number of threads; waiting threads of libraries sleep."""
 
+import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -179,3 +182,14 @@ def test_a_degenerate_cell_is_named_by_its_lowest_number_whatever_the_threads(th
             stiffness.stiffness(bad, "plane_strain", moduli, material)
         texts.append(str(caught.value))
     assert texts[0] == texts[1]
+
+
+NAME = "OPENBLAS_THREAD_TIMEOUT"
+
+
+@pytest.mark.parametrize(("given", "found"), [({}, "4"), ({NAME: "20"}, "20")])
+def test_waiting_threads_sleep_unless_told_otherwise(given, found):
+    environment = {name: value for name, value in os.environ.items() if name != NAME} | given
+    asked = f"import os, fastcontact; print(os.environ['{NAME}'])"
+    done = subprocess.run([sys.executable, "-c", asked], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == found

@@ -1,16 +1,22 @@
-"""The active-set solver compared with enumeration of all active sets, with every linear solver."""
+"""Active sets and active displacements compared with enumeration and with all displacements."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from models import DenseCompliance
+from models import DenseCompliance, elastic_model
 from scipy.sparse import bsr_array, csr_array
+from stepping import Stepping
 
+import fastcontact as fc
 from fastcontact.analysis import active_set
+from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
+from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear import choice as linear
 
@@ -98,3 +104,117 @@ def test_a_limit_of_iterations_returns_an_unsettled_state():
         if not solve(K, f, B, gap0, max_iterations=1).settled:
             return
     raise AssertionError("no problem needed a second iteration")
+
+
+def started(related=False, friction=0.0, name="direct"):
+    if name not in linear.SOLVERS:
+        pytest.skip(f"{name} is not installed")
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), radial_sizes=(3.0, 9.0), segments=3)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A1B1={"y": 2.0})
+    if related:
+        model.couple("CONT2", "y")
+    model.prescribe("A2B2", y=-2.0)
+    model.add_contact("c", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
+    return Stepping(model, name, 1e-14, Criteria(geometry=1e-8), fc.linear_ramp(2))
+
+
+def contact_dofs(analysis):
+    """The components of the points on both sides, which are named in the model."""
+    mesh = analysis.model.mesh
+    points = np.union1d(mesh.points_of("CONT1"), mesh.points_of("CONT2"))
+    return (points[:, None] * mesh.dim + np.arange(mesh.dim)).ravel()
+
+
+@pytest.fixture(params=[False, True], ids=["supports", "relations"])
+def both(request):
+    analysis = started(request.param)
+    everything = ActiveDofs(analysis.system, contact_dofs(analysis))
+    surfaces = analysis.dofs
+    assert isinstance(surfaces, SurfaceDofs)
+    return analysis, everything, surfaces
+
+
+def obeying(analysis, seed=1):
+    """Random displacements that obey supports and relations, and what these prescribe."""
+    lift = analysis.load_at(0.7).lift
+    v = np.where(analysis.system.free, np.random.default_rng(seed).normal(size=len(lift)), 0.0)
+    return analysis.system.displacement(v, lift), lift
+
+
+def test_rows_are_those_for_all_unknowns(both):
+    analysis, everything, surfaces = both
+    u, lift = obeying(analysis)
+    surfaces = surfaces.for_step(u, lift)
+    part = analysis.pairs["c"].constraints(Configuration.displaced(np.zeros((len(u) // 2, 2))))
+    B, offset = everything.rows(part.B, part.gap0, lift)
+    own, offset_too = surfaces.rows(part.B, part.gap0, lift)
+    np.testing.assert_array_equal(offset_too, offset)
+    v = everything.unknowns(u, lift)
+    np.testing.assert_allclose(own @ surfaces.unknowns(u, lift), B @ v, atol=1e-14)
+    np.testing.assert_array_equal(np.diff(own.indptr) > 0, np.diff(B.indptr) > 0)
+    assert own.data.all()
+
+
+def test_displacements_and_sizes_are_those_of_all(both):
+    analysis, everything, surfaces = both
+    u, lift = obeying(analysis)
+    surfaces, copy = surfaces.for_step(u, lift), u.copy()
+    v = surfaces.unknowns(u, lift)
+    np.testing.assert_allclose(surfaces.displacement(v, lift), surfaces.of(u), atol=1e-14)
+    assert surfaces.scale(u, lift) == everything.scale(u, lift)
+    assert surfaces.size(v) == everything.size(everything.unknowns(u, lift))
+    assert surfaces.size(100.0 + v) == (100.0 + v).max()
+    changed = surfaces.put(copy, surfaces.of(u) + 100.0)
+    dofs = contact_dofs(analysis)
+    np.testing.assert_array_equal(changed[dofs], u[dofs] + 100.0)
+    np.testing.assert_array_equal(np.delete(changed, dofs), np.delete(u, dofs))
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("name", ["direct", "cholmod"])
+def test_steps_end_where_those_of_all_displacements_end(name, friction):
+    analysis, other = started(friction=friction, name=name), started(friction=friction, name=name)
+    other.problem = replace(other.problem, dofs=ActiveDofs(other.system, contact_dofs(other)))
+    for index, instant in enumerate(analysis.ramp.instants, start=1):
+        result, expected = analysis.step(index, instant), other.step(index, instant)
+        scale = np.abs(expected.displacement).max()
+        np.testing.assert_allclose(result.displacement, expected.displacement, atol=1e-8 * scale)
+        assert result.iterations["geometry_updates"] == expected.iterations["geometry_updates"]
+        sizes = [entry["displacement_change"] for entry in result.iterations["history"][1:]]
+        same = [entry["displacement_change"] for entry in expected.iterations["history"][1:]]
+        np.testing.assert_allclose(sizes, same, atol=1e-9)
+
+
+def test_solvers_that_do_not_condense_find_all_displacements():
+    assert not isinstance(started(name="amg").dofs, SurfaceDofs)
+
+
+def test_the_condensed_problem_is_that_of_all_unknowns():
+    analysis = started()
+    solver, rng = analysis.solver, np.random.default_rng(3)
+    n, k = len(analysis.u), len(solver.last)
+    loaded = solver.load(rng.normal(size=n))
+    condensed = loaded.condensed()
+    assert condensed.condensed() is condensed
+    dense = np.zeros((5, n))
+    dense[:, solver.last] = np.where(rng.random((5, k)) < 0.2, rng.normal(size=(5, k)), 0.0)
+    B, own, c, C = csr_array(dense), csr_array(dense[:, solver.last]), rng.normal(size=5), np.eye(5)
+    for compliance in (None, C):
+        u, multiplier = loaded.solve(B, c, compliance)
+        v, same = condensed.solve(own, c, compliance)
+        np.testing.assert_allclose(same, multiplier, rtol=1e-9)
+        np.testing.assert_allclose(v, u[solver.last], atol=1e-10 * np.abs(u).max())
+    free, none = condensed.solve(own[:0], c[:0])
+    np.testing.assert_array_equal(free, loaded.solve(B[:0], c[:0])[0][solver.last])
+    assert not len(none)
+    for found, expected in zip(condensed.delassus(own), loaded.delassus(B), strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-10 * np.abs(expected).max())
+    force = rng.normal(size=k)
+    near = condensed.involved_solution(force, None)
+    everywhere = np.zeros(n)
+    everywhere[solver.last] = force
+    np.testing.assert_allclose(
+        near, loaded.involved_solution(everywhere, None)[solver.last], atol=1e-10 * np.abs(near).max()
+    )
+    np.testing.assert_array_equal(condensed.full_solution(force), near)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
@@ -38,8 +38,7 @@ def pressed(kinematics, element, pieces, options, curvature=0.0):
     along = {"3d": {"x": 0.004, "y": 0.001}, "plane_strain": {"x": 0.004}, "axisymmetric": {}}[kinematics]
     model.prescribe(top, **along, **{"xyz"[mesh.dim - 1]: -0.01})
     if kinematics == "axisymmetric":
-        model.fix("LOWER_LEFT", "x")
-        model.fix("UPPER_LEFT", "x")
+        supported(model, LOWER_LEFT="x", UPPER_LEFT="x")
     for i in range(pieces):
         own = options[i] if isinstance(options, list) else options
         model.add_contact(f"pair{i}", secondary=f"PIECE{i}", primary=primary, formulation="node_to_segment", **own)

@@ -1,15 +1,18 @@
-"""Friction with a compliance that couples forces in rotating frames, and tractions that supports leave undetermined."""
+"""The friction solver: Lemke's method, rotating frames, undetermined tractions, steps near full sliding."""
+
+import itertools
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from scipy.sparse import csr_array, diags_array
 from scipy.sparse.linalg import splu
 
 import fastcontact as fc
-from fastcontact.analysis.friction import cone_newton, dense
+from fastcontact.analysis import newton, step_halving
+from fastcontact.analysis.friction import cone_newton, dense, lemke
 from fastcontact.analysis.friction import solve as friction
-from fastcontact.analysis.friction.slip_directions import aligning, idle, own_compliance
+from fastcontact.analysis.friction.slip_directions import aligning, compliance_of_rows, idle, own_compliance
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.multiplier_field import Projection
 from fastcontact.contact.pairing import normals, tangents
@@ -104,8 +107,7 @@ def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
     monkeypatch.setattr(cone_newton, "PATIENCE", 0)
     monkeypatch.setattr(dense, "LARGEST", 0)
     mesh = fc.generate.block_on_block(divisions_lower=(6, 2), divisions_upper=(3, 3))
-    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy")
-    model.prescribe("UPPER_TOP", x=1e-3, y=-1e-4)
+    model = elastic_model(mesh, "plane_strain", LOWER_BOTTOM="xy", UPPER_TOP={"x": 1e-3, "y": -1e-4})
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", friction=0.3)
     with pytest.raises(
         fc.ConvergenceError, match=r"contact with friction did not converge .* of the largest force\..*0\.3"
@@ -115,8 +117,7 @@ def test_what_does_not_settle_is_told_with_its_numbers(monkeypatch):
 
 def spheres(friction=0.0):
     model = elastic_model(fc.generate.half_spheres("tri3", size=8.0), "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=2.0)
+    supported(model, A2B2={"y": -2.0}, A1B1={"y": 2.0})
     model.add_contact("pair", secondary="CONT1", primary="CONT2", formulation="node_to_segment", friction=friction)
     return model
 
@@ -162,3 +163,89 @@ def test_a_guess_does_not_leave_the_gap_of_a_soft_constraint_open():
     forces = dense.solve(F, free, np.array([0.3, 0.3]), np.ones(2, bool), guess)
     assert forces.settled
     np.testing.assert_allclose(forces.gaps[0], 0.0, atol=1e-14)
+
+
+def test_pivots_against_all_bases():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        n = 5
+        A = rng.normal(size=(n, n))
+        M, q = A @ A.T + 0.1 * np.eye(n) + (A - A.T), rng.normal(size=n)
+        z, _ = lemke.solved(M, q, 100)
+        wanted = None
+        for basis in itertools.product([False, True], repeat=n):
+            on, x = np.flatnonzero(basis), np.zeros(n)
+            x[on] = np.linalg.solve(M[np.ix_(on, on)], -q[on])
+            if (x >= 0).all() and (M @ x + q >= -1e-12).all():
+                wanted = x
+        np.testing.assert_allclose(z, wanted, atol=1e-10)
+
+
+def test_pivots_tell_a_problem_without_a_solution():
+    assert lemke.solved(np.array([[-1.0]]), np.array([-1.0]), 10)[0] is None
+    z, count = lemke.solved(np.array([[1.0]]), np.array([2.0]), 10)
+    assert (z.tolist(), count) == ([0.0], 0)
+
+
+def test_pivots_are_counted():
+    n = 6
+    A = np.random.default_rng(1).normal(size=(n, n))
+    problem = A @ A.T + np.eye(n), -np.ones(n)
+    z, needed = lemke.solved(*problem, 1000)
+    assert z is not None
+    assert needed > 1
+    assert lemke.solved(*problem, needed - 1)[0] is None
+
+
+def test_compliance_of_rows_against_dense_products():
+    rng = np.random.default_rng(11)
+    rows = tuple(csr_array(rng.normal(size=(8, 30)) * (rng.random((8, 30)) < 0.3)) for _ in range(3))
+    yielding = rng.random(30)
+    stack = np.stack([R.toarray() for R in rows])
+    expected = np.einsum("ain,n,bin->abi", stack, yielding, stack)
+    assert compliance_of_rows(rows, yielding) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("push", "told"), [(0.58, "before it 97% of the friction that contact can bear is used"), (0.3, "")]
+)
+def test_the_message_states_how_much_friction_is_used(monkeypatch, push, told):
+    """A block under the pressure 0.3 on a plane with the friction 0.3 slides at a push of 0.18 on its side."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4)), kinematics="plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1e4, nu=0.45))
+    model.add_pressure("TOP", 0.3, ramp=[(0.0, 0.0), (1.0, 1.0), (3.0, 1.0)])
+    model.add_traction("LEFT", x=0.3, ramp=[(0.0, 0.0), (1.0, 0.0), (2.0, push), (3.0, push)])
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.3)
+    load_step = step_halving.load_step
+
+    def failing(problem, state, index, end):
+        if end == 3.0:
+            raise fc.ConvergenceError("no equilibrium", [], smaller_steps_help=False)
+        return load_step(problem, state, index, end)
+
+    monkeypatch.setattr(step_halving, "load_step", failing)
+    with pytest.raises(fc.ConvergenceError, match="no equilibrium") as failed:
+        fc.solve(model, [1.0, 2.0, 3.0])
+    assert told in str(failed.value)
+    assert bool(told) == ("friction that contact can bear" in str(failed.value))
+
+
+def test_a_verdict_about_a_diverged_iterate_does_not_end_the_analysis(monkeypatch):
+    """An iterate far from equilibrium may seem to lie beyond the friction cone; a smaller step is tried."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4)), kinematics="plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1e4, nu=0.45))
+    model.fix("BOTTOM", "xy")
+    model.add_pressure("TOP", 500.0)
+    solved, calls = newton._Newton._solve, []
+
+    def diverging(self, u, changes):
+        calls.append(len(changes))
+        if len(calls) == 2:
+            raise fc.ConvergenceError("friction cannot hold it", smaller_steps_help=False)
+        return solved(self, u, changes)
+
+    monkeypatch.setattr(newton._Newton, "_solve", diverging)
+    step = fc.solve(model, 1)[-1]
+    assert calls[:3] == [1, 2, 1]
+    assert step.iterations["substeps"][-1] == 1.0

@@ -25,8 +25,7 @@ def pressed(pairs, element="hex8", **options):
     bottom = mesh.cell_groups["UZMIN"]
     left = np.intersect1d(bottom, mesh.cell_groups["LEFT"])
     groups = {**mesh.cell_groups, "LEFT": left, "RIGHT": np.setdiff1d(bottom, left)}
-    model = elastic_model(mesh.replace(cell_groups=groups), "3d", LZMIN="xyz")
-    model.prescribe("UZMAX", x=0.004, y=0.0, z=-0.01)
+    model = elastic_model(mesh.replace(cell_groups=groups), "3d", LZMIN="xyz", UZMAX={"x": 0.004, "y": 0.0, "z": -0.01})
     clearances = options.pop("clearances", (0.0, 0.0))
     for name, clearance in zip(["LEFT", "RIGHT"] if pairs == 2 else ["UZMIN"], clearances, strict=False):
         own = {"clearance": clearance} if clearance else {}

@@ -94,9 +94,7 @@ def check_resumed(make, ramp, relative, after=(2,), **options):
 
 def spheres(formulation="node_to_segment", **options):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=+2.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation, **options)
     return model
 
@@ -104,8 +102,7 @@ def spheres(formulation="node_to_segment", **options):
 def boxes(formulation="node_to_segment", shift=0.02, **options):
     """Two boxes, the upper one lowered and pushed aside."""
     low, up = box((10.0, 10.0, 5.0), (3, 3, 1), "hex8", (0.0, 0.0, -5.0)), box((10.0, 10.0, 5.0), (2, 2, 1))
-    model = elastic_model(united(L_=low, U_=up), "3d", L_ZMIN="xyz")
-    model.prescribe("U_ZMAX", x=shift, y=0.0, z=-0.04)
+    model = elastic_model(united(L_=low, U_=up), "3d", L_ZMIN="xyz", U_ZMAX={"x": shift, "y": 0.0, "z": -0.04})
     model.add_contact("pair", secondary="U_ZMIN", primary="L_ZMAX", formulation=formulation, **options)
     return model
 

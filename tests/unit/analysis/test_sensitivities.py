@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 
@@ -107,9 +107,7 @@ def test_axisymmetric_spheres():
         model = fc.Model(mesh, kinematics="axisymmetric")
         model.add_material(fc.LinearElastic(E=E, nu=nu), "SPHHAU")
         model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
-        model.fix("A1A2", "x")
-        model.prescribe("A2B2", y=-moved)
-        model.prescribe("A1B1", y=1.0)
+        supported(model, A1A2="x", A2B2={"y": -moved}, A1B1={"y": 1.0})
         model.add_contact("hertz", secondary="CONT1", primary="CONT2")
         return model
 
@@ -133,8 +131,7 @@ def test_in_space_with_factors_and_with_a_hierarchy(solver):
         model = fc.Model(mesh, kinematics="3d")
         model.add_material(fc.LinearElastic(E=E, nu=nu), "LBOX")
         model.add_material(fc.LinearElastic(E=2500.0, nu=0.22), "UBOX")
-        model.fix("LZMIN", "xyz")
-        model.prescribe("UZMAX", x=0.01, y=0.004, z=-0.05 * moved)
+        supported(model, LZMIN="xyz", UZMAX={"x": 0.01, "y": 0.004, "z": -0.05 * moved})
         model.add_contact("c", secondary="UZMIN", primary="LZMAX", clearance=clearance)
         return model
 
@@ -218,8 +215,7 @@ def test_heat_normals_and_loads_by_volume():
         model = fc.Model(mesh, kinematics="plane_strain")
         model.add_material(fc.LinearElastic(E=E, nu=nu, expansion=expansion, density=8e-9), "INNER")
         model.add_material(fc.LinearElastic(E=1.5e5, nu=0.25, expansion=1.2e-5, density=3e-9), "OUTER")
-        model.fix("SYMMETRY_X", "x")
-        model.fix("SYMMETRY_Y", "y")
+        supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
         model.add_temperature(100.0 * warm, groups="INNER")
         model.add_centrifugal(speed, groups=["INNER", "OUTER"])
         model.add_gravity(y=-9810.0 * weight)
@@ -394,9 +390,7 @@ def test_nodes_between_two_facets_are_named():
     model = fc.Model(mesh, kinematics="axisymmetric")
     model.add_material(fc.LinearElastic(E=20_000.0, nu=0.3), "SPHHAU")
     model.add_material(fc.LinearElastic(E=30_000.0, nu=0.2), "SPHBAS")
-    model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=-1.0)
-    model.prescribe("A1B1", y=1.0)
+    supported(model, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": 1.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="mortar")
     with pytest.raises(fc.ModelError, match=r"lie opposite nodes of the other side|if nodes move"):
         asked(model, ("pressure_max", "hertz"))
@@ -453,8 +447,7 @@ def test_quantities_that_cannot_be_told():
 
 def test_nodes_of_two_pairs_are_named():
     mesh = fc.generate.block((10.0, 5.0), (8, 4))
-    model = elastic_model(mesh, "plane_strain")
-    model.prescribe("RIGHT", x=-0.05, y=0.0)
+    model = elastic_model(mesh, "plane_strain", RIGHT={"x": -0.05, "y": 0.0})
     for name, side, normal in (("floor", "BOTTOM", (0.0, 1.0)), ("wall", "LEFT", (1.0, 0.0))):
         plane = fc.obstacles.HalfSpace(point=(0.0, 0.0), normal=normal)
         model.add_obstacle(name, secondary=side, obstacle=plane, formulation="node_to_segment")

@@ -1,4 +1,4 @@
-"""Steps one at a time: computed on request, not kept, equal to those of `solve`."""
+"""Steps one at a time: computed on request, not kept, equal to those of `solve`; a finished analysis is freed at once."""
 
 import gc
 import itertools
@@ -6,18 +6,19 @@ import weakref
 
 import numpy as np
 import pytest
+from models import elastic_model, supported
+from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis import step_halving
+from fastcontact.analysis.criteria import Criteria
 
 
 @pytest.fixture
 def model():
     found = fc.Model(fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3), "axisymmetric")
     found.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-    found.fix("A1A2", "x")
-    found.prescribe("A2B2", y=-0.5)
-    found.prescribe("A1B1", y=+0.5)
+    supported(found, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
     found.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
     return found
 
@@ -44,3 +45,32 @@ def test_nothing_is_computed_before_it_is_asked_for_and_nothing_is_kept(model, m
     assert computed == [1, 2]
     gc.collect()
     assert [reference() for reference in kept] == [None, None]
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize("solver", ["direct", "amg"])
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar"])
+def test_no_cycle_keeps_a_finished_analysis(solver, formulation):
+    mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -0.5}, A1B1={"y": +0.5})
+    model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation=formulation)
+
+    def solved():
+        analysis = Stepping(model, solver, 1e-10, Criteria(geometry_updates=2), fc.linear_ramp(1))
+        return analysis.step(1, 1.0).index
+
+    solved()
+    gc.collect()
+    gc.disable()
+    try:
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        assert solved() == 1
+        gc.collect()
+        ours = [type(thing).__name__ for thing in gc.garbage if type(thing).__module__.startswith("fastcontact")]
+        arrays = [thing.nbytes for thing in gc.garbage if type(thing).__name__ == "ndarray"]
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
+    assert not ours
+    assert sum(arrays) < 10_000

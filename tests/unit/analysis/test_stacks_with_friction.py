@@ -1,11 +1,12 @@
-"""Stacks of blocks with friction and multigrid: contact alone holds the middle bodies."""
+"""Friction with multigrid: stacks held by contact alone, and small contact forces."""
 
 import numpy as np
 import pytest
-from models import elastic_model, united
+from models import elastic_model, supported, united
 from pairwise import first_of
 
 import fastcontact as fc
+from fastcontact.analysis.friction import eliminated
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
 
@@ -55,3 +56,45 @@ def test_newtons_method_solves_no_more_exactly_than_the_friction_law_holds(eleme
     for name, contact in exact.contact.items():
         force = found.contact[name].force_vectors
         assert force == pytest.approx(contact.force_vectors, abs=1e-7 * np.abs(contact.force_vectors).max())
+
+
+def light_contact_beside_a_large_force(shift):
+    """Return two blocks pressed together and pushed along each other, and a third one far away that is stretched hard."""
+
+    def part(z, k):
+        return fc.generate.box((1.0, 1.0, 0.5), (k, k, k // 2), "hex8", (0.0, 0.0, z))
+
+    model = elastic_model(united(L_=part(-0.5, 6), U_=part(0.0, 5), FAR_=part(5.0, 6)), "3d", E=1.0, L_ZMIN="xyz")
+    supported(model, U_ZMAX={"x": shift, "y": 0.0, "z": -0.001}, FAR_XMIN="xyz")
+    model.prescribe("FAR_XMAX", x=0.2, y=0.0, z=0.0)
+    model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", formulation="mortar", multipliers="dual", friction=0.2)
+    return model
+
+
+@pytest.mark.parametrize("acceptable", first_of(1, [eliminated.ACCEPTABLE, 0.0]))
+def test_forces_that_cannot_be_more_accurate_settle_without_a_compliance(acceptable, monkeypatch):
+    monkeypatch.setattr(eliminated, "ROUND_OFF", 0.0)
+    monkeypatch.setattr(eliminated, "ENOUGH", 1e-9)  # more than linear solutions to 1e-10 can give
+    monkeypatch.setattr(eliminated, "ACCEPTABLE", acceptable)
+    model, found = light_contact_beside_a_large_force(6e-4), {}
+    for name in ("amg", "direct"):
+        problem = prepare(model, fc.linear_ramp(1), fc.Criteria(), linear_solver=name)
+        found[name] = load_step(problem, problem.initial_state(), 1, 1.0)[1].contact["c"]
+        if name == "amg":
+            assert bool(problem.solver.columns.asked) == (acceptable == 0.0)
+    assert np.abs(found["amg"].force - found["direct"].force).max() < 1e-6 * np.abs(found["direct"].force).max()
+    assert found["amg"].active.sum() > found["amg"].sticking.sum()
+
+
+@pytest.mark.parametrize(("factor", "told"), [(1.0, True), (0.0, False)], ids=["pressed", "lifted"])
+def test_only_a_contact_that_carries_a_force_is_said_to_be_too_coarse(factor, told, recwarn):
+    """A ball without force still touches one node of the dent that it has left."""
+    model = fc.Model(fc.generate.block((2.0, 1.0), (8, 4), "quad8"), kinematics="axisymmetric")
+    model.add_material(fc.ElasticPlastic(E=200e3, nu=0.3, yield_stress=400.0, hardening=[(0.0, 400.0), (1.0, 2000.0)]))
+    model.fix("BOTTOM", "y")
+    ramp = [(0.0, 0.0), (1.0, 1.0), (2.0, factor)]
+    ball = fc.obstacles.Sphere((0.0, 3.5), 2.5)
+    model.add_obstacle("ball", secondary="TOP", obstacle=ball, force={"y": -300.0}, ramp=ramp)
+    last = fc.solve(model, [1.0, 2.0])[-1]
+    assert last.contact["ball"].active.any()
+    assert any("element across" in w or "elements across" in w for w in last.warnings) == told

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.analysis import restart
@@ -20,9 +20,7 @@ PLASTIC = fc.ElasticPlastic(E=20_000.0, nu=0.3, yield_stress=400.0, hardening=[(
 def spheres(material=ELASTIC, strain="small", **options):
     model = fc.Model(fc.generate.half_spheres(size=8.0), kinematics="axisymmetric", strain=strain)
     model.add_material(material)
-    model.fix("A1A2", "x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=+2.0)
+    supported(model, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
 
@@ -37,10 +35,7 @@ def lying_block(**options):
 
 def sphere_on_block(element="hex8", **options):
     model = elastic_model(fc.generate.sphere_on_block(element, size=25.0, contact_size=4.0), "3d", E=20_000.0)
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Z", "z")
-    model.fix("BLOCK_BOTTOM", "y")
-    model.prescribe("SPHERE_TOP", y=-1.0)
+    supported(model, SYMMETRY_X="x", SYMMETRY_Z="z", BLOCK_BOTTOM="y", SPHERE_TOP={"y": -1.0})
     model.add_contact("hertz", secondary="CONT_SPHERE", primary="CONT_BLOCK", **options)
     return model
 

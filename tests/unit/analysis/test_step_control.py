@@ -1,4 +1,4 @@
-"""Halved load steps: the same end as with prescribed steps, and no trace of failed ones."""
+"""Halved load steps and substeps: the same end as with prescribed steps, larger after few iterations."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -13,6 +13,8 @@ import fastcontact as fc
 from fastcontact.analysis import geometry_loop, step_halving
 from fastcontact.analysis.convergence_messages import geometry_moves
 from fastcontact.analysis.criteria import Criteria
+from fastcontact.analysis.problem import prepare
+from fastcontact.errors import ConvergenceError
 from fastcontact.mesh.generate import block
 
 FEW = 3  # geometry updates: too few for the whole load, enough for a part of it
@@ -20,9 +22,7 @@ FEW = 3  # geometry updates: too few for the whole load, enough for a part of it
 
 def spheres(friction=0.3, **options):
     mesh = fc.generate.half_spheres("quad4", arc_sizes=(3.0, 6.0), segments=3)
-    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
-    model.prescribe("A1B1", y=+2.0)
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0}, A1B1={"y": +2.0})
     options = {"formulation": "node_to_segment", "friction": friction, **options}
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", **options)
     return model
@@ -213,3 +213,51 @@ def test_what_fails_inside_a_pairing_is_told_with_the_pairings_before_it(monkeyp
     with pytest.raises(fc.ConvergenceError, match=r"stand still \(step 1 from 0 to 1\)") as caught:
         analysis.advance(1, 0.0, 1.0)
     assert [entry["settled"] for entry in caught.value.history] == [True, True]
+
+
+def problem():
+    model = fc.Model(fc.generate.block((1.0, 1.0), (1, 1)), "plane_strain", strain="finite")
+    model.add_material(fc.NeoHookean(E=1.0, nu=0.3))
+    model.fix("BOTTOM", "xy")
+    model.prescribe("TOP", y=-0.1)
+    return prepare(model, fc.linear_ramp(2), fc.Criteria())
+
+
+def test_sizes_are_kept_and_grow(monkeypatch: pytest.MonkeyPatch) -> None:
+    solved, tried = step_halving.load_step, []
+
+    def load_step(problem, state, index, instant):
+        span = instant - tried[-1][1] if tried and tried[-1][2] else instant - state_at
+        converges = span <= largest + 1e-12
+        tried.append((span, instant if converges else (tried[-1][1] if tried else state_at), True))
+        if not converges:
+            raise ConvergenceError("too far")
+        end, result = solved(problem, state, index, instant)
+        return end, replace(result, iterations={**result.iterations, "history": [{}] * iterations})
+
+    monkeypatch.setattr(step_halving, "load_step", load_step)
+    prepared = problem()
+    state_at, largest, iterations = 0.0, 0.125, 15  # many iterations: no larger part is tried
+    state, step = step_halving.advance(prepared, prepared.initial_state(), 1, 0.0, 0.5)
+    assert step.iterations["substeps"] == pytest.approx([0.125, 0.25, 0.375, 0.5])
+    assert [span for span, *_ in tried] == pytest.approx([0.5, 0.25, 0.125, 0.125, 0.125, 0.125])
+    assert state.halved == 2
+    assert step_halving.State.from_dict(state.to_dict(8), state.u.reshape(-1, 2), frozenset()).halved == 2
+    # In the next step parts begin as small; few iterations let them grow, up to the whole step.
+    tried.clear()
+    state_at, largest, iterations = 0.5, 1.0, 4
+    state, step = step_halving.advance(prepared, state, 2, 0.5, 1.0)
+    assert step.iterations["substeps"] == pytest.approx([0.625, 0.75, 1.0])
+    assert state.halved == 0
+    tried.clear()
+    state_at = 1.0
+    _, step = step_halving.advance(prepared, state, 3, 1.0, 1.5)
+    assert "substeps" not in step.iterations
+
+
+def test_a_cell_that_turns_inside_out_is_told_with_its_measure() -> None:
+    prepared = problem()
+    u = np.zeros((4, 2))
+    u[prepared.model.mesh.points_of("TOP"), 1] = -1.5
+    with pytest.raises(fc.ConvergenceError, match=r"cell 0 of quad4 near \[0.5 0.5\] is inverted \(J = -0.5\)"):
+        prepared.deformed(u.ravel(), prepared.initial_state(), None)

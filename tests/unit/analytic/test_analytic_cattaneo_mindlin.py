@@ -1,18 +1,17 @@
 """Partial slip: tables, balance of forces, the friction law, unloading, and the block."""
 
 import itertools
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from models import reference
 from scipy.integrate import quad
 
 from fastcontact.analytic import block_sliding, cattaneo_mindlin_line, cattaneo_mindlin_sphere
 from fastcontact.errors import FastcontactWarning, ModelError
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/cattaneo_mindlin.json").read_text())
+REFERENCE = reference("cattaneo_mindlin")
 LIKE = {"E1": 1e5, "nu1": 0.3, "R1": 10.0, "E2": 1e5, "nu2": 0.3, "R2": 30.0, "friction": 0.4}
 
 

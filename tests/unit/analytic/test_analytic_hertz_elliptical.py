@@ -1,17 +1,16 @@
 """Elliptical Hertz contact compared with a table, integrals and limits."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from models import reference
 
 from fastcontact.analytic import hertz_elliptical, hertz_line, hertz_point
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/hertz_elliptical.json").read_text())
+REFERENCE = reference("hertz_elliptical")
 
 
 @pytest.mark.parametrize("row", REFERENCE["rows"])

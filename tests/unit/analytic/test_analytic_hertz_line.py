@@ -1,19 +1,18 @@
 """Hertz contact of cylinders compared with tables, integrals and the equations of elasticity."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from models import reference
 
 from fastcontact.analytic import hertz_line
 
 pytestmark = pytest.mark.pairwise
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/hertz_line.json").read_text())
+REFERENCE = reference("hertz_line")
 
 
 @pytest.fixture

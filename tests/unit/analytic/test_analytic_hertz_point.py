@@ -1,17 +1,16 @@
 """Hertz contact of spheres compared with tables, integrals, limits and the equations of elasticity."""
 
-import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from models import reference
 
 from fastcontact.analytic import hertz_point
 
-REFERENCE = json.loads((Path(__file__).parents[3] / "data/reference/hertz_point.json").read_text())
+REFERENCE = reference("hertz_point")
 STEEL = {"E1": 210_000.0, "nu1": 0.3, "R1": 20.0}
 
 

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from case_texts import HERTZ, UNITS, spheres
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact._jit import ahead
@@ -450,8 +450,7 @@ def test_a_strict_run_tells_the_checks_that_fail(tmp_path, capsys):
 
 @pytest.mark.filterwarnings("ignore:contact 'ceiling' never closed")
 def test_the_contact_that_was_taken_is_told_where_there_are_two(tmp_path, capsys):
-    case = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x")
-    case.prescribe("A2B2", y=-2.0)
+    case = elastic_model(fc.generate.half_spheres(size=25.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
     case.prescribe("A1B1", y=2.0)
     case.add_contact("hertz", secondary="CONT1", primary="CONT2")
     far = fc.obstacles.HalfSpace((0.0, 500.0), (0.0, -1.0))
@@ -477,8 +476,7 @@ def test_a_window_without_a_display_is_refused(tmp_path, capsys, monkeypatch):
     case = fc.Model(fc.generate.half_spheres(size=25.0), kinematics="axisymmetric")
     with fc.ResultWriter(tmp_path / "a.vtkhdf", case) as out:
         case.add_material(fc.LinearElastic(E=20_000.0, nu=0.3))
-        case.prescribe("A2B2", y=-2.0)
-        case.prescribe("A1B1", y=2.0)
+        supported(case, A2B2={"y": -2.0}, A1B1={"y": 2.0})
         case.add_contact("hertz", secondary="CONT1", primary="CONT2")
         fc.solve(case, 1, on_step=out.write)
     assert main(["plot", str(tmp_path / "a.vtkhdf"), "--view"]) == 1

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 
 import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
@@ -74,8 +74,7 @@ def test_the_middle_of_two_bodies_is_the_same_from_either_side(swapped):
     mesh = fc.generate.transformed(
         fc.generate.cylinder_on_block("quad4", size=8.0, contact_size=0.5), translate=(20.0, 0)
     )
-    model = elastic_model(mesh, "plane_strain", E=1e5, AXIS="x", BLOCK_BOTTOM="y")
-    model.prescribe("CYLINDER_TOP", y=-0.5)
+    model = elastic_model(mesh, "plane_strain", E=1e5, AXIS="x", BLOCK_BOTTOM="y", CYLINDER_TOP={"y": -0.5})
     sides = ["CONT_CYLINDER", "CONT_BLOCK"]
     secondary, primary = reversed(sides) if swapped else sides
     model.add_contact("c", secondary=secondary, primary=primary)
@@ -126,9 +125,7 @@ def test_in_space_distances_are_from_the_centre_of_pressure_or_the_planes_of_sym
     mesh = fc.generate.box((size, size, 1.0), (n, n, 4), "hex8", (at[0] + low, at[1] + low, at[2] - 1.0))
     model = elastic_model(mesh, "3d", E=E)
     if quarter:
-        model.fix("XMIN", "x")
-        model.fix("YMIN", "y")
-        model.fix("ZMIN", "z")
+        supported(model, XMIN="x", YMIN="y", ZMIN="z")
     else:
         model.fix("ZMIN", "xyz")
     ball = fc.obstacles.Sphere(centre=(at[0], at[1], at[2] + 3.0), R=3.0)

@@ -1,4 +1,4 @@
-"""Options of contact pairs, from Python and from case files, and their messages."""
+"""Options and formulations of contact pairs, from Python and from case files, and their messages."""
 
 import copy
 import tomllib
@@ -10,6 +10,7 @@ from pairwise import first_of
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.cases.summary import lines, of_step, summarise
+from fastcontact.contact.formulations import FORMULATIONS, Formulation
 
 CASE = """
 kinematics = "plane_strain"
@@ -122,3 +123,10 @@ def test_the_summary_tells_the_penetration(tmp_path):
     stiff = summarise(case_with(""), fc.solve(case_with("").model, case.ramp)[-1], [], {}, [])
     assert stiff["contact"]["pair"]["penetration"] < 1e-15
     assert stiff["contact"]["pair"]["penalty"] is None
+
+
+def test_every_name_has_a_class_and_others_have_none():
+    assert set(FORMULATIONS) >= {"node_to_segment", "continuous", "mortar"}
+    assert len(FORMULATIONS) == len(list(FORMULATIONS))
+    assert all(issubclass(kind, Formulation) for kind in FORMULATIONS.values())
+    assert FORMULATIONS.get("mortal") is None

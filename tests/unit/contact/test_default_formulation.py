@@ -1,4 +1,4 @@
-"""The default formulation is accurate on any two surfaces, also where others are not."""
+"""The default formulation is accurate on any two surfaces, and on each facet type against rigid obstacles."""
 
 import logging
 
@@ -7,6 +7,8 @@ import pytest
 from models import elastic_model, united
 
 import fastcontact as fc
+from fastcontact.contact import multiplier_field
+from fastcontact.mesh import elements
 from fastcontact.mesh.generate import union
 
 E, NU = 210e3, 0.3
@@ -62,8 +64,7 @@ def test_what_matches_at_first_is_right_after_sliding(part, swapped):
         cells = 16 * level
         shoe = bent(element, (48.0, 50.0), (cells, 2 * level), (-0.4 * np.pi, -0.6 * np.pi))
         hollow = bent(element, (50.0, 54.0), (2 * cells, 4 * level), (-0.3 * np.pi, -0.7 * np.pi))
-        model = elastic_model(united(SHOE_=shoe, HOLLOW_=hollow), "plane_strain", E=E, nu=NU)
-        model.fix("HOLLOW_TOP", "xy")
+        model = elastic_model(united(SHOE_=shoe, HOLLOW_=hollow), "plane_strain", E=E, nu=NU, HOLLOW_TOP="xy")
 
         def moved(X, axis):
             turned = X @ np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
@@ -82,8 +83,7 @@ def test_sides_that_mix_linear_and_quadratic_facets():
         return union(*(fc.generate.block((1.0, 1.0), (4, 4), e, (1.1 * k, y)) for k, e in enumerate(elements)))
 
     mesh = united(LOW_=row(-1.0, "quad4", "quad8"), UP_=row(0.0, "quad8", "tri3"))
-    model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy")
-    model.prescribe("UP_TOP", x=0.0, y=-0.02)
+    model = elastic_model(mesh, "plane_strain", E=E, nu=0.0, LOW_BOTTOM="xy", UP_TOP={"x": 0.0, "y": -0.02})
     model.add_contact("pair", secondary="UP_BOTTOM", primary="LOW_TOP")
     np.testing.assert_allclose(solved(model).pressure, 0.01 * E, rtol=1e-8)
 
@@ -106,3 +106,55 @@ def test_the_choice_is_seen_in_the_log(caplog):
         "contact 'pair': mortar with dual multipliers, since these are accurate on any two surfaces and cost little with "
         "every linear solver"
     ]
+
+
+CHOICES = {
+    "tri3": "node_to_segment", "tri6": "continuous", "quad4": "continuous", "quad8": "continuous", "tet4": "node_to_segment",
+    "hex8": "node_to_segment", "wedge6": "node_to_segment", "tet10": "continuous", "hex20": "continuous",
+    "hex27": "node_to_segment",
+}  # fmt: skip
+
+
+def pressed(element, **options):
+    """Return the model of a block under a ball."""
+    mesh = fc.generate.graded_block(element, width=10.0, contact_radius=2.5, contact_size=0.5, size=2.5)
+    up = "xyz"[mesh.dim - 1]
+    model = elastic_model(mesh, "axisymmetric" if mesh.dim == 2 else "3d", E=2e5, BOTTOM=up, SYMMETRY_X="x")
+    if mesh.dim == 3:
+        model.fix("SYMMETRY_Y", "y")
+    ball = fc.obstacles.Sphere((0.0,) * (mesh.dim - 1) + (50.0,), 50.0)
+    model.add_obstacle("ball", secondary="CONTACT", obstacle=ball, motion={up: -0.1}, **options)
+    return model
+
+
+@pytest.mark.parametrize(("element", "expected"), CHOICES.items())
+def test_the_choice_follows_the_cells(element, expected):
+    mesh = (fc.generate.block if elements.get(element).dim == 2 else fc.generate.box)(
+        (1.0,) * elements.get(element).dim, (1,) * elements.get(element).dim, element
+    ).with_facet_group("SIDE", lambda x: x[:, -1] == x[:, -1].max())
+    model = fc.Model(mesh, "plane_strain" if mesh.dim == 2 else "3d")
+    wall = fc.obstacles.HalfSpace((0.0,) * mesh.dim, (0.0,) * (mesh.dim - 1) + (-1.0,))
+    model.add_obstacle("wall", secondary="SIDE", obstacle=wall)
+    other = fc.obstacles.HalfSpace((0.0,) * (mesh.dim - 1) + (5.0,), (0.0,) * (mesh.dim - 1) + (-1.0,))
+    model.add_obstacle("field", secondary="SIDE", obstacle=other, integration="simpson")
+    another = fc.obstacles.HalfSpace((0.0,) * (mesh.dim - 1) + (6.0,), (0.0,) * (mesh.dim - 1) + (-1.0,))
+    model.add_obstacle("rubbing", secondary="SIDE", obstacle=another, friction=0.2)
+    rubbing = "mortar" if mesh.dim == 3 and expected == "continuous" else expected
+    assert [pair.formulation for pair in model.contact] == [expected, "continuous", rubbing]
+
+
+def test_triangles_under_a_ball_have_no_oscillating_pressure():
+    """The mesh-converged largest pressure is 6957 to 0.1 %; that of the continuous formulation is 43 % above it here."""
+    (step,) = fc.solve(pressed("tri3"), fc.linear_ramp(1))
+    assert step.contact["ball"].pressure_max == pytest.approx(6957.0, rel=0.08)
+    (step,) = fc.solve(pressed("tri3", formulation="continuous"), fc.linear_ramp(1))
+    assert step.contact["ball"].pressure_max > 1.3 * 6957.0
+
+
+def test_a_dense_matrix_too_large_to_be_of_use_is_refused(monkeypatch):
+    monkeypatch.setattr(multiplier_field, "MOST_ROWS", 20)
+    with pytest.raises(
+        fc.ContactError,
+        match=r"closes \d+ integration points at once.*use formulation='mortar' with multipliers='dual'",
+    ):
+        fc.solve(pressed("hex20"), fc.linear_ramp(1), linear_solver="direct")

@@ -1,15 +1,27 @@
-"""Projection on lines along averaged normals: compared with a plain solution, and its continuity."""
+"""Projection on lines and facets along averaged normals: kernels compared with NumPy, continuity, invariants."""
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import fastcontact as fc
+from fastcontact._jit import decorators
+from fastcontact.contact import projection, projection_kernels
 from fastcontact.contact.pairing import pair
-from fastcontact.contact.projection import along_line_normals, at_nodes_of_facets, interpolated, places, smooth_normals
+from fastcontact.contact.projection import (
+    along_line_normals,
+    along_normals,
+    at_nodes_of_facets,
+    facet_normals,
+    interpolated,
+    nodal_normals,
+    places,
+    smooth_normals,
+)
 from fastcontact.contact.search.closest import closest_of_kinds
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
+from fastcontact.mesh.generate import box, merge_points, union
 
 
 def wavy(element, n=8):
@@ -107,3 +119,161 @@ def test_a_closed_line_has_no_end():
     assert found.paired.all()
     # On a circle nodal means are radial, so the projection runs towards the centre.
     assert np.abs(found.normal - np.column_stack([np.cos(angle), np.sin(angle)])).max() < 1e-12
+
+
+KINDS = ("hex8", "hex20", "hex27", "tet4", "tet10")
+
+
+def rough(element, n=3, by=0.03):
+    """A box with a rough top, and its top."""
+    mesh = box((1.0, 1.0, 1.0), (n, n, 1), element)
+    points = mesh.points.copy()
+    points[:, 2] += by * np.sin(17.0 * np.arange(len(points))) * (points[:, 2] > 0.99)
+    mesh = mesh.replace(points=points)
+    return mesh.points, surface(mesh, "ZMAX")
+
+
+def mixed():
+    """A top of quadrangles and triangles, a little rough."""
+    halves = union(box((0.5, 1, 1), (2, 4, 1), "hex8"), box((0.5, 1, 1), (2, 4, 1), "wedge6", (0.5, 0, 0)))
+    mesh = merge_points(halves, tolerance=1e-9)
+    points = mesh.points + 0.02 * np.sin(np.arange(mesh.points.size)).reshape(-1, 3)
+    return points, surface(mesh, "ZMAX")
+
+
+def above(n, seed=0, beside=0.1):
+    rng = np.random.default_rng(seed)
+    return rng.uniform([-beside, -beside, 0.9], [1 + beside, 1 + beside, 1.2], (n, 3))
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_normals_are_those_of_the_tangents(element):
+    points, side = rough(element)
+    (block,) = side.blocks
+    facet = elements.get(block.element)
+    tangent = np.einsum("akj,fkd->fadj", facet.gradient(facet.nodes), points[block.facets])
+    normal = np.cross(tangent[..., 0], tangent[..., 1])
+    normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+    assert facet_normals(block, points) == pytest.approx(normal, abs=1e-13)
+
+
+@pytest.mark.parametrize("element", KINDS)
+def test_means_are_weighted_by_the_angles_at_corners(element):
+    points, side = rough(element)
+    (block,) = side.blocks
+    facet = elements.get(block.element)
+    total, own = np.zeros((len(side.points), 3)), facet_normals(block, points)
+    for row, nodes in enumerate(block.facets):
+        for a in range(facet.n_nodes):
+            weight = 1.0
+            if a < facet.n_corners:
+                ends = [b if a == c else c for b, c in facet.edges if a in (b, c)]
+                p, q = points[nodes[ends]] - points[nodes[a]]
+                weight = np.arccos(p @ q / np.linalg.norm(p) / np.linalg.norm(q))
+            total[block.local[row, a]] += weight * own[row, a]
+    total /= np.linalg.norm(total, axis=1, keepdims=True)
+    assert nodal_normals(side, points) == pytest.approx(total, abs=1e-13)
+
+
+@pytest.mark.parametrize("element", KINDS)
+@pytest.mark.parametrize("shift", [0.0, 1e4])
+def test_points_lie_along_the_normal_of_their_projection_of_projection_kernels(element, shift):
+    points, side = rough(element, by=0.02)
+    points, candidates = points + shift, above(200, beside=-0.1) + shift
+    normals = at_nodes_of_facets(smooth_normals(side, points))
+    start = closest_of_kinds(candidates, side.corners(points))
+    facet, xi, overhang, normal = along_normals(candidates, side, points, normals, start)
+    at = places(side, facet, xi)
+    foot = np.einsum("nk,nkd->nd", at.shape, points[at.nodes])
+    assert (overhang == 0.0).all()
+    assert normal == pytest.approx(interpolated(normals[facet], at), abs=1e-13)
+    assert np.abs(np.cross(candidates - foot, normal)).max() < 1e-12 * max(1.0, shift)
+
+
+def test_beyond_the_end_the_projection_stays_in_the_facet_and_tells_by_how_much():
+    points, side = rough("hex8", 4, 0.0)
+    candidates = np.array([[1.1, 0.3, 1.1], [0.3, -0.05, 1.2], [0.3, 0.3, 1.0]])
+    normals = at_nodes_of_facets(smooth_normals(side, points))
+    facet, xi, overhang, normal = along_normals(
+        candidates, side, points, normals, closest_of_kinds(candidates, side.corners(points))
+    )
+    assert overhang == pytest.approx([0.4, 0.2, 0.0], abs=1e-12)  # facets are a quarter long
+    assert (np.abs(xi) <= 1.0).all()
+    assert normal == pytest.approx(np.tile([0.0, 0, 1], (3, 1)), abs=1e-15)
+    foot = np.einsum("nk,nkd->nd", (at := places(side, facet, xi)).shape, points[at.nodes])
+    assert foot == pytest.approx(np.array([[1.0, 0.3, 1.0], [0.3, 0.0, 1.0], [0.3, 0.3, 1.0]]), abs=1e-12)
+
+
+def test_a_facet_that_is_left_hands_on_to_the_one_beside_it_of_any_kind():
+    """From a wrong start the same feet are found as from the closest points, over triangles and quadrangles."""
+    points, side = mixed()
+    candidates = above(150, beside=-0.05)
+    normals = at_nodes_of_facets(smooth_normals(side, points))
+    start = closest_of_kinds(candidates, side.corners(points))
+    facet, xi, overhang, _ = along_normals(candidates, side, points, normals, start)
+    begin, beside = side.neighbours
+    wrong = np.array([beside[begin[f]] for f in facet])
+    corner = np.where(side.triangular[wrong, None], 0.3, 0.0) * np.ones((1, 2))
+    again = along_normals(candidates, side, points, normals, start._replace(facet=wrong, xi=corner))
+    feet = [
+        np.einsum("nk,nkd->nd", (at := places(side, f, x)).shape, points[at.nodes]) for f, x in ((facet, xi), again[:2])
+    ]
+    # Where the facet of the start lies too far away for its plane to mean anything, the start is kept.
+    aside = np.abs(np.cross(candidates - feet[1], again[3])).max(axis=1)
+    inner = (overhang == 0.0) & (again[2] == 0.0) & (aside < 1e-11)
+    assert inner.mean() > 0.8
+    assert len(np.unique(side.triangular[facet[inner]])) == 2
+    assert feet[0][inner] == pytest.approx(feet[1][inner], abs=1e-11)
+
+
+def test_where_no_step_is_possible_the_closest_point_stays():
+    points, side = rough("hex8", 2, 0.0)
+    normals = np.tile([1.0, 0.0, 0.0], (side.n_facets, 4, 1))  # along the facets
+    candidates = above(20, beside=-0.1)
+    start = closest_of_kinds(candidates, side.corners(points))
+    facet, xi, _, _ = along_normals(candidates, side, points, normals, start)
+    assert (facet == start.facet).all()
+    assert (xi == start.xi).all()
+
+
+def test_neighbours_share_a_node():
+    _, side = mixed()
+    begin, beside = side.neighbours
+    nodes = [set(facet) for block in side.blocks for facet in block.local.tolist()]
+    for f in range(side.n_facets):
+        assert beside[begin[f] : begin[f + 1]].tolist() == [
+            g for g in range(side.n_facets) if g != f and nodes[f] & nodes[g]
+        ]
+
+
+def test_corners_are_taken_one_by_one():
+    """At every corner of a box the facets of each face have the normal of the face, whatever the number of corners."""
+    mesh = fc.generate.box((1.0, 1.0, 1.0), (2, 2, 2), "hex8")
+    side = surface(mesh.replace(cell_groups={**mesh.cell_groups, "ALL": np.concatenate(
+        [mesh.cell_groups[name] for name in ("XMIN", "XMAX", "YMIN", "YMAX", "ZMIN", "ZMAX")]
+    )}), "ALL")  # fmt: skip
+    (normals,) = smooth_normals(side, mesh.points)
+    assert normals == pytest.approx(facet_normals(side.blocks[0], mesh.points), abs=1e-15)
+
+
+@pytest.mark.skipif(not decorators.compiled(), reason="one thread interprets")
+def test_threads_change_no_bit(monkeypatch):
+    points, side = mixed()
+    candidates = above(200)
+    normals = at_nodes_of_facets(smooth_normals(side, points))
+    start = closest_of_kinds(candidates, side.corners(points))
+    alone = along_normals(candidates, side, points, normals, start)
+    monkeypatch.setattr(projection, "portions", lambda count, nodes=1: [(0, 3), (3, count // 2), (count // 2, count)])
+    for one, other in zip(alone, along_normals(candidates, side, points, normals, start), strict=True):
+        assert (one == other).all()
+    for block in side.blocks:
+        assert np.array_equal(facet_normals(block, points), facet_normals(block, points))
+
+
+def test_reference_coordinates_in_and_beyond_a_facet():
+    for triangle, s, t, out, kept in (
+        (True, 0.2, 0.3, 0.0, (0.2, 0.3)), (True, 0.9, 0.6, 0.5, (0.6, 0.4)), (True, -0.25, 0.5, 0.25, (0.0, 0.4)),
+        (False, 0.2, -0.3, 0.0, (0.2, -0.3)), (False, 1.5, 0.0, 0.25, (1.0, 0.0)), (False, -2.0, 3.0, 1.0, (-1.0, 1.0)),
+    ):  # fmt: skip
+        assert projection_kernels.beyond(triangle, s, t) == pytest.approx(out)
+        assert projection_kernels.inside(triangle, s, t) == pytest.approx(kept)

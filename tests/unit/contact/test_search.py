@@ -1,13 +1,17 @@
-"""The tree search compared with brute force."""
+"""The closest facet compared with brute force, and the frame of the projection."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from fastcontact import ContactError
 from fastcontact._jit import decorators
-from fastcontact.contact.search.closest import closest
+from fastcontact.contact.search.closest import closest, closest_of_kinds
+from fastcontact.contact.search.facet_tables import flat_triangles, tables, terms
+from fastcontact.mesh import elements
 
 
 def search(points, corners):
@@ -136,3 +140,264 @@ def test_points_that_are_not_finite_are_told():
     points[3, 1] = np.nan
     with pytest.raises(ContactError, match="1 points to project are not finite"):
         closest(points, corners)
+
+
+KINDS = ("tri3", "tri6", "quad4", "quad8", "quad9")
+BY_SIZE = {elements.get(name).n_nodes: elements.get(name) for name in KINDS}
+
+
+def triangular(name):
+    return name.startswith("tri")
+
+
+def grid(name, n):
+    """Reference coordinates (m, 2) all over a facet, its sides included."""
+    if triangular(name):
+        s, t = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, n), np.linspace(0, 1, n), indexing="ij"))
+        inside = s + t <= 1 + 1e-12
+        return np.column_stack([s[inside], t[inside]])
+    s, t = np.meshgrid(np.linspace(-1, 1, n), np.linspace(-1, 1, n), indexing="ij")
+    return np.column_stack([s.ravel(), t.ravel()])
+
+
+def scattered(name, seed, n, bend=0.02):
+    """Facets (n, n_nodes, 3) of about unit size anywhere in a cube, bent at random, and points near them."""
+    rng, element = np.random.default_rng(seed), elements.get(name)
+    flat = np.column_stack([element.nodes / (1 if triangular(name) else 2), np.zeros(element.n_nodes)])
+    turns = Rotation.random(n, random_state=seed).as_matrix()
+    facets = (flat * rng.uniform(0.5, 1.5, (n, 1, 3)) + bend * rng.normal(size=(n, *flat.shape))) @ turns
+    facets += rng.uniform(-2, 2, (n, 1, 3))
+    points = facets[rng.integers(n, size=20)].mean(axis=1) + rng.uniform(-0.7, 0.7, (20, 3))
+    return np.ascontiguousarray(facets), points
+
+
+def on_facets(corners, facet, xi):
+    return np.einsum("nk,nkd->nd", BY_SIZE[corners.shape[1]].shape(xi), corners[facet])
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(1, 30), name=st.sampled_from(KINDS))
+def test_the_closest_facet_is_found_of_search_3d(seed, n, name):
+    corners, points = scattered(name, seed, n)
+    found = closest(points, corners)
+    samples = np.einsum("qk,nkd->nqd", elements.get(name).shape(grid(name, 61)), corners).reshape(-1, 3)
+    expected = cKDTree(samples).query(points)[0]
+    assert np.abs(on_facets(corners, found.facet, found.xi) - found.position).max() < 1e-11
+    assert np.abs(np.linalg.norm(points - found.position, axis=1) - found.distance).max() < 1e-15
+    assert (found.distance <= expected + 1e-12).all()
+    assert (found.distance >= expected - 0.06).all()
+    assert np.abs(np.linalg.norm(found.normal, axis=1) - 1).max() < 1e-14
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), name=st.sampled_from(KINDS))
+def test_a_projection_inside_a_facet_is_perpendicular_to_it(seed, name):
+    corners, points = scattered(name, seed, 6)
+    found = closest(points, corners)
+    s, t = found.xi.T
+    inside = (
+        np.minimum.reduce([s, t, 1 - s - t]) > 1e-9 if triangular(name) else np.abs(found.xi).max(axis=1) < 1 - 1e-9
+    )
+    assert (found.overhang[inside] == 0).all()
+    gap = np.einsum("nd,nd->n", points - found.position, found.normal)
+    assert np.abs(np.abs(gap) - found.distance)[inside].max(initial=0.0) < 1e-11
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_facets_of_a_sphere_have_outward_normals_of_their_order(name):
+    """Patches of the sphere of radius 10 about the x axis, seen from points outside and inside."""
+    element, n = elements.get(name), 8
+    step = 0.8 / n
+    lower = np.array([[-0.4 + step * i, -0.4 + step * j] for i in range(n) for j in range(n)])
+    local = element.nodes if triangular(name) else 0.5 * (1 + element.nodes)
+    angles = [lower[:, None] + step * local]
+    if triangular(name):
+        angles.append(lower[:, None] + step * (1 - local))
+    theta, phi = np.moveaxis(np.concatenate(angles), 2, 0)
+
+    def ball(theta, phi, radius):
+        return radius * np.stack([np.cos(theta) * np.cos(phi), np.sin(theta) * np.cos(phi), np.sin(phi)], axis=-1)
+
+    rng = np.random.default_rng(1)
+    angle = rng.uniform(-0.39, 0.39, (2, 200))
+    for radius in (11.0, 9.5):
+        found = closest(ball(*angle, radius), ball(theta, phi, 10.0))
+        assert np.abs(found.distance - abs(radius - 10)).max() < (3e-2 if element.order == 1 else 2e-4)
+        assert np.abs(found.normal - ball(*angle, 1.0)).max() < (0.08 if element.order == 1 else 4e-3)
+
+
+def test_the_saddle_is_exact():
+    """The facet z = x y: seen from a point above its middle that is stationary, but the ridges come closer."""
+    corners = np.array([[[-1.0, -1, 1], [1, -1, -1], [1, 1, 1], [-1, 1, -1]]])
+    found = closest(np.array([[0.0, 0.0, 3.0], [0.3, -0.2, -0.06], [2.0, 2.0, 1.0]]), corners)
+    # Minimise 2 x^2 + (x^2 - 3)^2 along x = y: x^2 = 2, beyond the corner (1, 1).
+    assert np.abs(found.xi[0]) == pytest.approx([1.0, 1.0], abs=0)
+    assert found.distance[0] == pytest.approx(np.sqrt(6), rel=1e-15)
+    assert found.xi[1] == pytest.approx([0.3, -0.2], abs=1e-12)
+    assert found.distance[1] == pytest.approx(0.0, abs=1e-14)
+    assert found.normal[1] == pytest.approx(np.array([0.2, -0.3, 1.0]) / np.sqrt(1.13), abs=1e-12)
+    assert found.xi[2] == pytest.approx([1.0, 1.0], abs=0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_facets_that_share_the_closest_point_are_ties_for_the_first(name):
+    element = elements.get(name)
+    rng = np.random.default_rng(3)
+    turns = [Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix() for angle in rng.permutation(6)]
+    start = np.column_stack([element.nodes - element.nodes[0], np.zeros(element.n_nodes)])
+    facets = np.stack([start @ turn.T for turn in turns])  # all meet at the origin
+    points = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1e-13], [0.0, 0.0, 0.0]])
+    for order in (np.arange(6), rng.permutation(6)):
+        found = closest(points, facets[order])
+        assert found.facet.tolist() == [0, 0, 0]
+        assert found.xi == pytest.approx(np.tile(element.nodes[0], (3, 1)), abs=1e-9)
+
+
+def test_overhang_counts_facet_lengths_beyond_the_sides():
+    quad = np.array([[[0.0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]])
+    triangle = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 1, 0]]])
+    points = np.array([[3.0, 0.5, 1], [1.0, -0.25, 0], [-1.0, 1.5, 0.1], [0.5, 0.2, 5]])
+    assert closest(points, quad).overhang == pytest.approx([0.5, 0.25, 0.5, 0.0], abs=1e-15)
+    # Beyond the third side s + t = 1 of the triangle: (3, 0.5) has s = 1.5, t = 0.5; its foot is the corner (2, 0).
+    assert closest(points, triangle).overhang == pytest.approx([1.0, 0.25, 0.5, 0.0], abs=1e-15)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_turning_and_scaling_everything_changes_only_rounding(name):
+    corners, points = scattered(name, 5, 25)
+    turn, shift, scale = Rotation.random(random_state=6).as_matrix(), np.array([3.0, -20.0, 7.0]), 1e-6
+    one = closest(points, corners)
+    other = closest(scale * (points @ turn.T + shift), scale * (corners @ turn.T + shift))
+    assert np.array_equal(one.facet, other.facet)
+    assert np.abs(one.xi - other.xi).max() < 1e-11
+    assert np.abs(one.overhang - other.overhang).max() < 1e-11
+    assert np.abs(one.distance - other.distance / scale).max() < 1e-12
+    assert np.abs(one.normal @ turn.T - other.normal).max() < 1e-11
+
+
+def test_several_kinds_are_one_surface():
+    kinds = [scattered(name, 7, 9)[0] for name in ("tri3", "quad8", "tri6")]
+    points = scattered("quad4", 8, 30)[1]
+    found = closest_of_kinds(points, kinds)
+    alone = [closest(points, corners) for corners in kinds]
+    assert found.distance == pytest.approx(np.min([one.distance for one in alone], axis=0), abs=0)
+    for i, facet in enumerate(found.facet):
+        kind, row = divmod(facet, 9)
+        assert alone[kind].facet[i] == row
+        assert alone[kind].xi[i] == pytest.approx(found.xi[i], abs=0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_tables_are_those_of_the_elements(name):
+    element = elements.get(name)
+    nodes, sides, to_terms, (bend, turn, second) = tables(element.n_nodes)
+    assert np.array_equal(nodes, element.nodes)
+    xi = grid(name, 31)
+    assert np.abs(terms(xi, element.n_nodes) @ to_terms - element.shape(xi)).max() < 1e-14
+    assert (xi @ sides[:, :2].T <= sides[:, 2] + 1e-14).all()
+    # Facets lie no farther than their bend from the flat triangles between their nodes.
+    corners = np.random.default_rng(2).normal(size=(50, element.n_nodes, 3))
+    allowed = np.linalg.norm(to_terms @ corners, axis=2) @ bend
+    weights = np.array([[1, 1, 1], [2, 1, 0], [0, 1, 2], [3, 1, 2]]) / np.array([[3], [3], [3], [6]])
+    for flat in flat_triangles(element.n_nodes):
+        curved = np.einsum("qk,nkd->nqd", element.shape(weights @ nodes[flat]), corners)
+        assert (np.linalg.norm(curved - weights @ corners[:, flat], axis=2) <= allowed[:, None] + 1e-12).all()
+    # Tangents at two places of the domain, one of them (0, 0), and second derivatives, by differences.
+    places, step = xi * (1 - 2e-4) + 1e-4 * nodes.mean(axis=0), 1e-4
+    at = lambda s, t: terms(places + step * np.array([s, t]), element.n_nodes)  # noqa: E731
+    slopes = np.stack([at(1, 0) - at(-1, 0), at(0, 1) - at(0, -1)], axis=-1) / (2 * step)
+    start = np.eye(element.n_nodes)[:, [1, 2]]
+    assert (np.linalg.norm(slopes - start, axis=2).max(axis=0)[3:] <= turn[3:] + 1e-7).all()
+    both = (at(1, 1) - at(1, -1) - at(-1, 1) + at(-1, -1)) / (4 * step**2)
+    twice = [(at(s, t) - 2 * at(0, 0) + at(-s, -t)) / step**2 for s, t in ((1, 0), (0, 1))]
+    hessians = np.stack([twice[0], both, both, twice[1]], axis=-1).reshape(*both.shape, 2, 2)
+    assert (np.linalg.norm(hessians, ord=2, axis=(2, 3)).max(axis=0)[3:] <= second[3:] + 1e-5).all()
+    areas = [np.linalg.det(nodes[flat[1:]] - nodes[flat[0]]) / 2 for flat in flat_triangles(element.n_nodes)]
+    assert min(areas) > 0
+    assert sum(areas) == pytest.approx(0.5 if triangular(name) else 4.0)
+
+
+def wavy(name, n):
+    """A connected surface of facets (n_facets, n_nodes, 3) over the unit square, and points near it and at its nodes."""
+    element, rng = elements.get(name), np.random.default_rng(11)
+    lower = np.array([[i, j] for i in range(n) for j in range(n)]) / n
+    local = element.nodes if triangular(name) else 0.5 * (1 + element.nodes)
+    parts = [lower[:, None] + local / n] + ([lower[:, None] + (1 - local) / n] if triangular(name) else [])
+    x, y = np.moveaxis(np.concatenate(parts), 2, 0)
+    facets = np.stack([x, y, 0.1 * np.sin(5 * x) * np.cos(4 * y)], axis=-1)
+    near = facets.mean(axis=1) + rng.normal(0, 0.3 / n, (len(facets), 3))
+    return facets, np.concatenate([near, facets[:40, 0], facets[:40, 1], 1e6 * rng.normal(size=(20, 3))])
+
+
+def of_lowest_number(points, facets):
+    """Distances to the closest facet and the first of those that are equally close, one facet after the other."""
+    found = [closest(points, facets[f : f + 1]) for f in range(len(facets))]
+    distance = np.array([one.distance for one in found])
+    best = distance.min(axis=0)
+    place = np.array([one.position for one in found])
+    nearest = place[distance.argmin(axis=0), np.arange(len(points))]
+    size = np.ptp(facets, axis=1).max()
+    meet = np.linalg.norm(place - nearest, axis=2) <= 1e-10 * size
+    return best, np.argmax(meet & (distance <= best + 1e-10 * size + 1e-14 * best), axis=0)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_tree_finds_what_one_facet_after_the_other_finds_of_search_3d(name):
+    """Points at the nodes are shared by several facets, points a million sizes away nearly as close to many."""
+    facets, points = wavy(name, 9)
+    found = closest(points, facets)
+    distance, first = of_lowest_number(points, facets)
+    assert np.abs(found.distance - distance).max() <= 1e-15 * distance.max()
+    assert np.abs(found.distance - distance)[:-20].max() < 1e-14
+    assert np.array_equal(found.facet[:-20], first[:-20])
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_the_order_of_points_and_facets_changes_nothing(name):
+    facets, points = wavy(name, 9)
+    found, rng = closest(points, facets), np.random.default_rng(12)
+    some = rng.permutation(len(points))
+    again = closest(points[some], facets)
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(again, field), getattr(found, field)[some])
+    for i in some[:30]:
+        assert closest(points[i : i + 1], facets).facet[0] == found.facet[i]
+    turned = rng.permutation(len(facets))
+    other = closest(points, facets[turned])
+    assert np.abs(other.distance - found.distance).max() <= 1e-15 * found.distance.max()
+    # The same facet but where several meet in the closest point, and then the same point.
+    alike = turned[other.facet] == found.facet
+    assert alike.mean() > 0.5
+    assert np.array_equal(other.xi[alike], found.xi[alike])
+    assert np.abs(other.position - found.position)[:-20].max() < 1e-9
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_of_facets_that_coincide_the_first_is_taken(name):
+    facets, points = wavy(name, 5)
+    found, doubled = closest(points, facets), closest(points, np.concatenate([facets, facets, facets]))
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(doubled, field), getattr(found, field))
+
+
+@pytest.mark.parametrize("name", ["tri3", "quad4", "quad8"])
+def test_threads_do_not_change_a_bit_of_search_3d(name, monkeypatch):
+    facets, points = wavy(name, 30)
+    points = np.concatenate([points + 1e-3 * k for k in range(30_000 // len(points) + 1)])
+    found = []
+    for count in (1, 2, 3):
+        monkeypatch.setattr(decorators, "threads", lambda count=count: count)
+        found.append(closest(points, facets))
+    for field in ("facet", "xi", "normal", "overhang", "position", "distance"):
+        assert np.array_equal(getattr(found[0], field), getattr(found[1], field))
+        assert np.array_equal(getattr(found[0], field), getattr(found[2], field))
+
+
+def test_what_cannot_be_projected_is_told():
+    corners, points = scattered("quad4", 1, 3)
+    with pytest.raises(ContactError, match="1 points to project are not finite"):
+        closest(np.vstack([points, [np.nan, 0, 0]]), corners)
+    with pytest.raises(ContactError, match=r"did not converge .* folded or collapsed"):
+        closest(points, np.ones((1, 4, 3)))
+    with pytest.raises(ContactError, match=r"no facets of 5 nodes .* \[3, 4, 6, 8, 9\]"):
+        closest(points, np.ones((1, 5, 3)))

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from models import supported
 from scipy.spatial.transform import Rotation
 
 import fastcontact as fc
@@ -107,8 +108,7 @@ def fit(element="quad4", divisions=(24, 36), clearance=-0.05, **options):
     mesh = fc.generate.rings(element, divisions_inner=(6, divisions[0]), divisions_outer=(6, divisions[1]))
     model = fc.Model(mesh, "plane_strain")
     model.add_material(STEEL)
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
     if clearance is not None:
         options["clearance"] = clearance
     model.add_contact("fit", secondary="CONT_INNER", primary="CONT_OUTER", **options)
@@ -157,8 +157,7 @@ def test_the_error_told_of_a_press_fit_is_right_within_a_factor_of_three(divisio
     model = fc.Model(mesh, kinematics="plane_strain")
     model.add_material(STEEL, groups=["INNER"])
     model.add_material(fc.LinearElastic(E=70e3, nu=0.33), groups=["OUTER"])
-    model.fix("SYMMETRY_X", "x")
-    model.fix("SYMMETRY_Y", "y")
+    supported(model, SYMMETRY_X="x", SYMMETRY_Y="y")
     primary = "CONT_OUTER" if secondary == "CONT_INNER" else "CONT_INNER"
     options = {} if formulation == "node_to_segment" else {"surface_smoothing": False}
     model.add_contact("fit", secondary=secondary, primary=primary, clearance=-0.05, formulation=formulation, **options)

@@ -172,8 +172,8 @@ def block(element="quad4", kinematics="plane_strain", **material):
     ],
 )
 def test_who_has_a_mean_dilatation(material, averaged):
-    assert block(**material).averaged_materials().tolist() == [averaged]
-    assert block(kinematics="plane_stress", **material).averaged_materials().tolist() == [False]
+    assert block(**material).material_field().averaged.tolist() == [averaged]
+    assert block(kinematics="plane_stress", **material).material_field().averaged.tolist() == [False]
 
 
 def test_an_unknown_choice_is_refused():

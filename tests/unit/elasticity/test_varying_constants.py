@@ -5,7 +5,7 @@ import dataclasses
 import mechanics
 import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
 from pairwise import first_of
 
 import fastcontact as fc
@@ -54,8 +54,7 @@ def ring(element, kinematics, n, power=2.0, nu=0.3):
     model.add_material(
         fc.LinearElastic(E=lambda x: 1000.0 * (x[:, 0] if axisymmetric else np.hypot(*x.T)) ** power, nu=nu)
     )
-    model.fix("BOTTOM", "y")
-    model.fix("TOP", "y" if axisymmetric else "x")
+    supported(model, BOTTOM="y", TOP="y" if axisymmetric else "x")
     model.add_pressure("LEFT", 1.0)
     ratio, factor = (nu, 1 / (1 - nu**2)) if plane else (nu / (1 - nu), (1 - nu) / ((1 + nu) * (1 - 2 * nu)))
     root = np.sqrt(power**2 / 4 + 1 - power * ratio)
@@ -259,9 +258,7 @@ def test_graded_bodies_in_contact_shorten_by_the_integral(formulation):
         return 1000.0 * np.exp((x[:, 1] - base) / height)
 
     model.add_material(fc.LinearElastic(E=E, nu=0.0))
-    model.fix("LOWER_BOTTOM", "y")
-    model.fix("LOWER_LEFT", "x")
-    model.fix("UPPER_LEFT", "x")
+    supported(model, LOWER_BOTTOM="y", LOWER_LEFT="x", UPPER_LEFT="x")
     model.add_pressure("UPPER_TOP", 5.0)
     model.add_contact("pair", secondary="CONT_UPPER", primary="CONT_LOWER", formulation=formulation)
     step = solved(model)
@@ -277,9 +274,7 @@ def test_all_solvers_agree_on_a_graded_hertz_contact(solver):
     forces = []
     for linear in ("cholmod" if solver == "direct" else "direct", solver):
         model = elastic_model(mesh, "axisymmetric", E=fc.Tabulated("y", [(-20.0, 10_000.0), (20.0, 40_000.0)]))
-        model.fix("A1A2", "x")
-        model.prescribe("A2B2", y=-1.0)
-        model.prescribe("A1B1", y=+1.0)
+        supported(model, A1A2="x", A2B2={"y": -1.0}, A1B1={"y": +1.0})
         model.add_contact("hertz", secondary="CONT1", primary="CONT2")
         try:
             step = fc.solve(model, fc.linear_ramp(1), linear_solver=linear)[-1]

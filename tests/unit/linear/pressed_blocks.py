@@ -1,7 +1,7 @@
 """A box and two non-matching blocks, for tests of linear solvers under contact."""
 
 import numpy as np
-from models import united
+from models import supported, united
 
 import fastcontact as fc
 from fastcontact.elasticity.constrained_system import supports_apart
@@ -20,8 +20,7 @@ def pressed(element="hex8", friction=0.0, ratio=1.0, curvature=0.0, n=10, along=
     model = fc.Model(united(L_=part(-0.5, n), U_=upper.replace(points=points)), "3d")
     model.add_material(fc.LinearElastic(ratio, 0.3), groups=["L_BOX"])
     model.add_material(fc.LinearElastic(1.0, 0.3), groups=["U_BOX"])
-    model.fix("L_ZMIN", "xyz")
-    model.prescribe("U_ZMAX", x=along if friction else 0.0, y=0.0, z=-0.01)
+    supported(model, L_ZMIN="xyz", U_ZMAX={"x": along if friction else 0.0, "y": 0.0, "z": -0.01})
     model.add_contact("c", secondary="U_ZMIN", primary="L_ZMAX", friction=friction, **options)
     return model
 

@@ -114,8 +114,7 @@ def continuous(curvature=0.0, **options):
 def on_obstacle(obstacle, element="hex8"):
     divisions = (8, 8, 4) if element == "hex8" else (4, 4, 2)
     mesh = fc.generate.box((1.0, 1.0, 0.5), divisions, element)
-    model = elastic_model(mesh, "3d", E=1.0)
-    model.prescribe("ZMAX", x=0.0, y=0.0, z=-0.01)
+    model = elastic_model(mesh, "3d", E=1.0, ZMAX={"x": 0.0, "y": 0.0, "z": -0.01})
     model.add_obstacle("c", secondary="ZMIN", obstacle=obstacle, formulation="continuous")
     return model
 

@@ -133,8 +133,7 @@ def test_an_iterate_is_left_where_its_monitor_says_so_with_forces_of_all_equatio
 
 def on_wall(friction=0.0, n=8, **options):
     mesh = fc.generate.box((1.0, 1.0, 0.5), (n, n, n // 2), "hex8")
-    model = elastic_model(mesh, "3d", E=1.0)
-    model.prescribe("ZMAX", x=0.004 if friction else 0.0, y=0.0, z=-0.01)
+    model = elastic_model(mesh, "3d", E=1.0, ZMAX={"x": 0.004 if friction else 0.0, "y": 0.0, "z": -0.01})
     wall = fc.obstacles.HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     model.add_obstacle("c", secondary="ZMIN", obstacle=wall, friction=friction, **options)
     return model

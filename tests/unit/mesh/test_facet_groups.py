@@ -1,9 +1,13 @@
-"""Facets selected by position, and meshes cut along them."""
+"""Facets selected by position, cut meshes, and meshes from gmsh, meshio and PyVista in memory."""
 
+import sys
+
+import meshio
 import numpy as np
 import pytest
 
 import fastcontact as fc
+from fastcontact.mesh import elements
 from fastcontact.mesh.topology import bodies, outer_facets
 
 SOLIDS = ("tet4", "tet10", "hex8", "hex20", "hex27", "wedge6", "wedge15", "pyramid5", "pyramid13")
@@ -99,3 +103,207 @@ def test_a_group_by_place_uses_the_facets_that_are_there():
 def test_what_is_refused(call, said):
     with pytest.raises(fc.MeshError, match=said):
         call(bar("quad4"))
+
+
+SOLIDS_OF_LIBRARIES = [name for name, element in elements.ELEMENTS.items() if element.dim == 3]
+
+
+def a_body(element):
+    """Return a mesh with groups of solids, facets and points."""
+    generate = fc.generate.block if elements.get(element).dim == 2 else fc.generate.box
+    size = (2.0, 1.0, 1.5)[: elements.get(element).dim]
+    mesh = generate(size, (2,) * len(size), element)
+    return mesh.with_groups(points={"CORNER": [0], "A name, with signs/": [1, 2]})
+
+
+def assert_same(found, mesh):
+    """The same cells, in any order of elements, and the same members in every group."""
+    np.testing.assert_allclose(found.points, mesh.points, atol=1e-15)
+    assert sorted(found.group_names) == sorted(mesh.group_names)
+    for name, block in mesh.cells.items():
+        np.testing.assert_array_equal(found.cells[name], block)
+    for group in mesh.cell_groups:
+        members, expected = found.cells_of(group), mesh.cells_of(group)
+        assert sorted(members) == sorted(expected)
+        for name, block in expected.items():
+            np.testing.assert_array_equal(members[name], block)
+    for group, members in mesh.point_groups.items():
+        np.testing.assert_array_equal(found.point_groups[group], members)
+
+
+@pytest.mark.parametrize("element", ["tri3", "quad8", "quad9", *SOLIDS_OF_LIBRARIES])
+def test_meshio_hands_over_what_it_read(element, tmp_path):
+    mesh = a_body(element)
+    fc.write_mesh(tmp_path / "a.vtu", mesh)
+    assert_same(fc.from_meshio(meshio.read(tmp_path / "a.vtu")), mesh)
+
+
+def test_meshio_hands_over_sets_and_tags_made_in_memory():
+    points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+    cells = [("quad", [[3, 2, 1, 0]]), ("line", [[0, 1]]), ("vertex", [[2]])]
+    tags = [np.array([1]), np.array([2]), np.array([3])]
+    made = meshio.Mesh(
+        points, cells, cell_data={"gmsh:physical": tags}, field_data={"BODY": [1, 2], "LOW": [2, 1], "TIP": [3, 0]},
+        cell_sets={"SET": [[0], [], []]}, point_sets={"SIDE": [0, 3]},
+    )  # fmt: skip
+    mesh = fc.from_meshio(made)
+    assert mesh.dim == 2
+    assert mesh.cells["quad4"].tolist() == [[3, 0, 1, 2]]  # turned, since it was clockwise
+    assert [mesh.points_of(name).tolist() for name in ("BODY", "LOW", "TIP", "SET", "SIDE")] == [
+        [0, 1, 2, 3], [0, 1], [2], [0, 1, 2, 3], [0, 3]
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("element", ["tri6", "quad4", *SOLIDS_OF_LIBRARIES])
+def test_pyvista_hands_over_a_file_of_ours(element, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    mesh = a_body(element)
+    fc.write_mesh(tmp_path / "a.vtu", mesh)
+    assert_same(fc.from_pyvista(pyvista.read(tmp_path / "a.vtu")), mesh)
+
+
+def test_masks_and_groups_of_results_become_groups():
+    pyvista = pytest.importorskip("pyvista")
+    plane = pyvista.Plane(i_resolution=4, j_resolution=2)
+    plane.cell_data["LEFT"] = plane.cell_centers().points[:, 0] < 0
+    plane.point_data["group_TOP"] = (plane.points[:, 1] > 0.49).astype(np.int8)
+    plane.point_data["group_number"] = np.arange(plane.n_points)  # no group, but a field
+    mesh = fc.from_pyvista(plane)
+    assert mesh.dim == 2
+    assert len(mesh.cells_of("LEFT")["quad4"]) == 4
+    assert (mesh.points[mesh.points_of("TOP"), 1] == 0.5).all()
+    assert mesh.group_names == ["LEFT", "TOP"]
+
+
+def test_cells_that_nobody_knows_are_named():
+    pyvista = pytest.importorskip("pyvista")
+    with pytest.raises(fc.MeshError, match="1 of VTK's type 7"):
+        fc.from_pyvista(
+            pyvista.PolyData(
+                np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [1, 2, 0], [0, 1, 0.0]]), faces=[5, 0, 1, 2, 3, 4]
+            )
+        )
+    with pytest.raises(fc.MeshError, match=r"meshio's mesh: .*kind polygon"):
+        fc.from_meshio(meshio.Mesh(np.eye(3), [("polygon", [[0, 1, 2]])]))
+    with pytest.raises(fc.MeshError, match="no cells"):
+        fc.from_meshio(meshio.Mesh(np.eye(3), []))
+
+
+@pytest.mark.parametrize(
+    ("call", "wanted"), [("from_meshio", "meshio.Mesh"), ("from_pyvista", "pyvista.UnstructuredGrid")]
+)
+def test_what_is_no_mesh_is_refused(call, wanted):
+    with pytest.raises(fc.MeshError, match=f"{call} takes a {wanted}, not str"):
+        getattr(fc, call)("bolt.msh")
+
+
+def test_without_gmsh_the_message_says_how_to_get_it(monkeypatch):
+    monkeypatch.setitem(sys.modules, "gmsh", None)
+    with pytest.raises(fc.FileError, match=r"gmsh cannot be imported .*: pip install gmsh"):
+        fc.from_gmsh()
+
+
+@pytest.fixture
+def gmsh():
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:  # it is installed, but a library of the system that it needs is not
+        pytest.skip(f"gmsh cannot be imported: {error}")
+    gmsh.initialize(interruptible=False)
+    gmsh.option.setNumber("General.Terminal", 0)
+    yield gmsh
+    gmsh.finalize()
+
+
+def two_boxes(gmsh):
+    """Make a box on a box in gmsh, that do not share nodes; return their tags, and those of the faces between them."""
+    low, up = (gmsh.model.occ.addBox(0, 0, z, 1, 1, 1) for z in (0, 1))
+    gmsh.model.occ.synchronize()
+    faces = [tag for _, tag in gmsh.model.getEntities(2) if abs(gmsh.model.occ.getCenterOfMass(2, tag)[2] - 1) < 1e-6]
+    gmsh.model.mesh.setSize(gmsh.model.getEntities(0), 0.5)
+    return low, up, faces
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_gmsh_hands_over_physical_groups(gmsh, order):
+    low, up, faces = two_boxes(gmsh)
+    groups = [("LOW", 3, [low]), ("UP", 3, [up]), ("ALL", 3, [low, up])]
+    for name, dim, tags in [*groups, ("FACE", 2, faces[:1]), ("SAME", 2, faces[:1]), ("TIP", 0, [1])]:
+        gmsh.model.addPhysicalGroup(dim, tags, name=name)
+    gmsh.model.mesh.generate(3)
+    gmsh.model.mesh.setOrder(order)
+    gmsh.option.setNumber("Mesh.MshFileVersion", 2.2)
+    mesh = fc.from_gmsh()
+    assert gmsh.option.getNumber("Mesh.MshFileVersion") == 2.2  # the user's own settings stay
+    solid, facet = ("tet4", "tri3") if order == 1 else ("tet10", "tri6")
+    count = {name: len(mesh.cells_of(name)[solid]) for name in ("LOW", "UP", "ALL")}
+    assert count["LOW"] + count["UP"] == count["ALL"] == len(mesh.cells[solid])
+    assert mesh.cell_groups["FACE"].tolist() == mesh.cell_groups["SAME"].tolist()
+    assert (mesh.points[mesh.cells_of("FACE")[facet]][..., 2] == 1.0).all()
+    assert len(mesh.points_of("TIP")) == 1
+    volume = fc.quality(mesh)
+    assert "inside out" not in str(volume)
+
+
+def test_gmsh_without_groups_and_with_a_body_that_has_none(gmsh):
+    low, _, _ = two_boxes(gmsh)
+    with pytest.raises(fc.MeshError, match=r"has no mesh: call gmsh\.model"):
+        fc.from_gmsh()
+    gmsh.model.mesh.generate(3)
+    whole = fc.from_gmsh()
+    assert not whole.group_names
+    gmsh.model.addPhysicalGroup(3, [low], name="LOW")
+    with pytest.warns(
+        fc.FastcontactWarning, match=r"solid cells belong to no physical group .*\(those of the volumes 2\)"
+    ):
+        part = fc.from_gmsh()
+    assert 0 < len(part.cells["tet4"]) < len(whole.cells["tet4"])
+
+
+def test_gmsh_without_a_model(gmsh):
+    gmsh.finalize()
+    try:
+        with pytest.raises(fc.MeshError, match=r"call gmsh.initialize\(\)"):
+            fc.from_gmsh()
+    finally:
+        gmsh.initialize(interruptible=False)
+    with pytest.raises(fc.MeshError, match="has no mesh"):
+        fc.from_gmsh()
+
+
+@pytest.mark.parametrize("element", ["tri3", "quad8", *SOLIDS_OF_LIBRARIES])
+def test_facets_by_their_place_are_those_of_the_generator(element):
+    mesh = a_body(element)
+    bare = mesh.replace(cells=mesh.solids, cell_groups={}, point_groups={})
+    axis = "XYZ"[mesh.dim - 1]
+    names = ("YMAX", "YMIN") if mesh.dim == 2 else (f"{axis}MAX", f"{axis}MIN")
+    names = names if names[0] in mesh.cell_groups else ("TOP", "BOTTOM")
+    last = mesh.points[:, -1]
+    for name, place in zip(names, (last.max(), last.min()), strict=True):
+        bare = bare.with_facet_group(name, lambda x, place=place: np.abs(x[:, -1] - place) < 1e-9)
+        again = mesh.with_facet_group("AGAIN", lambda x, place=place: np.abs(x[:, -1] - place) < 1e-9)
+        np.testing.assert_array_equal(again.cell_groups["AGAIN"], mesh.cell_groups[name])  # no facet twice
+        expected = {kind: np.sort(np.sort(block), axis=0) for kind, block in mesh.cells_of(name).items()}
+        found = {kind: np.sort(np.sort(block), axis=0) for kind, block in bare.cells_of(name).items()}
+        assert sorted(found) == sorted(expected)
+        for kind, block in expected.items():
+            np.testing.assert_array_equal(found[kind], block)
+
+
+def test_other_groups_keep_their_cells():
+    mesh = fc.generate.half_spheres("tri3")
+    lines_first = mesh.replace(cells={k: mesh.cells[k] for k in ("line2", "tri3")}, cell_groups={}).with_groups(
+        cells={"SOLIDS": len(mesh.cells["line2"]) + np.arange(len(mesh.cells["tri3"]))}
+    )
+    bare = lines_first.replace(cells={**lines_first.cells, "line2": lines_first.cells["line2"][:3]}, cell_groups={})
+    bare = bare.with_groups(cells={"SOLIDS": 3 + np.arange(len(mesh.cells["tri3"])), "LINES": [0, 2]})
+    more = bare.with_facet_group("ALL", lambda x: np.ones(len(x), bool))
+    assert len(more.cells_of("ALL")["line2"]) == len(outer_facets(mesh)["line2"])
+    np.testing.assert_array_equal(more.cells_of("SOLIDS")["tri3"], mesh.cells["tri3"])
+    np.testing.assert_array_equal(more.cells_of("LINES")["line2"], bare.cells["line2"][[0, 2]])
+
+
+def test_a_group_of_points_is_not_shadowed():
+    mesh = a_body("quad4")
+    with pytest.raises(fc.MeshError, match="'CORNER' is already a group of points"):
+        mesh.with_facet_group("CORNER", lambda x: x[:, 0] < 1)

@@ -1,12 +1,21 @@
-"""Quadrature rules compared with exact integrals of monomials."""
+"""Quadrature rules compared with exact integrals, and quality measures of known meshes."""
 
 import itertools
+import math
 from math import factorial
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from fastcontact.errors import MeshError
+from fastcontact.mesh import elements
 from fastcontact.mesh import quadrature as rules
+from fastcontact.mesh.generate import block, box
+from fastcontact.mesh.mesh import Mesh
+from fastcontact.mesh.quality import check_cells, quality
+from fastcontact.mesh.quality_kernels import extremes
 
 
 def on_line(i):
@@ -80,3 +89,135 @@ def test_points_lie_in_the_cell(rule, exact, degree):
         assert (points.sum(axis=1) <= 1.0 + 1e-15).all()
     if exact is on_pyramid:
         assert (np.abs(points[:, :2]).max(axis=1) < 1 - points[:, 2]).all()
+
+
+def one(name, points):
+    return Mesh(points, {name: [np.arange(len(points))]})
+
+
+def test_a_right_triangle():
+    found = quality(one("tri3", [[0, 0], [3, 0], [0, 4]]))
+    assert found.smallest_angle == pytest.approx(math.degrees(math.asin(3 / 5)))
+    assert found.largest_angle == pytest.approx(90.0)
+    assert (found.shortest_edge, found.longest_edge) == (3.0, 5.0)
+    assert found.worst_aspect == pytest.approx(5 / 3)
+    assert found.measure == pytest.approx(6.0)
+    assert (found.n_points, found.n_cells, found.n_bad, found.dim) == (3, {"tri3": 1}, 0, 2)
+
+
+def test_a_rhomb_and_a_dart():
+    rhomb = quality(one("quad4", [[0, 0], [2, 0], [3, math.sqrt(3)], [1, math.sqrt(3)]]))
+    assert (rhomb.smallest_angle, rhomb.largest_angle) == pytest.approx((60.0, 120.0))
+    dart = quality(one("quad4", [[0, 0], [4, 0], [1, 1], [0, 4]]))
+    assert dart.largest_angle > 180.0
+    assert dart.measure == pytest.approx(4.0)
+
+
+@pytest.mark.parametrize("name", [name for name, element in elements.ELEMENTS.items() if element.dim > 1])
+def test_reference_cells_have_their_measure_and_are_accepted(name):
+    element = elements.get(name)
+    mesh = one(name, np.pad(element.nodes, ((0, 0), (0, max(0, 2 - element.dim)))))
+    check_cells(mesh)
+    assert quality(mesh).measure == pytest.approx(element.quadrature[1].sum())
+    assert quality(mesh).n_bad == 0
+
+
+def test_facets_of_a_cube_have_right_angles():
+    corners = elements.get("hex8").nodes
+    mesh = Mesh(corners, {"hex8": [range(8)], "quad4": [[0, 1, 2, 3]]})
+    found = quality(mesh)
+    assert (found.smallest_angle, found.largest_angle) == pytest.approx((90.0, 90.0))
+    assert "volume 8 [length^3]" in str(found)
+
+
+def test_a_curved_side_counts_in_the_area():
+    element = elements.get("tri6")
+    nodes = element.nodes.copy()
+    nodes[4] += 0.1  # outward, along the normal (1, 1): a parabola of height 0.1 sqrt(2) over a chord of sqrt(2)
+    assert quality(one("tri6", nodes)).measure == pytest.approx(0.5 + 2 / 3 * 0.1 * 2)
+
+
+@given(st.floats(0.1, 100.0), st.floats(-180.0, 180.0))
+@settings(max_examples=30, deadline=None)
+def test_angles_do_not_depend_on_size_and_direction(scale, degrees):
+    mesh = block((1.0, 1.0), (2, 2), "tri3", distortion=0.2)
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    turned = mesh.replace(points=scale * mesh.points @ np.array([[c, s], [-s, c]]))
+    before, after = quality(mesh), quality(turned)
+    assert after.smallest_angle == pytest.approx(before.smallest_angle)
+    assert after.worst_aspect == pytest.approx(before.worst_aspect)
+    assert after.measure == pytest.approx(scale**2)
+
+
+def test_the_first_inverted_cell_is_named_with_place_and_count():
+    points = [[0, 0], [1, 0], [0, 1], [1, 1], [2, 0]]
+    mesh = Mesh(points, {"line2": [[0, 1]], "tri3": [[0, 1, 2], [1, 2, 3], [1, 3, 4]]})
+    assert quality(mesh).n_bad == 2
+    with pytest.raises(MeshError) as error:
+        check_cells(mesh)
+    message = str(error.value)
+    assert "cell 2 (tri3 at (0.666667, 0.666667), area -0.5) is inverted, one of 2 such cells" in message
+    assert "topology.oriented" in message
+
+
+@pytest.mark.parametrize("height", [0.0, 1e-15])
+def test_a_flat_cell_is_degenerate(height):
+    mesh = one("tri3", [[0, 0], [1, 0], [0.5, height]])
+    assert quality(mesh).n_bad == 1
+    with pytest.raises(MeshError, match=r"cell 0 .* is degenerate, one of 1 such cells"):
+        check_cells(mesh)
+
+
+def test_a_cell_with_all_nodes_in_one_place_is_degenerate_and_does_not_warn():
+    with np.errstate(all="raise"):
+        assert quality(one("tri3", np.ones((3, 2)))).n_bad == 1
+
+
+def test_a_thin_cell_is_not_degenerate():
+    mesh = one("tri3", [[0, 0], [1, 0], [0.5, 1e-6]])
+    check_cells(mesh)
+    assert quality(mesh).n_bad == 0
+
+
+def test_a_folded_quadratic_cell_is_inverted_though_its_corners_are_fine():
+    nodes = elements.get("tri6").nodes.copy()
+    nodes[3] = [0.5, 0.6]
+    mesh = one("tri6", nodes)
+    assert quality(mesh).n_bad == 1
+    with pytest.raises(MeshError, match="inverted"):
+        check_cells(mesh)
+
+
+def test_a_mesh_without_solid_cells_has_no_figures():
+    found = quality(Mesh([[0, 0], [1, 0]], {"line2": [[0, 1]]}))
+    assert math.isnan(found.smallest_angle)
+    assert math.isnan(found.longest_edge)
+    assert (found.measure, found.n_bad) == (0.0, 0)
+
+
+def test_the_report_is_a_few_lines_with_units():
+    lines = str(quality(block((2.0, 1.0), (4, 2), "tri3"))).splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith("15 points, 16 tri3, 12 line2")
+    assert "45.0" in lines[1]
+    assert "degrees" in lines[1]
+    assert "[length]" in lines[2]
+    assert lines[3] == "area 2 [length^2]"
+
+
+@pytest.mark.parametrize("name", [name for name, element in elements.ELEMENTS.items() if element.dim > 1])
+def test_jacobians_and_edges_against_plain_numpy(name):
+    element = elements.get(name)
+    solid = element.dim == 3
+    mesh = box((1.0, 2.0, 1.5), (2, 2, 1), name) if solid else block((1.0, 2.0), (3, 2), name)
+    points = mesh.points + np.random.default_rng(1).uniform(-0.9, 0.9, mesh.points.shape)  # some cells fold
+    cells, (_, dN, weights) = mesh.cells[name], element.tables
+    low, high, measure, longest = np.empty((4, len(cells)))
+    extremes(points, cells, dN, weights, np.array(element.edges, np.intp), low, high, measure, longest)
+    det = np.linalg.det(np.einsum("cnd,qnj->cqdj", points[cells], dN))
+    assert (det < 0).any()
+    np.testing.assert_allclose(low, det.min(axis=1), rtol=0, atol=1e-13 * np.abs(det).max())
+    np.testing.assert_allclose(high, det.max(axis=1), rtol=0, atol=1e-13 * np.abs(det).max())
+    np.testing.assert_allclose(measure, det @ weights, rtol=0, atol=1e-13 * np.abs(det).max())
+    ends = points[cells][:, np.array(element.edges)]
+    np.testing.assert_allclose(longest, np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2).max(axis=1), rtol=1e-14)

@@ -1,8 +1,15 @@
-"""The text description of a model."""
+"""Descriptions and digests of a model, its axis of symmetry, reference temperature and histories."""
+
+import logging
 
 import numpy as np
+import pytest
+from models import elastic_model, supported
 
 import fastcontact as fc
+from fastcontact.mesh.generate import block, half_spheres
+from fastcontact.model.fingerprint import different, fingerprint
+from fastcontact.model.ramp import ramp_of
 
 
 def blocks():
@@ -112,3 +119,215 @@ def test_every_material_load_and_connection_is_told():
     ):
         assert text in lines, text
     assert "coupling" in model._repr_html_()
+
+
+def spheres(mesh, held, **contact):
+    model = elastic_model(mesh, "axisymmetric", E=20_000.0)
+    if held:
+        model.fix("A1A2", "x")
+    supported(model, A2B2={"y": -0.2}, A1B1={"y": 0.2})
+    model.add_contact("c", secondary="CONT1", primary="CONT2", **contact)
+    return fc.solve(model, fc.linear_ramp(1))[-1]
+
+
+@pytest.mark.each_value
+@pytest.mark.parametrize("formulation", ["node_to_segment", "continuous", "mortar", None])
+@pytest.mark.parametrize("element", ["tri3", "quad4", "tri6"])
+def test_results_are_those_of_the_model_whose_axis_is_held(element, formulation):
+    sizes = {"size": 16.0} if element.startswith("tri") else {"arc_sizes": (8.0, 16.0), "radial_sizes": (8.0, 16.0)}
+    mesh = half_spheres(element, **sizes)
+    if element == "tri6" and formulation == "node_to_segment":
+        pytest.skip("node-to-segment refuses facets whose corner nodes carry no pressure")
+    free, held = (spheres(mesh, held, formulation=formulation) for held in (False, True))
+    assert (free.displacement == held.displacement).all()
+    assert (free.reaction == held.reaction).all()
+    assert (free.displacement[mesh.points_of("A1A2"), 0] == 0.0).all()
+    assert (free.contact["c"].pressure == held.contact["c"].pressure).all()
+
+
+def cylinder(inner=0.0):
+    return elastic_model(block((1.0, 1.0), (2, 2), origin=(inner, 0.0)), "axisymmetric", BOTTOM="y")
+
+
+def test_one_line_says_which_nodes_are_held(caplog):
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        cylinder().check()
+    assert [r.message for r in caplog.records] == [
+        "axis of symmetry: x is held at zero at 3 nodes with x = 0 (first: point 0)"
+    ]
+    caplog.clear()
+    held = cylinder()
+    held.fix("LEFT", "x")
+    ring = cylinder(inner=0.1)
+    with caplog.at_level(logging.INFO, "fastcontact"):
+        held.check()
+        ring.check()
+    assert not caplog.records
+
+
+def test_a_disc_under_pressure_on_its_rim_is_lame():
+    """Without a hole the radial displacement is linear: u = -p r (1 - nu) / E under plane stress."""
+    model = cylinder()
+    model.add_pressure("RIGHT", 10.0)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    radius = model.mesh.points[:, 0]
+    assert step.displacement[:, 0] == pytest.approx(-10.0 * radius * 0.7 / 1000.0, abs=1e-12)
+
+
+def test_a_hole_opens_under_pressure():
+    model = cylinder(inner=0.1)
+    model.add_pressure("LEFT", 10.0)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert (step.displacement[model.mesh.points_of("LEFT"), 0] > 0.0).all()
+
+
+def test_nodes_of_single_precision_are_on_the_axis_and_others_not():
+    points = cylinder().mesh.points.copy()
+    left = cylinder().mesh.points_of("LEFT")
+    points[left[0], 0], points[left[1], 0] = 4e-8, 1e-3
+    model = fc.Model(cylinder().mesh.replace(points=points), "axisymmetric")
+    assert model.axis_nodes.tolist() == [left[0], left[2]]
+    plane = fc.Model(cylinder().mesh, "plane_strain")
+    assert not len(plane.axis_nodes)
+
+
+def test_a_support_that_moves_the_axis_is_refused():
+    model = cylinder()
+    model.prescribe("TOP", x=0.1)
+    with pytest.raises(fc.ModelError, match=r"x = 0.1 is prescribed at point 2 on the axis of symmetry"):
+        model.check()
+
+
+def test_a_function_of_the_radius_that_vanishes_on_the_axis_is_not():
+    model = cylinder()
+    model.prescribe("TOP", x=lambda points: 0.1 * (points[:, 0] + 1e-12))
+    model.check()
+    fixed, values = model.prescribed()
+    corner = model.mesh.point("TOP_LEFT")
+    assert fixed[corner, 0]
+    assert values[corner, 0] == 0.0
+
+
+def test_a_relation_that_moves_the_axis_is_refused():
+    model = cylinder()
+    model.relate([("TOP_LEFT", "x", 1.0)], 0.1)
+    with pytest.raises(fc.ModelError, match="contradicts"):
+        model.check()
+
+
+def test_a_radial_traction_on_the_axis_goes_into_it():
+    """Facets that reach the axis carry the traction; at r = 0 nothing moves."""
+    model = cylinder()
+    model.add_traction("TOP", x=1.0)
+    (step,) = fc.solve(model, fc.linear_ramp(1))
+    assert not step.displacement[model.mesh.points_of("LEFT"), 0].any()
+    assert step.displacement[model.mesh.point("TOP_RIGHT"), 0] > 0.0
+
+
+@pytest.mark.parametrize(("options", "rise"), [({}, 60.0), ({"reference": 0.0}, 80.0)])
+def test_a_free_block_expands_by_the_rise_over_the_reference(options, rise):
+    model = fc.Model(fc.generate.block(), kinematics="plane_stress", reference_temperature=20.0)
+    model.add_material(fc.LinearElastic(E=1000.0, nu=0.3, expansion=1e-5))
+    model.fix("LEFT", "x")
+    model.fix("BOTTOM", "y")
+    model.add_temperature(80.0, **options)
+    assert fc.solve(model, 1)[-1].displacement.max() == pytest.approx(1e-5 * rise, rel=1e-9)
+
+
+def model(pressure=lambda points: 1.0 + points[:, 0], height=3.0, order=1, stiffness=2.0, mass=1.0):
+    found = elastic_model(block((2.0, 1.0), (6, 3), "quad4", origin=(-1.0, -1.0)), "plane_strain")
+    supports = [("BOTTOM", {"y": 0.0}), ("LEFT", {"x": 0.0})][::order]
+    for group, values in supports:
+        found.prescribe(group, **values)
+    found.add_pressure("RIGHT", pressure)
+    found.add_body_force(y=-mass)
+    found.add_spring("TOP", x=stiffness)
+    found.add_obstacle("ball", secondary="TOP", obstacle=fc.obstacles.Sphere((0.0, height), height), motion={"y": -0.1})
+    return found
+
+
+def parts(**changes):
+    return fingerprint(model(**changes), {"geometry_updates": None})
+
+
+def test_the_same_case_has_the_same_digests_however_it_was_put_together():
+    expected = parts()
+    assert parts() == expected
+    assert parts(order=-1) == expected
+    assert parts(pressure=lambda points: points[:, 0] + 1.0) == expected, "a function counts by its values"
+    assert all(len(digest) == 16 for digest in expected.values())
+
+
+@pytest.mark.parametrize(
+    ("change", "part"),
+    [
+        ({"pressure": lambda points: 1.0 + points[:, 1]}, "the loads"),
+        ({"pressure": lambda points: np.nextafter(1.0 + points[:, 0], np.inf)}, "the loads"),
+        ({"mass": 1.0 + 1e-15}, "the loads"),
+        ({"height": 3.1}, "contact 'ball'"),
+        ({"stiffness": 2.5}, "the springs"),
+    ],
+)
+def test_what_changed_is_named(change, part):
+    assert different(parts(), parts(**change)) == [part]
+
+
+def test_options_count():
+    one, other = (fingerprint(model(), {"geometry_updates": updates}) for updates in (None, 2))
+    assert different(one, other) == ["the option geometry_updates"]
+    assert different(one, fingerprint(model())) == ["the option geometry_updates"]
+
+
+def test_functions_that_fail_are_told_apart_by_their_names():
+    """The check of the model says what is wrong with them."""
+
+    def wrong(points):
+        raise ZeroDivisionError
+
+    def other(points):
+        raise ZeroDivisionError
+
+    assert different(parts(pressure=wrong), parts(pressure=wrong)) == []
+    assert different(parts(pressure=wrong), parts(pressure=other)) == ["the loads"]
+
+
+def test_the_default_ramp_has_equal_steps_to_one():
+    ramp = fc.linear_ramp(4)
+    assert ramp.instants == (0.25, 0.5, 0.75, 1.0)
+    assert [ramp.value(t) for t in ramp.instants] == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_a_piecewise_linear_table_is_interpolated():
+    ramp = fc.Ramp((0.5, 1.0, 1.5), ((0, 0), (1, 2), (2, 0)))
+    assert [ramp.value(t) for t in ramp.instants] == [1.0, 2.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("given", "instants", "table"),
+    [
+        (4, (0.25, 0.5, 0.75, 1.0), ((0.0, 0.0), (1.0, 1.0))),
+        (np.int64(2), (0.5, 1.0), ((0.0, 0.0), (1.0, 1.0))),
+        (np.array([0.5, 0.75]), (0.5, 0.75), ((0.0, 0.0), (1.0, 1.0))),
+        ([0.5, 1.0, 1.5], (0.5, 1.0, 1.5), ((0.0, 0.0), (1.5, 1.5))),
+        (np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.2]]), (1.0, 2.0), ((0.0, 0.0), (1.0, 1.0), (2.0, 0.2))),
+        ([(0.0, 0.0), (1.0, 1.0)], (1.0,), ((0.0, 0.0), (1.0, 1.0))),
+        (iter([0.5, 1.0]), (0.5, 1.0), ((0.0, 0.0), (1.0, 1.0))),
+    ],
+)
+def test_numbers_and_arrays_are_ramps(given, instants, table):
+    ramp = ramp_of(given)
+    assert ramp.instants == instants
+    assert ramp.table == table
+
+
+def test_a_ramp_stays_itself_and_none_is_the_default():
+    ramp = fc.Ramp((1.0,))
+    assert ramp_of(ramp) is ramp
+    assert ramp_of(None) == fc.linear_ramp(20)
+    assert fc.Ramp(np.array([0.5, 1.0])) == fc.Ramp((0.5, 1.0))
+
+
+@pytest.mark.parametrize("given", [[1.0, 0.5], [[0.0, 0.0, 0.0]], [["a", "b"]], np.zeros((2, 2, 2)), [np.nan]])
+def test_what_is_no_ramp(given):
+    with pytest.raises(fc.ModelError):
+        ramp_of(given)

@@ -2,12 +2,16 @@
 
 import dataclasses
 import inspect
+import warnings
 
+import numpy as np
 import pytest
-from models import elastic_model
+from models import elastic_model, supported
+from test_result_files import MESH, step_result
 
 import fastcontact as fc
 from fastcontact.contact.formulations import FORMULATIONS
+from fastcontact.mesh.generate import block, box, merge_points, renamed, union
 from fastcontact.model.pair_options import SHARED_OPTIONS, ContactOptions
 
 
@@ -96,3 +100,288 @@ def test_options_of_contact_are_named_arguments(add):
     assert own | {*SHARED_OPTIONS} == {*ContactOptions.__annotations__}
     assert all(shown[name].default is None for name in ContactOptions.__annotations__)
     assert not any(parameter.kind is parameter.VAR_KEYWORD for parameter in shown.values())
+
+
+def bolt(**options):
+    """Return a bar of length 10 that is held at both ends and cut across in its middle."""
+    bar = fc.generate.box((1.0, 1.0, 10.0), (1, 1, 4), "hex8")
+    bar = bar.with_facet_group("CUT", lambda x: abs(x[:, 2] - 5.0) < 1e-9, between=True)
+    model = elastic_model(fc.generate.cut(bar, "CUT"), "3d", E=210e3, nu=0.0, ZMIN="xyz", ZMAX="xyz")
+    model.add_pretension("bolt", "CUT", force=1000.0, **options)
+    return model
+
+
+def plate(kinematics="plane_stress"):
+    model = fc.Model(fc.generate.block((1.0, 1.0), (2, 2)), kinematics)
+    model.add_material(fc.LinearElastic(E=1e3, nu=0.3, expansion=1e-5))
+    return model
+
+
+@pytest.mark.parametrize("normal", [None, (0.0, 0.0, 2.0), (0.0, 0.0, -1.0), (0.0, 0.3, -1.0)])
+def test_tension_is_tension_whichever_way_the_normal_points(normal):
+    step = fc.solve(bolt(normal=normal), 1)[-1]
+    assert step.pretension["bolt"]["force"] == pytest.approx(1000.0, rel=1e-9)
+    assert step.stress[:, 2].mean() > 900.0
+
+
+def test_a_section_cut_towards_the_other_side_is_in_tension_too():
+    bar = fc.generate.box((1.0, 1.0, 2.0), (1, 1, 2), "hex8")
+    bar = bar.with_facet_group("CUT", lambda x: abs(x[:, 2] - 1.0) < 1e-9, between=True)
+    model = elastic_model(fc.generate.cut(bar, "CUT", normal=(0.0, 0.0, -1.0)), "3d", E=1.0, nu=0.0, ZMIN="xyz")
+    model.fix("ZMAX", "xyz")
+    model.add_pretension("bolt", "CUT", force=0.1)
+    assert fc.solve(model, 1)[-1].stress[:, 2] == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"normal": (1.0, 0.0, 0.0)}, "the normal of pretension 'bolt' deviates by 90 degrees from that of 'CUT'"),
+        ({"locked_from": 0.0}, "its force never acts"),
+        ({"locked_from": -1.0}, "its force never acts"),
+    ],
+)
+def test_bolts_that_cannot_be_meant_are_refused(options, text):
+    with pytest.raises(fc.errors.ModelError, match=text):
+        fc.solve(bolt(**options), 1)
+
+
+def test_one_section_has_one_pretension():
+    model = bolt()
+    with pytest.raises(fc.errors.ModelError, match="are in one section, which has one force"):
+        model.add_pretension("other", "CUT", shortening=0.1)
+
+
+def test_a_force_on_solid_cells_is_refused():
+    with pytest.raises(fc.errors.ModelError, match="'BLOCK' is a group of solid cells"):
+        plate().add_force("BLOCK", y=-1.0)
+    model = plate()
+    model.add_force("BLOCK", y=-1.0, distribute=False)
+    assert model.load_vector(model.loads[0])[:, 1] == pytest.approx(-1.0)
+
+
+def test_points_and_sectors_are_whole_numbers():
+    for place in (1.5, 12.7):
+        with pytest.raises(fc.errors.ModelError, match=f"point {place} is not in the mesh"):
+            plate().add_spring(place, y=1.0)
+    with pytest.raises(fc.errors.ModelError, match="two sectors at least, a whole number"):
+        plate("plane_strain").add_cyclic_symmetry("LEFT", "BOTTOM", sectors=2.5)
+
+
+@pytest.mark.parametrize("state", ["strain", "stress", "temperature"])
+def test_large_strains_without_stress_are_told(state):
+    model = plate()
+    supported(model, LEFT="x", BOTTOM="y")
+    if state == "strain":
+        model.add_initial_strain(xx=-0.5)
+    elif state == "stress":
+        model.add_initial_stress(xx=500.0)
+    else:
+        model.add_temperature(5e4)
+    with pytest.warns(
+        fc.FastcontactWarning, match=r"temperatures and initial states cause strains of 0.5, beyond the 0.1"
+    ):
+        fc.solve(model, 1)
+
+
+def test_small_ones_are_not():
+    model = plate()
+    supported(model, LEFT="x", BOTTOM="y")
+    model.add_temperature(100.0)
+    assert fc.solve(model, 1)[-1].warnings == ()
+
+
+def test_numbers_of_other_kinds_are_numbers():
+    for number in (np.float32(1000.0), np.array(1000.0), np.int64(1000)):
+        assert fc.LinearElastic(E=number, nu=0.3).E == 1000.0
+    with pytest.raises(fc.errors.ModelError, match="E = True must be a positive number"):
+        fc.LinearElastic(E=True, nu=0.3)
+    with pytest.raises(fc.errors.ModelError, match="must be a sequence of sequences of numbers"):
+        fc.Tabulated("x", [(0.0, "1.0")])
+
+
+@pytest.mark.parametrize("name", ["hex8", "quad4", "tet10"])
+def test_a_cell_with_a_node_twice_is_refused(name):
+    mesh = fc.generate.block(element=name) if name == "quad4" else fc.generate.box(element=name)
+    nodes = mesh.cells[name].copy()
+    nodes[1, 2] = nodes[1, 1]
+    with pytest.raises(fc.errors.MeshError, match=rf"cell \d+ \({name} at .*has point {nodes[1, 1]} twice"):
+        fc.Model(mesh.replace(cells={**mesh.cells, name: nodes}), "3d" if mesh.dim == 3 else "plane_strain")
+
+
+SIZES = [1e61, 1e160, 1e308, 10**400, -1e300]
+
+
+def half_spheres(y=-0.1, E=20_000.0):
+    model = elastic_model(fc.generate.half_spheres("tri3", size=12.0), "axisymmetric", E=E, A1A2="x", A1B1="y")
+    model.prescribe("A2B2", y=y)
+    return model
+
+
+def everywhere(value):
+    return lambda x: np.full(len(x), float(value))
+
+
+WAYS = {
+    "displacement": lambda v: half_spheres(y=v),
+    "displacement as a function": lambda v: fc.solve(half_spheres(y=everywhere(v)), 1),
+    "pressure": lambda v: half_spheres().add_pressure("D1B1", v),
+    "force": lambda v: half_spheres().add_force("A2B2", y=v),
+    "clearance": lambda v: half_spheres().add_contact("pair", secondary="CONT1", primary="CONT2", clearance=v),
+    "penalty": lambda v: half_spheres().add_contact("pair", secondary="CONT1", primary="CONT2", penalty=v),
+    "ramp": lambda v: fc.solve(half_spheres(), [[0.0, 0.0], [1.0, v]]),
+    "load factors": lambda v: fc.solve(half_spheres(), [abs(v)]),
+}
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("way", WAYS)
+def test_a_number_out_of_range_is_refused_by_its_name(way, size):
+    if size == 10**400 and way == "displacement as a function":
+        pytest.skip("no function of arrays returns it")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(fc.FastcontactError, match=r"out of range|must be|must hold") as caught:
+            WAYS[way](size)
+    assert len(str(caught.value)) < 400
+    assert "not finite" not in str(caught.value)
+
+
+@pytest.mark.parametrize("E", [1e61, 1e308, 10**400, 1e-61, 1e-320])
+def test_a_modulus_out_of_range(E):
+    with pytest.raises(fc.ModelError, match=r"out of range: it must lie between 1e-60 and 1e\+60|must be a number"):
+        fc.LinearElastic(E=E, nu=0.3)
+
+
+@pytest.mark.parametrize(("y", "E"), [(-1e-60, 1.0), (-1e50, 1e-40), (-0.1, 1e50), (-1e55, 1e55)])
+def test_within_the_range_results_are_those_of_other_units(y, E):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", fc.FastcontactWarning)
+        found, expected = (fc.solve(half_spheres(*given), 1)[-1] for given in ((y, E), (-1.0, 1.0)))
+    np.testing.assert_allclose(found.displacement / -y, expected.displacement, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.stress / (-y * E), expected.stress, rtol=1e-9, atol=1e-12)
+
+
+def test_whole_numbers_of_any_length_are_refused():
+    with pytest.raises(fc.ModelError, match="the argument steps of linear_ramp must be a whole number"):
+        fc.linear_ramp(10**400)
+    with pytest.raises(fc.ModelError, match="must be a number"):
+        fc.linear_ramp(2, 10**400)
+
+
+WALL = fc.obstacles.HalfSpace(point=(0.0, 1.0), normal=(0.0, -1.0))
+
+
+def cube():
+    """A cube with a reference point, and a group of points by their numbers."""
+    mesh = box((1.0, 1.0, 1.0), (1, 1, 1), "hex8")
+    corners = np.flatnonzero((mesh.points[:, 0] == 0.0) & (mesh.points[:, 1] == 0.0))
+    mesh = mesh.with_groups(points={"line": corners, "none": []})
+    return elastic_model(fc.generate.with_reference_points(mesh, {"HANDLE": (0.5, 0.5, 3.0)}), "3d", E=1.0)
+
+
+def ring():
+    """An axisymmetric block."""
+    model = fc.Model(block((1.0, 1.0), (2, 2), "quad4"), "axisymmetric")
+    model.add_material(fc.LinearElastic(E=1.0, nu=0.3, density=1.0))
+    return model
+
+
+def thin_plate():
+    return fc.Model(block(), "plane_strain")
+
+
+def turned_by_a_line():
+    model = cube()
+    model.add_moment("line", z=1.0)
+    model.check(fc.linear_ramp(1))
+
+
+def at(place):
+    return lambda: fc.generate.with_reference_points(block(), {"HANDLE": place})
+
+
+def spread(group, radius):
+    return lambda: cube().add_force(group, z=-1.0, at=(0.5, 0.5, 1.0), radius=radius)
+
+
+def turned_about(centre):
+    rotation = {"centre": centre, "angle": 0.1}
+    return lambda: thin_plate().add_obstacle("wall", secondary="TOP", obstacle=WALL, rotation=rotation)
+
+
+def isotropic_across(nu):
+    given = {"E_along": 1.0, "E_across": 1.0, "nu_along": 0.3, "G_along": 1.0, "axes": np.eye(3)}
+    return lambda: fc.Orthotropic.transversely_isotropic(**given, nu_across=nu)
+
+
+ALONG_Z = fc.LinearElastic(E=fc.Tabulated("z", [(0.0, 1.0), (1.0, 2.0)]), nu=0.3)
+NO_PLACE, NO_CENTRE = (
+    "the place .* of reference point 'HANDLE' must be 2 numbers",
+    "centre .* must be 2 finite numbers, not",
+)
+NO_RAMP, NO_TURN = "the ramp must be a number of steps, load factors", ".* have no mean rotation"
+
+
+def touching_corners():
+    """Two squares that share a corner, with an obstacle for all of their sides."""
+    squares = [block((1.0, 1.0), (1, 1), origin=(at, at)) for at in (0.0, 1.0)]
+    sides = dict.fromkeys(("LEFT", "RIGHT", "BOTTOM", "TOP"), "SIDES")
+    mesh = merge_points(union(*(renamed(square, sides) for square in squares)), 1e-6)
+    elastic_model(mesh).add_obstacle("wall", secondary="SIDES", obstacle=WALL)
+
+
+REFUSED = [
+    (touching_corners, fc.ContactError, "meet back to back at point 3"),
+    (isotropic_across(-1.0), fc.ModelError, "nu_across = -1.0 must be above -1"),
+    *((at(place), fc.MeshError, NO_PLACE) for place in [(0.5,), (0.5, 0.5, 0.5), (np.nan, 0.0)]),
+    (
+        lambda: fc.generate.with_reference_points(block(), {"TOP": (0.5, 3.0)}),
+        fc.MeshError,
+        "already a group 'TOP': give",
+    ),
+    (lambda: fc.solve(cube(), np.zeros((3, 3))), fc.ModelError, NO_RAMP),
+    (lambda: fc.solve(cube(), np.zeros((1, 1))), fc.ModelError, NO_RAMP),
+    (lambda: block((1.0,), (2, 2)), fc.MeshError, "argument size of block must be two numbers, not the tuple"),
+    (lambda: block((1.0, 1.0), "ab"), fc.MeshError, "divisions of block must be two"),
+    (
+        lambda: cube().add_coupling("HANDLE", "line", kind="distributing"),
+        fc.ModelError,
+        f"of 'HANDLE' with 'line': {NO_TURN}",
+    ),
+    (turned_by_a_line, fc.ModelError, f"the moment on 'line': {NO_TURN}"),
+    (lambda: cube().add_moment("none", z=1.0), fc.ModelError, "'none' is empty: the moment"),
+    (
+        lambda: ring().add_gravity(x=9.81),
+        fc.ModelError,
+        "has a radial component x: in axisymmetry it can act only along the axis",
+    ),
+    (lambda: ring().add_centrifugal(3.0, direction=(0.0, 0.0, 1.0)), fc.ModelError, r"its direction is \(0, 1, 0\)"),
+    *((spread("ZMAX", r), fc.ModelError, f"of the force on 'ZMAX' = {r:g} must be positive") for r in (0.0, -1.0)),
+    (spread("none", 0.1), fc.ModelError, "'none' is empty: the force"),
+    *((turned_about(c), fc.ModelError, NO_CENTRE) for c in [(0.0, 0.0, 0.0), (np.inf, 0.0), ("left", 0.0)]),
+    (
+        lambda: thin_plate().add_material(ALONG_Z),
+        fc.ModelError,
+        "a table is along z, but the mesh is plane: use x, y or radius",
+    ),
+]
+
+
+@pytest.mark.parametrize(("make", "kind", "message"), REFUSED, ids=[message for _, _, message in REFUSED])
+def test_it_is_refused(make, kind, message):
+    with pytest.raises(kind, match=message):
+        make()
+
+
+def test_forces_on_the_primary_side_have_a_row_for_each_point(tmp_path):
+    step = step_result(2)
+    name, contact = next(iter(step.contact.items()))
+    wrong = dataclasses.replace(
+        contact, primary_points=np.array([1, 2], np.int32), primary_force_vectors=np.zeros((3, 2))
+    )
+    with (
+        fc.ResultWriter(tmp_path / "run.vtkhdf", MESH) as out,
+        pytest.raises(fc.FileError, match=r"primary_force_vectors has shape \(3, 2\), but \(2, 2\) is needed"),
+    ):
+        out.write(dataclasses.replace(step, contact={**step.contact, name: wrong}))

@@ -399,8 +399,7 @@ def test_a_history_begins_at_zero_and_names_its_theory(steps_of_disc):
 
 @pytest.fixture(scope="module")
 def steps_of_disc():
-    model = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x")
-    model.prescribe("A2B2", y=-2.0)
+    model = elastic_model(fc.generate.half_spheres(size=10.0), "axisymmetric", E=20_000.0, A1A2="x", A2B2={"y": -2.0})
     model.prescribe("A1B1", y=2.0)
     model.add_contact("hertz", secondary="CONT1", primary="CONT2", formulation="node_to_segment")
     return fc.solve(model, 4), "hertz"

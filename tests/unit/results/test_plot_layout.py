@@ -63,8 +63,7 @@ def test_pictures_of_an_animation_are_whole_and_in_proportion(size, tmp_path, mo
 
 def pressed(friction):
     mesh = block((4.0, 1.0), (8, 2))
-    model = elastic_model(mesh, "plane_strain")
-    model.prescribe("TOP", y=-0.01)
+    model = elastic_model(mesh, "plane_strain", TOP={"y": -0.01})
     model.prescribe("TOP", x=0.001)
     floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
     model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=friction)

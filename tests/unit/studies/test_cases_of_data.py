@@ -1,10 +1,16 @@
-"""Studies of cases built from data in Python, and unsuitable cases."""
+"""Studies of cases built from data in Python, values set by path, quantities between nodes."""
 
+from types import SimpleNamespace
+
+import numpy as np
 import pytest
 
 import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.errors import CaseError
+from fastcontact.mesh.generate import block
+from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.quantities import contact_radius, peak
 
 DATA = {
     "kinematics": "plane_strain",
@@ -77,3 +83,116 @@ def test_what_is_no_case_file_is_refused(study, tmp_path):
         CaseError, match="'plate' is an input deck: studies change the mesh and the numbers of a case file"
     ):
         study(read_case(tmp_path / "plate.inp"))
+
+
+def test_a_maximum_on_the_axis_is_that_of_a_quartic_along_it():
+    mesh = block((1.0, 2.0), (4, 60))
+    x, y = mesh.points.T
+    value, where = peak(mesh, 3.0 - 2.0 * (y - 0.917) ** 2 + (y - 0.917) ** 4 - x**2, axisymmetric=True)
+    assert value == pytest.approx(3.0, rel=1e-12)
+    assert where == pytest.approx([0.0, 0.917], abs=1e-9)
+
+
+@pytest.mark.parametrize("axisymmetric", [True, False])
+def test_with_few_nodes_a_parabola_through_the_neighbours_does(axisymmetric):
+    mesh = block((1.0, 2.0), (4, 8))
+    x, y = mesh.points.T
+    x0 = 0.0 if axisymmetric else 0.55
+    value, where = peak(mesh, 3.0 - (y - 0.9) ** 2 - (x - x0) ** 2, axisymmetric)
+    assert value == pytest.approx(3.0, rel=1e-12)
+    assert where == pytest.approx([x0, 0.9], abs=1e-12)
+
+
+def test_where_no_vertex_is_near_the_node_itself_is_taken():
+    mesh = block((1.0, 2.0), (4, 8))
+    values = mesh.points @ [1.0, 2.0]  # largest in a corner
+    value, where = peak(mesh, values, axisymmetric=False)
+    assert value == 5.0
+    assert where.tolist() == [1.0, 2.0]
+
+
+def contact(pressure, radius, r=None):
+    r = np.linspace(0.0, 1.0, len(pressure)) if r is None else r
+    pressure = np.asarray(pressure, float)
+    return SimpleNamespace(radius=radius, across=r, active=pressure > 0, pressure=pressure)
+
+
+def test_the_radius_is_where_the_pressure_of_hertz_ends():
+    r = np.linspace(0.0, 1.0, 41)
+    pressure = np.sqrt(np.maximum(1.0 - (r / 0.718) ** 2, 0.0))
+    assert contact_radius(contact(pressure, (0.7, 0.725), r)) == pytest.approx(0.718, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("pressure", "bracket", "radius"),
+    [
+        ([0.0] * 5, (np.nan, np.nan), np.nan),  # open
+        ([1.0, 0.5, 0.0, 0.0, 0.0], (0.25, 0.5), 0.375),  # too few nodes for a line
+        ([1.0, 1.0, 1.1, 1.1, 1.2, 1.4, 1.8, 3.0, 0.0], (0.875, 1.0), 1.0),  # a punch
+    ],
+)
+def test_where_there_is_no_edge_to_fit_the_bracket_answers(pressure, bracket, radius):
+    assert contact_radius(contact(pressure, bracket)) == pytest.approx(radius, nan_ok=True)
+
+
+PARSED = {
+    "material": [{"E": 1.0, "nu": 0.3}, {"E": 2.0, "nu": 0.2}],
+    "contact": {"pair": {"friction": 0.1}},
+    "mesh": {"arc_sizes": [1.0, 2.0]},
+}
+LINKED = {
+    "size": {"mesh.arc_sizes[0]": "0.5*value^2", "mesh.arc_sizes[1]": "value", "contact.pair.friction": "-1e-1*value"}
+}
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "where"),
+    [
+        ("material[1].E", 7.0, lambda data: data["material"][1]["E"]),
+        ("contact.pair.friction", 0.4, lambda data: data["contact"]["pair"]["friction"]),
+        ("contact.pair.formulation", "mortar", lambda data: data["contact"]["pair"]["formulation"]),
+        ("mesh.arc_sizes[0]", 3.0, lambda data: data["mesh"]["arc_sizes"][0]),
+    ],
+)
+def test_a_path_sets_one_value_and_leaves_the_case_alone(path, value, where):
+    found = substituted(PARSED, path, value, {})
+    assert where(found) == value
+    assert PARSED["material"][1]["E"] == 2.0
+    assert PARSED["mesh"]["arc_sizes"] == [1.0, 2.0]
+    assert "formulation" not in PARSED["contact"]["pair"]
+
+
+def test_a_name_sets_several_paths_by_their_laws():
+    found = substituted(PARSED, "size", 3.0, LINKED)
+    assert found["mesh"]["arc_sizes"] == [4.5, 3.0]
+    assert found["contact"]["pair"]["friction"] == pytest.approx(-0.3)
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        ("sise", "'size'"),
+        ("material[2].E", r"\[2\].*case has 2"),
+        ("contact.pear.friction", "'pair'"),
+        ("mesh.arc_sizes", "name a single value"),
+        ("contact.pair", "name a single value"),
+        ("material.E", r"the number of a table before 'E', such as \[0\]"),
+        ("material[0].E.x", "unknown entry"),
+        ("a..b", "not a path"),
+        ("material[x].E", "not a path"),
+    ],
+)
+def test_a_wrong_path_is_told(path, words):
+    with pytest.raises(CaseError, match=words):
+        substituted(PARSED, path, 1.0, LINKED)
+
+
+@pytest.mark.parametrize("law", ["2*valve", "value+1", "__import__('os')", 3.0, "value^x"])
+def test_a_law_is_a_power_of_the_value_and_nothing_else(law):
+    with pytest.raises(CaseError, match=r"a\*value\^p"):
+        substituted(PARSED, "n", 2.0, {"n": {"contact.pair.friction": law}})
+
+
+def test_a_power_of_a_negative_number_is_refused():
+    with pytest.raises(CaseError, match=r"cannot be evaluated for -2\.0"):
+        substituted(PARSED, "n", -2.0, {"n": {"contact.pair.friction": "value^0.5"}})

@@ -1,6 +1,7 @@
-"""A study of synthetic runs with known limits and model errors: tables, sentences, pictures, JSON and CSV."""
+"""A study of synthetic runs with known limits and model errors: tables, sentences, pictures, reports."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.errors import CaseError, ContactError
 from fastcontact.studies import convergence, execute, levels
+from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory
@@ -178,3 +180,20 @@ def test_corners_of_a_quadratic_mesh_file_make_a_linear_study(on_a_mesh_file):
         made = levels.make_mesh(recipe, mesh)
         assert set(made.solids) == kinds
         assert len(made.cells[kinds.pop()]) == 4 * len(mesh.cells["tri6"])
+
+
+def test_the_report_stands_alone_and_says_everything(root):
+    study = convergence_study(root / "data/cases/forma04c.toml", levels=3, workers=1)
+    names = [str(series.combination) for series in study.series]
+    captions = [caption for caption, _ in study.tables()]
+    assert captions[:-1] == [caption for name in names for caption in (name, f"{name}: limits")]
+    assert study._repr_html_().count("<tr") == sum(len(rows) for _, rows in study.tables())
+    page, text = study.html(), "\n".join(study.lines())
+    assert not re.search(r"(src|href)=['\"](?!data:)", page)
+    assert "http" not in page
+    assert page.count("<img") == page.count("data:image/png;base64,") == 1
+    for caption, rows in study.tables():
+        assert f"<caption>{caption}</caption>" in page
+        assert f"\n{caption}\n" in text
+        assert all(f">{cell}<" in page.replace("&plusmn;", "+-") for row in rows for cell in row)
+        assert {len(row) for row in rows} == {len(rows[0])}

@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 
+import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.errors import CaseError
 from fastcontact.studies.convergence import convergence_study
@@ -205,3 +206,16 @@ def test_quantities_of_the_study_are_in_the_table(case, tmp_path):
 def test_the_command_says_how_values_are_written(case, text, capsys):
     assert main(["sweep", str(case), "--set", text]) == 1
     assert "for example" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("case", "values", "same"),
+    [
+        ("flat-punch", {"obstacle.punch.motion.y": [-0.001, -0.002]}, True),
+        ("flat-punch", {"theory.punch.approach": [0.001, 0.002]}, False),
+        ("forma04c", {"approach": [0.4, 4.0]}, False),
+    ],
+)
+def test_a_remark_tells_of_a_theory_that_stays(case, values, same):
+    sweep = fc.parameter_sweep(case, values, level=0, workers=1)
+    assert any("theory is the same for all points" in text for text in sweep.remarks()) is same

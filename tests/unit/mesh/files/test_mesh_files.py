@@ -83,7 +83,7 @@ def test_clockwise_cells_are_turned_and_counted(tmp_path, name, caplog):
         found, report = read_mesh_report(tmp_path / "turned.med")
     assert report.n_turned == 1
     assert "1 cells turned" in caplog.text
-    assert (topology.corner_areas(found, name) > 0).all()
+    assert (topology.corner_measures(found, name) > 0).all()
     assert set(found.cells[name][1]) == set(block[1])
     np.testing.assert_array_equal(found.cells[name][0], block[0])
     assert read_mesh_report(tmp_path / "turned.med", orient=False)[1].n_turned == 0
@@ -103,7 +103,7 @@ def test_number_turned_is_the_number_that_was_clockwise(tmp_path, turned, suffix
     write_mesh(path, mesh.replace(cells=cells))
     found, report = read_mesh_report(path)
     assert report.n_turned == sum(turned[:4])
-    assert all((topology.corner_areas(found, name) > 0).all() for name in found.cells)
+    assert all((topology.corner_measures(found, name) > 0).all() for name in found.cells)
 
 
 # There and back -------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from fastcontact.mesh.files.med import write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh, read_mesh_report, write_mesh
 from fastcontact.mesh.generate.box import box
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.mesh.topology import corner_volumes
+from fastcontact.mesh.topology import corner_measures
 
 pytestmark = pytest.mark.usefixtures("meshio_here")
 
@@ -36,7 +36,7 @@ def row_of(names):
 
 
 def volumes(names):
-    return {name: corner_volumes(row_of([name]), name)[0] for name in names}
+    return {name: corner_measures(row_of([name]), name)[0] for name in names}
 
 
 def outward_with_mid_nodes(points, faces):
@@ -89,7 +89,7 @@ def test_medcoupling_sees_our_solids_as_they_are(tmp_path, name):
     # What medcoupling calls the volume of linear cells.
     found.convertQuadraticCellsToLinear()
     measured = found.getMeasureField(False).getArray().toNumPyArray()
-    np.testing.assert_allclose(measured, corner_volumes(mesh, name), rtol=1e-12)
+    np.testing.assert_allclose(measured, corner_measures(mesh, name), rtol=1e-12)
     assert (measured > 0).all()
 
 
@@ -104,13 +104,13 @@ def test_solids_of_medcoupling_are_read_the_right_way_round(tmp_path):
     mc.WriteUMesh(str(tmp_path / "cubes.med"), cubes, True)
     mesh, report = read_mesh_report(tmp_path / "cubes.med")
     assert (list(mesh.cells), report.n_turned) == (["hex8"], 0)
-    assert corner_volumes(mesh, "hex8").sum() == pytest.approx(2.5**3)
+    assert corner_measures(mesh, "hex8").sum() == pytest.approx(2.5**3)
     cubes.simplexize(mc.PLANAR_FACE_6)
     cubes.findAndCorrectBadOriented3DCells()
     mc.WriteUMesh(str(tmp_path / "tetrahedra.med"), cubes, True)
     mesh, report = read_mesh_report(tmp_path / "tetrahedra.med")
     assert (list(mesh.cells), report.n_turned) == (["tet4"], 0)
-    assert corner_volumes(mesh, "tet4").sum() == pytest.approx(2.5**3)
+    assert corner_measures(mesh, "tet4").sum() == pytest.approx(2.5**3)
 
 
 @pytest.mark.skipif(not CASES.is_dir(), reason="code_aster's cases are not beside the checkout")
@@ -202,7 +202,7 @@ def assert_vtk_cells(grid, mesh, vtk):
     size.SetInputData(grid)
     size.Update()
     measured = size.GetOutput().GetCellData().GetArray("Volume")
-    expected = np.concatenate([corner_volumes(mesh, name) for name in mesh.solids])
+    expected = np.concatenate([corner_measures(mesh, name) for name in mesh.solids])
     assert grid.GetNumberOfCells() == len(expected)
     for number, volume in enumerate(expected):
         cell = grid.GetCell(number)

@@ -13,7 +13,7 @@ from fastcontact import topology
 from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import GENERATORS, block, block_on_block, cylinder_on_block
-from fastcontact.mesh.generate._blocks import rectangular, transfinite
+from fastcontact.mesh.generate._spacing import rectangular, transfinite
 
 ELEMENTS = ("tri3", "tri6", "quad4", "quad8", "quad9")
 side = st.floats(0.1, 10.0)

@@ -7,7 +7,7 @@ import fastcontact as fc
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import box
 from fastcontact.mesh.generate.box import SOLIDS
-from fastcontact.mesh.topology import bodies, corner_volumes, outer_facets
+from fastcontact.mesh.topology import bodies, corner_measures, outer_facets
 
 SIZE, ORIGIN = (2.0, 1.5, 1.2), (0.5, -0.3, 0.1)
 SIDES = {f"{axis}{end}": (k, end) for k, axis in enumerate("XYZ") for end in ("MIN", "MAX")}
@@ -18,7 +18,7 @@ def test_volume_points_and_sides(element):
     mesh = box(SIZE, (3, 2, 2), element, ORIGIN)
     fc.Model(mesh, "3d")  # no cell is degenerate or inverted
     assert list(mesh.solids) == [element]
-    assert corner_volumes(mesh, element).sum() == pytest.approx(np.prod(SIZE), rel=1e-13)
+    assert corner_measures(mesh, element).sum() == pytest.approx(np.prod(SIZE), rel=1e-13)
     assert fc.quality(mesh).measure == pytest.approx(np.prod(SIZE), rel=1e-13)
     assert bodies(mesh)[0] == 1
     assert (bodies(mesh)[1] == 0).all()

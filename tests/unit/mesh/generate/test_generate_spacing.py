@@ -1,4 +1,6 @@
-"""Spacing of nodes on a line, and triangulation of other outlines than a disc."""
+"""Spacing of nodes on a line, triangulation of outlines, and refusals of meshes of unreasonable size."""
+
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -6,9 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fastcontact as fc
-from fastcontact.mesh.generate._smooth import delaunay, edges_of, stars_of
+from fastcontact import generate
+from fastcontact.errors import MeshError, ModelError
 from fastcontact.mesh.generate._spacing import Spacing, divided, geometric
-from fastcontact.mesh.generate._triangulate import filled
+from fastcontact.mesh.generate._triangulate import delaunay, edges_of, filled, stars_of
+from fastcontact.model.ramp import linear_ramp
 
 size = st.floats(0.01, 1.0)
 
@@ -46,8 +50,8 @@ def test_segments_follow_the_size_function(near, far, plateau):
 
 
 def test_the_size_function_is_flat_then_linear_then_flat():
-    spacing = Spacing(1.0, 3.0, pole=(1.0, 0.0), plateau=2.0, reach=6.0)
-    points = np.array([[1.0, 0.0], [3.0, 0.0], [1.0, 4.0], [7.0, 0.0], [100.0, 0.0]])
+    spacing = Spacing(1.0, 3.0, plateau=2.0, reach=6.0)
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [0.0, 4.0], [6.0, 0.0], [99.0, 0.0]])
     assert spacing(points).tolist() == [1.0, 1.0, 2.0, 3.0, 3.0]
 
 
@@ -96,3 +100,47 @@ def test_triangles_cover_the_hull_and_stars_close_around_inner_points():
 
 def test_a_segment_as_long_as_the_line_to_rounding_makes_two():
     assert len(geometric(1.0, 0.9999999999999999, 0.36741607936191695)) == 3
+
+
+TOO_LARGE = [
+    ("half-spheres", {"element": "tri3", "size": 1e-12}, r"5e\+13 segments, more than 1000000"),
+    ("half-spheres", {"element": "tri3", "size": 1e-4}, r"e\+11 cells, more than 5000000"),
+    ("half-spheres", {"element": "tri3", "contact_size": 1e-12}, r"segments, more than 1000000"),
+    (
+        "half-spheres",
+        {"element": "quad4", "arc_sizes": (1e-3, 1e-3), "radial_sizes": (1e-3, 1e-3)},
+        r"cells, more than",
+    ),
+    (
+        "block-on-block",
+        {"divisions_lower": (2**32, 2)},
+        r"divisions\[0\] = 4294967296 is out of range: .* at most 1000000",
+    ),
+    ("block-on-block", {"divisions_lower": (100_000, 100_000)}, r"1e\+10 cells, more than 5000000"),
+    ("box", {"divisions": (1000, 1000, 1000)}, r"1e\+09 cells"),
+    ("box", {"divisions": (100, 100, 100), "element": "tet4"}, r"6e\+06 cells"),
+    ("rings", {"divisions_inner": (100_000, 100_000)}, r"1e\+10 cells"),
+    ("crowned-blocks", {"element": "quad4", "contact_size": 1e-9}, "segments, more than 1000000"),
+    ("quarter-disc", {"element": "tri3", "R": 1e-200}, r"R = 1e-200 is out of range: it must be at least 1e-100"),
+    (
+        "quarter-disc",
+        {"element": "tri3", "R": 1e200},
+        r"R = 1e\+200 is out of range: its magnitude must be at most 1e\+100",
+    ),
+]
+
+
+@pytest.mark.parametrize(("name", "options", "message"), TOO_LARGE)
+def test_meshes_that_nobody_can_mean(name, options, message):
+    tracemalloc.start()
+    with pytest.raises(MeshError, match=message):
+        generate.GENERATORS[name](**options)
+    taken = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert taken < 1 << 29
+
+
+def test_ramps_of_more_steps_than_anyone_waits_for():
+    with pytest.raises(ModelError, match="4294967297 load steps are more than 1000000"):
+        linear_ramp(4_294_967_297)
+    assert len(linear_ramp(1000)) == 1000
