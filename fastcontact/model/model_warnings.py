@@ -13,6 +13,7 @@ import numpy as np
 
 from fastcontact._jit.parallel import on_one_blas_thread
 from fastcontact._tools.neighbours import close_pairs
+from fastcontact._tools.units import in_si, misfit
 from fastcontact.arrays import AnyArray, Array, Numbers
 from fastcontact.elasticity.energy import gradients_at, integration_rule
 from fastcontact.elasticity.loads import BodyForce, Load, Pressure, Traction, Value, evaluated
@@ -26,7 +27,6 @@ from fastcontact.model.hanging_nodes import hanging_nodes_warning
 from fastcontact.model.prescribed_overlap import Pairs, Supports, prescribed_overlap_warnings
 from fastcontact.model.ramp import Harmonic, Ramp, Table
 from fastcontact.model.repeated_pairs import split_side_warnings
-from fastcontact.model.units import in_si, misfit
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 if TYPE_CHECKING:

@@ -96,7 +96,7 @@ class Hierarchy:
     def _coarsened(
         self, A: BlockMatrix, level: Level, modes: Array
     ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
-        """Return the prolongator, its transpose, the coarse matrix and its rigid-body modes; None if aggregation stagnates."""
+        """Return a prolongator, its transpose, the coarse matrix and its rigid-body modes; None if aggregation stagnates."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 

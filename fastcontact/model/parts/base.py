@@ -10,6 +10,7 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._jit import ahead
 from fastcontact._tools.argument_types import finite_vector, typed
+from fastcontact._tools.units import named_units
 from fastcontact.arrays import AnyArray, Array, Mask, Numbers
 from fastcontact.contact.obstacles.rigid_side import Rotation
 from fastcontact.elasticity.incompatible_modes import BENDING
@@ -32,7 +33,6 @@ from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.periodicity import PeriodicInterface
 from fastcontact.model.pretension import Pretension
 from fastcontact.model.ramp import Harmonic, PartHistory, Table
-from fastcontact.model.units import named_units
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fastcontact._tools.units import named_units
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.results.plot.fields import Field
@@ -22,9 +23,14 @@ if TYPE_CHECKING:
 else:  # Matplotlib is imported only when a plot is drawn
     Axes = Any
 
-Units = Mapping[str, str]
-UNITS: Units = {"length": "mm", "force": "N", "pressure": "MPa"}
-UNKNOWN: Units = {}
+Units = str | Mapping[str, str]
+UNITS: Mapping[str, str] = {"length": "mm", "force": "N", "pressure": "MPa"}
+UNKNOWN: Mapping[str, str] = {}
+
+
+def units_of(given: Units, result: ContactResult | StepResult) -> Mapping[str, str]:
+    """Return the names of units of the caller, by default those of the model; ModelError if they cannot be read."""
+    return named_units(given) or result.units
 
 
 def placed(points: Array, size: float) -> str:
@@ -126,8 +132,8 @@ def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]
 
 
 def framed(
-    axes: Any, drawn: Any, shown: Field, heading: str, units: Units, labels: Sequence[str], points: Array | None = None,
-    *, alone: bool = True,
+    axes: Any, drawn: Any, shown: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
+    points: Array | None = None, *, alone: bool = True,
 ) -> Any:  # fmt: skip
     """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 

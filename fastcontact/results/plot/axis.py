@@ -12,7 +12,7 @@ from fastcontact.arrays import AnyArray, Array, Indices
 from fastcontact.elasticity.recovery import von_mises
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes, units_of
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled
 
@@ -77,7 +77,7 @@ def axis_stress(
     depth, side, stress = stresses_on_axis(mesh, step, pair)
     upright = abs(_axis(step, pair)[1][1]) > 0.5
     bodies = ("upper body", "lower body") if upright else ("right body", "left body")
-    axes, units = new_axes(ax, (6.4, 4.8)), units or step.units
+    axes, units = new_axes(ax, (6.4, 4.8)), units_of(units, step)
     reach = PLOTTED_DEPTH * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
     values = {caption: stress[:, component] for caption, component in COMPONENTS.items()} | {

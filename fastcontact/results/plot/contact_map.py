@@ -13,7 +13,7 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, new_panels, units_of
 from fastcontact.results.plot.patches import fill
 from fastcontact.results.plot.solid import seen_along
 from fastcontact.results.step import ContactResult
@@ -88,7 +88,7 @@ def contact_map(
     if mesh.dim != 3:
         raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
     blocks = _facets(mesh, contact)
-    (basis, labels), units = _seen_along(contact, blocks), units or contact.units
+    (basis, labels), units = _seen_along(contact, blocks), units_of(units, contact)
     flat = contact.coordinates @ basis.T
     if labels is None:
         flat -= contact.middle @ basis.T

@@ -11,7 +11,17 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Panels, Units, contacts_of, new_axes, new_panels, outer_legend
+from fastcontact.results.plot._axes import (
+    UNKNOWN,
+    Axes,
+    Panels,
+    Units,
+    contacts_of,
+    new_axes,
+    new_panels,
+    outer_legend,
+    units_of,
+)
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
@@ -75,7 +85,7 @@ def history(
     if axes is None:
         axes = Panels(new_panels(2, 1, (6.0, 5.8), sharex=True)[:, 0])
     upper, lower = axes
-    contacts, units = contacts_of(steps, pair), units or steps[-1].units
+    contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
     cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
     forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
@@ -159,7 +169,7 @@ def contact_zones(
     if not steps:
         raise FastcontactError("there is no step whose contact could be plotted")
     axes = new_axes(ax, (6.4, 4.8))
-    contacts, units = contacts_of(steps, pair), units or steps[-1].units
+    contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
     y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])

@@ -12,7 +12,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, outer_legend
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, outer_legend, units_of
 from fastcontact.results.step import ContactResult, half_width
 from fastcontact.results.units import labelled, valued
 
@@ -47,8 +47,9 @@ def pressure_profile(
         see `normal_stress`.
     title : str
         Title of the plot.
-    units : mapping of str to str, optional
-        Names of the units of ``length``, ``force`` and ``pressure`` for the labels; by default those of the model.
+    units : str or mapping of str to str, optional
+        Names of the units of ``length``, ``force`` and ``pressure`` for the labels, for example ``"mm, N, MPa"``; by
+        default those of the model.
     ax : matplotlib Axes, optional
         Axes of the plot; by default those of a new figure.
 
@@ -74,7 +75,7 @@ def pressure_profile(
         raise FastcontactError(
             f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: one of each node"
         )
-    ax, units = new_axes(ax, (6.4, 5.0)), units or contact.units
+    ax, units = new_axes(ax, (6.4, 5.0)), units_of(units, contact)
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
@@ -133,7 +134,7 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
-def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Units) -> None:
+def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mapping[str, str]) -> None:
     """Shade the range of the contact radius, in 2D as arc lengths, on both sides of the contact."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):

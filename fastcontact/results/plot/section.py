@@ -12,7 +12,18 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, framed, mark, new_axes, part_shown, placed, size_around
+from fastcontact.results.plot._axes import (
+    UNKNOWN,
+    Axes,
+    Units,
+    framed,
+    mark,
+    new_axes,
+    part_shown,
+    placed,
+    size_around,
+    units_of,
+)
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import shaded
 from fastcontact.results.plot.shape import scale_of, scaled
@@ -86,7 +97,7 @@ def section(
     from matplotlib.collections import LineCollection
 
     at, direction = _plane(mesh, point, normal)
-    shown, units = field_of(mesh, step, field), units or step.units
+    shown, units = field_of(mesh, step, field), units_of(units, step)
     triangles, lines = _touching(shown, step, at, direction)
     scale = scale_of(scale, mesh, [step])
     basis, labels = seen_along(direction, 1.0 - 1e-12)

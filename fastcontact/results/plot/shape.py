@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from fastcontact.results.plot._axes import (
     placed,
     settled,
     size_around,
+    units_of,
 )
 from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines
@@ -129,7 +130,7 @@ def deformed_shape(
     """
     if zoom is not None and (mesh.dim == 3 or not 0.0 < zoom < LARGEST):
         raise FastcontactError(f"zoom = {zoom:g}: in the plane half a width > 0 can be drawn; in 3D draw a section")
-    shown, units = field_of(mesh, step, field), units or step.units
+    shown, units = field_of(mesh, step, field), units_of(units, step)
     scale = scale_of(scale, mesh, [step])
     points = scaled(shown.mesh.points, scale, step.displacement[shown.node])
     heading = title or f"Deformed shape (displacements x {scale:g}), {step.instant}"
@@ -151,7 +152,7 @@ def deformed_shape(
     return framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
 
 
-def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Units, hidden: bool = False) -> None:
+def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False) -> None:
     """Mark the extreme value; its label contains the position in the deformed and in the reference configuration."""
     before = mesh.points[shown.node[shown.extreme]]
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())

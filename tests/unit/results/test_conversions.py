@@ -124,6 +124,7 @@ def test_steps_show_the_units_and_no_number_depends_on_them(steps):
     assert f"{contact.pressure_max:.6g} MPa" in contact._repr_html_()
     assert fc.plot.pressure_profile(contact).get_ylabel() == "contact pressure [MPa]"
     assert fc.plot.pressure_profile(contact, units={"pressure": "bar"}).get_ylabel() == "contact pressure [bar]"
+    assert fc.plot.pressure_profile(contact, units="in, lbf, psi").get_ylabel() == "contact pressure [psi]"
     assert fc.plot.pressure_profile(plain[-1].contact["disc"]).get_ylabel() == "contact pressure"
     assert fc.plot.history(steps, "disc")[0].get_ylabel() == "contact force [N/mm]"
 
