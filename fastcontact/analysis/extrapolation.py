@@ -18,7 +18,7 @@ FARTHEST = 2.0
 # Highest degree of the polynomial that continues steps.
 DEGREE = 4
 # A polynomial of one more degree is clearly closer if its distance is this fraction. If any closer one were chosen,
-# indentations past yield, whose steps are not smooth, would take 4 % more iterations.
+# indentations past yield, whose steps are not smooth, would take 5 % more iterations.
 SMOOTH = 0.5
 
 
