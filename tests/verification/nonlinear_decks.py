@@ -1,6 +1,6 @@
 """Decks of nonlinear bodies, and what CalculiX 2.20 finds for them, kept in ``data/reference/calculix_nonlinear.json``.
 
-``PYTHONPATH=.:tests python tests/verification/nonlinear_decks.py`` runs CalculiX (``ccx``) on all of them and writes the file.
+``PYTHONPATH=.:tests python tests/verification/nonlinear_decks.py`` runs CalculiX (``ccx``) on all and writes the file.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def spread(mesh: fc.Mesh, most: int = 10) -> list[int]:
 
 
 def deck(mesh, kind, laws, rest, bodies=("BLOCK",), sets=(), surfaces=(), steps=(), nlgeom=True, cells=(0,)) -> Case:
-    """Return the deck of a mesh, with a law for each of the bodies, and with steps of keywords and the number of increments."""
+    """Return the deck of a mesh, with a law for each body; steps are keywords and the number of increments."""
     # Thin, so that CalculiX's solid cells are nearly in plane stress.
     thickness = "0.02," if kind == "CPS8" else "1.,"
     types = {**TYPES, ELEMENTS[kind]: kind, **({"wedge15": kind} if kind == "C3D15" else {})}
@@ -151,7 +151,7 @@ def case(name: str) -> Case:
 
 
 def gauss_order(kind: str) -> np.ndarray:
-    """Return for the integration points that CalculiX prints those of ours, in its order; of plane cells it has three layers."""
+    """Return the integration points of ours in the order of CalculiX, of a layer of plane cells."""
     ours = elements.get(ELEMENTS[kind]).quadrature[0]
     line = np.polynomial.legendre.leggauss(round(len(ours) ** (1.0 / ours.shape[1])))[0]
     theirs = np.stack(np.meshgrid(*[line] * ours.shape[1], indexing="ij"), axis=-1).reshape(-1, ours.shape[1])[:, ::-1]
