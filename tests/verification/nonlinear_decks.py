@@ -1,6 +1,6 @@
 """Decks of nonlinear bodies, and what CalculiX 2.20 finds for them, kept in ``data/reference/calculix_nonlinear.json``.
 
-``PYTHONPATH=.:tests python tests/verification/nonlinear_decks.py`` runs CalculiX (``ccx``) on all of them and writes the file.
+``PYTHONPATH=.:tests python tests/verification/nonlinear_decks.py`` runs CalculiX (``ccx``) on all and writes the file.
 """
 
 from __future__ import annotations
@@ -26,14 +26,13 @@ ELEMENTS = {
 }  # fmt: skip
 LAWS = {
     "isotropic": "*ELASTIC\n200., .3\n*PLASTIC\n1., 0.\n1.5, .05\n2., .5\n3., 2.\n",
-    "kinematic": "*ELASTIC\n200., .3\n*PLASTIC, HARDENING=KINEMATIC\n1., 0.\n11., 1.\n",
+    "kinematic": "*ELASTIC\n2000., .3\n*PLASTIC, HARDENING=KINEMATIC\n1., 0.\n101., 1.\n",
     "perfect": "*ELASTIC\n200., .3\n*PLASTIC\n1., 0.\n",
     "neo-Hookean": "*HYPERELASTIC, NEO HOOKE\n.5, .2\n",
     "Mooney-Rivlin": "*HYPERELASTIC, MOONEY-RIVLIN\n.3, .2, .2\n",
     "Yeoh": "*HYPERELASTIC, YEOH\n.5, -.02, .01, .2, 0., 0.\n",
     "Ogden": "*HYPERELASTIC, OGDEN, N=2\n.6, 2.5, .3, -1.5, .2, 0.\n",
     "Saint Venant-Kirchhoff": "*ELASTIC\n3., .3\n",
-    "rubber": "*HYPERELASTIC, NEO HOOKE\n.5, .02\n",
 }
 
 
@@ -53,7 +52,7 @@ def spread(mesh: fc.Mesh, most: int = 10) -> list[int]:
 
 
 def deck(mesh, kind, laws, rest, bodies=("BLOCK",), sets=(), surfaces=(), steps=(), nlgeom=True, cells=(0,)) -> Case:
-    """Return the deck of a mesh, with a law for each of the bodies, and with steps of keywords and the number of increments."""
+    """Return the deck of a mesh, with a law for each body; steps are keywords and the number of increments."""
     # Thin, so that CalculiX's solid cells are nearly in plane stress.
     thickness = "0.02," if kind == "CPS8" else "1.,"
     types = {**TYPES, ELEMENTS[kind]: kind, **({"wedge15": kind} if kind == "C3D15" else {})}
@@ -110,33 +109,27 @@ def tube(law: str, pressures, nlgeom: bool) -> Case:
     return deck(mesh, "CAX8", [law], held, sets=("TOP", "BOTTOM"), surfaces=("LEFT",), steps=steps, nlgeom=nlgeom)
 
 
-def pressed(kind: str, laws, depth: float, friction: float = 0.0, along: float = 0.0) -> Case:
-    """Return a narrow block on a wide one of another mesh, pressed down and moved along."""
-    element = ELEMENTS[kind]
-    low = fc.generate.block((2.0, 1.0), (8, 4), element, origin=(0.0, 0.0), name="BLOCK")
-    high = fc.generate.block((1.2, 0.6), (6, 3), element, origin=(0.0 if kind == "CAX8" else 0.4, 1.0), name="BLOCK")
-    curved = high.points.copy()
-    at = (curved[:, 0] - (0.0 if kind == "CAX8" else 1.0)) / 2.0
-    curved[:, 1] += at**2 * (1.6 - curved[:, 1]) / 0.6
-    mesh = united(L_=low, U_=high.replace(points=curved))
+def pressed(kind: str, laws, depth: float) -> Case:
+    """Return a narrow round block pressed on a wide one of another mesh."""
+    low = fc.generate.block((2.0, 1.0), (8, 4), ELEMENTS[kind], name="BLOCK")
+    high = fc.generate.block((1.2, 0.6), (6, 3), ELEMENTS[kind], origin=(0.4, 1.0), name="BLOCK")
+    round_end = high.points.copy()
+    round_end[:, 1] += ((round_end[:, 0] - 1.0) / 2.0) ** 2 * (1.6 - round_end[:, 1]) / 0.6
+    mesh = united(L_=low, U_=high.replace(points=round_end))
     rest = "*SURFACE INTERACTION, NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1.E4\n"
-    rest += f"*FRICTION\n{friction}, 1.E4\n" if friction else ""
     rest += "*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE\nS_U_BOTTOM, S_L_TOP\n*BOUNDARY\nL_BOTTOM, 1, 2\n"
-    rest += "U_TOP, 1\nU_LEFT, 1\nL_LEFT, 1\n" if kind == "CAX8" else ""
     steps = [(f"*BOUNDARY\nU_TOP, 1, 1, 0.\nU_TOP, 2, 2, {-depth}\n", 10)]
-    steps += [(f"*BOUNDARY\nU_TOP, 1, 1, {along}\n", 10)] if along else []
-    sets = ("U_TOP", "L_BOTTOM", "U_LEFT", "L_LEFT")
-    return deck(mesh, kind, laws, rest, ("L_BLOCK", "U_BLOCK"), sets, ("L_TOP", "U_BOTTOM"), steps, cells=(27,))
+    sets, surfaces = ("U_TOP", "L_BOTTOM"), ("L_TOP", "U_BOTTOM")
+    return deck(mesh, kind, laws, rest, ("L_BLOCK", "U_BLOCK"), sets, surfaces, steps, cells=(27,))
 
 
 SMALL = [(0.01, 0.02), (-0.01, 0.0)]
-CYCLE = [(0.01, 0.02), (-0.01, -0.02), (0.01, 0.02)]
+# Small: kinematic hardening has small strains here. Without NLGEOM, CalculiX 2.20 yields at less than the yield stress.
+CYCLE = [(0.001, 0.002), (-0.001, -0.002), (0.001, 0.002)]
 FINITE = [(0.2, 0.3), (0.1, -0.2)]
 CASES = {
-    **{f"isotropic, {kind}": (block, kind, "isotropic", SMALL, False)
-       for kind in ("C3D8", "C3D10", "C3D20", "CPE8", "CPS8", "CAX8")},
-    **{f"kinematic, {kind}": (block, kind, "kinematic", CYCLE, False) for kind in ("C3D20", "CPE8", "CPS8", "CAX8")},
-    **{f"isotropic, NLGEOM, {kind}": (block, kind, "isotropic", FINITE) for kind in ("C3D20", "CPE8", "CPS8", "CAX8")},
+    **{f"isotropic, {kind}": (block, kind, "isotropic", SMALL, False) for kind in ("C3D8", "C3D10", "C3D20", "CPE8", "CAX8")},
+    **{f"kinematic, {kind}": (block, kind, "kinematic", CYCLE) for kind in ("C3D20", "CPE8", "CAX8")},
     **{f"neo-Hookean, {kind}": (block, kind, "neo-Hookean", FINITE)
        for kind in ("C3D8", "C3D10", "C3D15", "C3D20", "CPE8", "CPS8", "CAX8")},
     **{f"{law}, {kind}": (block, kind, law, FINITE)
@@ -144,14 +137,10 @@ CASES = {
     **{f"Saint Venant-Kirchhoff, {kind}": (block, kind, "Saint Venant-Kirchhoff", [(0.1, 0.05)])
        for kind in ("C3D20", "CPE8", "CPS8", "CAX8")},
     **{f"strip bent by a {load}, {kind}": (strip, kind, "Saint Venant-Kirchhoff", load)
-       for load in ("force", "pressure") for kind in ("C3D20", "CPE8", "CPS8")},
+       for load in ("force", "pressure") for kind in ("C3D20", "CPE8")},
     "tube that yields": (tube, "perfect", (0.6, 0.7, 0.0), False),
     "rubber tube": (tube, "neo-Hookean", (0.3,), True),
     "rubber on rubber, CPE8": (pressed, "CPE8", ("neo-Hookean", "Ogden"), 0.2),
-    "rubber on rubber, CAX8": (pressed, "CAX8", ("Mooney-Rivlin", "Yeoh"), 0.2),
-    "rubber rubs on rubber, CPE8": (pressed, "CPE8", ("neo-Hookean", "Mooney-Rivlin"), 0.2, 0.3, 0.2),
-    "steel on steel that yields, CAX8": (pressed, "CAX8", ("isotropic", "isotropic"), 0.05),
-    "steel on steel that yields, CPE8": (pressed, "CPE8", ("isotropic", "isotropic"), 0.05),
 }  # fmt: skip
 
 
@@ -162,7 +151,7 @@ def case(name: str) -> Case:
 
 
 def gauss_order(kind: str) -> np.ndarray:
-    """Return for the integration points that CalculiX prints those of ours, in its order; of plane cells it has three layers."""
+    """Return the integration points of ours in the order of CalculiX, of a layer of plane cells."""
     ours = elements.get(ELEMENTS[kind]).quadrature[0]
     line = np.polynomial.legendre.leggauss(round(len(ours) ** (1.0 / ours.shape[1])))[0]
     theirs = np.stack(np.meshgrid(*[line] * ours.shape[1], indexing="ij"), axis=-1).reshape(-1, ours.shape[1])[:, ::-1]
@@ -176,7 +165,7 @@ def has_points(kind: str) -> bool:
     return kind not in ("C3D10", "C3D15")
 
 
-def read_dat(text: str, given: Case, kind: str) -> list[dict]:
+def read_dat(text: str, kind: str) -> list[dict]:
     """Return of each step the displacements, the forces of sets and the stresses at points that a .dat file has."""
     steps: dict[float, dict] = {}
     table: list = []
@@ -188,7 +177,6 @@ def read_dat(text: str, given: Case, kind: str) -> list[dict]:
             table = step["forces" if head[1] == "total force" else head[1]]
         elif numbers:
             table.append([float(x) for x in numbers[1].split()])
-    del given
     dim = 3 if kind.startswith("C3D") else 2
     found = []
     for time, step in sorted(steps.items()):
@@ -216,13 +204,17 @@ def by_calculix(name: str) -> list[dict]:
     """Return what CalculiX finds."""
     given = case(name)
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "run.inp").write_text(given.text, encoding="utf-8")
+        # CalculiX replaces further compressibility constants that are zero by its own.
+        text = given.text.replace("0., 0.\n*SOLID", "1.E12, 1.E12\n*SOLID").replace(
+            "-1.5, .2, 0.\n", "-1.5, .2, 1.E12\n"
+        )
+        (Path(folder) / "run.inp").write_text(text, encoding="utf-8")
         environment = {**os.environ, "OMP_NUM_THREADS": "1"}
         done = subprocess.run(
             [CCX, "run"], cwd=folder, env=environment, capture_output=True, text=True, timeout=300, check=False
         )
         assert "Job finished" in done.stdout, done.stdout[-1500:]
-        return read_dat((Path(folder) / "run.dat").read_text(encoding="utf-8"), given, kind_of(name))
+        return read_dat((Path(folder) / "run.dat").read_text(encoding="utf-8"), kind_of(name))
 
 
 def here(name: str) -> list[dict]:
@@ -261,16 +253,4 @@ def here(name: str) -> list[dict]:
 
 
 if __name__ == "__main__":
-    import sys
-
-    known = json.loads(FILE.read_text()) if FILE.exists() and len(sys.argv) > 1 else {}
-    for name in CASES:
-        if len(sys.argv) > 1 and sys.argv[1] not in name:
-            continue
-        try:
-            known[name] = by_calculix(name)
-        except AssertionError as error:
-            print(name, "FAILS", str(error)[-600:])
-            continue
-        print(name, len(known[name]))
-    FILE.write_text(json.dumps(known), encoding="utf-8")
+    FILE.write_text(json.dumps({name: by_calculix(name) for name in CASES}), encoding="utf-8")

@@ -35,6 +35,7 @@ from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
 from fastcontact.elasticity.multipoint_constraints import MultiPointConstraint, TemporaryConstraint
+from fastcontact.elasticity.nonlinear_materials import ElasticPlastic
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, Table
 from fastcontact.model.relation_rows import along
@@ -400,11 +401,12 @@ class Building:
     def _ramp(self, conditions: Conditions) -> Ramp:
         """Return the ramp with the ends of all steps and the corners of all histories.
 
-        Models with friction or cohesive contact also have the ends of the increments of each step.
+        Models with friction, cohesive contact or elastic-plastic bodies also have the ends of the increments of each step.
         """
         steps = self.content.steps
         instants = {float(number) for number in range(1, len(steps) + 1)}
-        if any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
+        yields = any(isinstance(law, ElasticPlastic) for law, _ in self.model.materials)
+        if yields or any(pair.options.get("friction") or "cohesion" in pair.options for pair in self.model.contact):
             for number, step in enumerate(steps):
                 count = max(1, round(min(MOST_PARTS, step.period / min(step.increment, step.period))))
                 instants.update(number + k / count for k in range(1, count))  # ends of equal increments
