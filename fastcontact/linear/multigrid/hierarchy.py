@@ -24,7 +24,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import COARSEST, Coarse
 from fastcontact.linear.multigrid.level import Level
-from fastcontact.linear.multigrid.matrix import WORK_OF_ROW, BlockMatrix, pointers, widest_row
+from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers, widest_row
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 
@@ -94,14 +94,12 @@ class Hierarchy:
     def _coarsened(
         self, A: BlockMatrix, level: Level, modes: Array
     ) -> tuple[BlockMatrix, BlockMatrix, BlockMatrix, Array] | None:
-        """Return the prolongator, its transpose, the coarse matrix and its rigid-body modes; None if aggregation stagnates."""
+        """Return the prolongator, its transpose, the coarse matrix and its modes; None if aggregation stagnates."""
         from pyamg.aggregation.aggregate import standard_aggregation
         from pyamg.aggregation.tentative import fit_candidates
 
         size, n = len(A.rows), len(A.indptr) - 1
-        start, near = graph(A)
-        ones = np.ones(len(near), np.int8)
-        aggregates, _ = standard_aggregation(csr_matrix((ones, near, start), shape=(n, n)))
+        aggregates, _ = standard_aggregation(graph(A))
         n_coarse, n_modes = aggregates.shape[1], modes.shape[1]
         if not 0 < n_coarse * n_modes < level.n:
             return None
@@ -201,15 +199,13 @@ class Hierarchy:
             level.relax(level.r, *factor)
 
 
-def graph(A: BlockMatrix) -> tuple[Numbers, Numbers]:
-    """Return the graph of A: offsets (n_rows + 1,) and column numbers of the off-diagonal blocks that are not zero."""
-    n = len(A.indptr) - 1
-    arguments, count = (A.indptr, A.indices, A.storage, A.data, len(A.rows) ** 2), np.empty(n, np.int32)
-    spread(galerkin_kernels.count_near, n, WORK_OF_ROW, *arguments, widest_row(A.indptr), count)
-    start = pointers(count)
-    neighbours = np.empty(start[-1], np.int32)
-    spread(galerkin_kernels.find_near, n, WORK_OF_ROW, *arguments, start, neighbours)
-    return start, neighbours
+def graph(A: BlockMatrix) -> csr_matrix:
+    """Return the graph of A (n, n): ones or twos at the off-diagonal blocks that are not zero."""
+    n, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL else A.storage[:3:2]
+    rows = np.repeat(np.arange(n), np.diff(start))
+    near = A.data.reshape(-1, len(A.rows) ** 2).any(axis=1) & (columns != rows)
+    stored = csr_matrix((np.ones(int(near.sum()), np.int8), (rows[near], columns[near])), shape=(n, n))
+    return stored + stored.T.tocsr()
 
 
 def by_columns(P: BlockMatrix, n: int) -> tuple[Numbers, Numbers, Numbers]:
