@@ -200,7 +200,7 @@ class Hierarchy:
 
 
 def graph(A: BlockMatrix) -> csr_matrix:
-    """Return the graph of A (n, n): ones or twos at the off-diagonal blocks that are not zero."""
+    """Return the graph (n, n) of a symmetric A: positive numbers at the off-diagonal blocks that are not zero."""
     n, (start, columns) = len(A.indptr) - 1, (A.indptr, A.indices) if A.storage is ALL else A.storage[:3:2]
     rows = np.repeat(np.arange(n), np.diff(start))
     near = A.data.reshape(-1, len(A.rows) ** 2).any(axis=1) & (columns != rows)
