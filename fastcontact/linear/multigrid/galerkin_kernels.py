@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Set-up of a multigrid hierarchy: the graph of a matrix, smoothed prolongators and Galerkin products.
+"""Set-up of a multigrid hierarchy: smoothed prolongators and Galerkin products.
 
 Block matrices are given by arrays, see `matrix.BlockMatrix`, and block sizes m and n by tuples of zeros, `rows` and `cols`.
 Numbers that may be split are tuples, see `split_matrix_kernels`, and `storage` defines which blocks are stored, see
@@ -11,40 +11,6 @@ import numpy as np
 from fastcontact._jit.decorators import kernel
 from fastcontact.linear.multigrid.block_products import add_product, add_transposed
 from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, place_of
-
-
-@kernel
-def _near(i, indptr, indices, storage, data, square, near):
-    """Fill `near` with the columns of the nonzero off-diagonal blocks of row i; return their number."""
-    part, count = part_of(storage, i), 0
-    for k in range(indptr[i], indptr[i + 1]):
-        if indices[k] == i:
-            continue
-        slot = place_of(storage, part, i, indices[k], k)[0]
-        for e in range(slot * square, (slot + 1) * square):
-            if data[e] != 0.0:
-                near[count] = indices[k]
-                count += 1
-                break
-    return count
-
-
-@kernel
-def count_near(low, high, indptr, indices, storage, data, square, widest, count):
-    """Fill `count` (n_rows,) with the number of nonzero off-diagonal blocks of rows of up to `widest` blocks.
-
-    A row without neighbours is a node without coupling: all its unknowns are supported.
-    """
-    near = np.empty(widest, np.int32)
-    for i in range(low, high):
-        count[i] = _near(i, indptr, indices, storage, data, square, near)
-
-
-@kernel
-def find_near(low, high, indptr, indices, storage, data, square, start, neighbours):
-    """Fill the columns `neighbours` of the nonzero off-diagonal blocks, with the row pointers `start`."""
-    for i in range(low, high):
-        _near(i, indptr, indices, storage, data, square, neighbours[start[i] : start[i + 1]])
 
 
 @kernel

@@ -84,7 +84,7 @@ def merged(change: LocalChange, *others: LocalChange) -> LocalChange:
 
 
 def restriction(P: BlockMatrix, nodes: Indices) -> tuple[Indices, bsr_array]:
-    """Return the coarse nodes (l,) that a prolongator P connects with `nodes` (k,), and P between them in double precision."""
+    """Return the coarse nodes (l,) that P connects with `nodes` (k,), and P between them, in double precision."""
     rows, cols = len(P.rows), len(P.cols)
     count = np.diff(P.indptr)[nodes]
     indptr = np.concatenate([[0], np.cumsum(count)])
