@@ -285,7 +285,8 @@ def sliding_load(constraints: Constraints, solution: Solution, rows: slice, rubb
 
     `rubbed` (m,) are those of the normal forces of constraints [energy]; for other parameters see `contact_result`.
     """
-    assert constraints.nodal is not None and isinstance(solution, FrictionalEquilibrium)
+    assert constraints.nodal is not None
+    assert isinstance(solution, FrictionalEquilibrium)
     # The slip of a step as a whole may be elastic; that of increments is sliding, also if the constraint sticks at the end.
     slides = rubbed if solution.work is not None else np.where(solution.sticking[rows], 0.0, rubbed)
     load, area = constraints.nodal.over_whole_side(constraints.normal_forces(slides)), constraints.nodal.nodal_areas

@@ -119,8 +119,8 @@ class ContactResult:
         Integral of the pressure over the slip in this step, in pairs with friction [pressure * length].
     slip, slip_total : ndarray (m, dim)
         Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps
-        [length]. If friction is solved in increments, it counts from the instant at which a node closes. At open and at sticking nodes `slip` is zero. Both are NaN if the result file was written by a version
-        that did not store them.
+        [length]. Where friction is solved in increments, it counts from the instant at which a node closes. At open and at
+        sticking nodes `slip` is zero. Both are NaN if the result file was written by a version that did not store them.
     primary_points : ndarray of int (k,)
         Point numbers of the nodes of the primary side; empty for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
