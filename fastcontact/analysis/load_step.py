@@ -213,9 +213,8 @@ def keep_path(
         elif not (pair.options.tied or pair.options.gap_only):
             given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
             forces[name], work_of_pair, rubbed = contact_work(pair, *given)
-            rubbed = sliding_load(constraints, settled.solution, rows, rubbed) if pair.friction else None
-            more = {"dissipation": work_of_pair[0], "sliding_load": rubbed}
-            results_so_far[name] = replace(results_so_far[name], **more)
+            load_of_pair = sliding_load(constraints, settled.solution, rows, rubbed) if pair.friction else None
+            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
             works += work_of_pair
         if pair.options.wear is not None:
             before = start.worn.get(name, Worn.nothing(len(contact.points)))
