@@ -223,6 +223,43 @@ def _nodal_shear(
     return traction - np.einsum("nd,nd->n", traction, normal)[:, None] * normal
 
 
+def approach(constraints: Constraints, solution: Solution, rows: slice, contact: ContactResult) -> Array:
+    """Return the parts (n_nodes, dim) of nodal slips before nodes closed in the step, averaged by contact force [length].
+
+    They are known, and not zero, if the step was solved in increments. For parameters see `contact_result`.
+    """
+    if not isinstance(solution, FrictionalEquilibrium) or solution.approach is None or not constraints.tangents:
+        return np.zeros_like(contact.coordinates)
+    assert constraints.nodal is not None
+    forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
+    slips = np.einsum("mk,kmd->md", solution.approach[rows], np.stack(constraints.directions))
+    pressure = constraints.nodal.pressure(forces)[:, None]
+    mean = np.divide(
+        constraints.nodal.traction(forces[:, None] * slips),
+        pressure,
+        out=np.zeros_like(contact.coordinates),
+        where=pressure > 0.0,
+    )
+    # The nodal values of a field may exceed the values from which it is computed.
+    largest, length = np.linalg.norm(slips, axis=1).max(initial=0.0), np.linalg.norm(mean, axis=1)
+    return mean * np.divide(largest, length, out=np.ones_like(length), where=length > largest)[:, None]
+
+
+def sliding_load(constraints: Constraints, solution: Solution, rows: slice, rubbed: Array) -> Array:
+    """Return the integrals (n_nodes,) of the pressure over the slip in the step [pressure * length].
+
+    `rubbed` (m,) are those of the normal forces of constraints [energy]; for other parameters see `contact_result`.
+    """
+    assert constraints.nodal is not None
+    assert isinstance(solution, FrictionalEquilibrium)
+    # The slip of a step as a whole may be elastic; that of increments is sliding, also if the constraint sticks at the end.
+    slides = rubbed if solution.work is not None else np.where(solution.sticking[rows], 0.0, rubbed)
+    load, area = constraints.nodal.over_whole_side(constraints.normal_forces(slides)), constraints.nodal.nodal_areas
+    positive = np.maximum(load, 0.0)  # a field may undershoot beyond the edge of the contact; its integral is preserved
+    total = float(positive @ area)
+    return np.asarray(positive * (max(float(load @ area), 0.0) / total if total > 0.0 else 0.0))
+
+
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
     """Return a contact result with Cauchy instead of nominal tractions, and widths in the deformed configuration.
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
-from fastcontact.analysis.contact_result import contact_results
+from fastcontact.analysis.contact_result import approach, contact_results, sliding_load
 from fastcontact.analysis.equilibrium import StepEquilibrium, with_loads
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
@@ -216,20 +216,22 @@ def keep_path(
         slip = np.zeros_like(contact.coordinates)
         if contact.active.any() and not pair.options.tied:
             held = contact.sticking & bool(pair.friction) & (pair.options.tangential_penalty is None)
-            slip = np.where((contact.active & ~held)[:, None], pair.nodal_slip(at), 0.0)
+            slip = pair.nodal_slip(at) - approach(constraints, settled.solution, rows, contact)
+            slip = np.where((contact.active & ~held)[:, None], slip, 0.0)
         slipped[name] = slip + start.slipped.get(name, 0.0)
         results_so_far[name] = replace(contact, slip=slip, slip_total=slipped[name])
-        if pair.options.wear is not None:
-            before = start.worn.get(name, Worn.nothing(len(contact.points)))
-            worn[name] = before.after(pair, at, contact, pair.options.wear)
-            results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
         if name in end.bonds:
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
             given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
-            forces[name], work_of_pair = contact_work(pair, *given)
-            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0])
+            forces[name], work_of_pair, rubbed = contact_work(pair, *given)
+            load_of_pair = sliding_load(constraints, settled.solution, rows, rubbed) if pair.friction else None
+            results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
             works += work_of_pair
+        if pair.options.wear is not None:
+            before = start.worn.get(name, Worn.nothing(len(contact.points)))
+            worn[name] = before.after(pair, at, results_so_far[name], pair.options.wear)
+            results_so_far[name] = replace(results_so_far[name], wear=worn[name].depth)
     stored = sum(entry.stored for entry in forces.values()) + sum(entry.stored for entry in end.bonds.values())
     released = sum(entry.released for entry in end.bonds.values())
     work = None if start.work is None else start.work.after(energy, stored, works.tolist(), released)

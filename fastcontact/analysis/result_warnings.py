@@ -50,9 +50,14 @@ WAVERING = 0.25
 MANY = 10
 
 
-def result_warnings(problem: Problem, state: State, last: StepResult) -> list[str]:
-    """Return the warnings about an analysis whose `last` step ended in a state."""
-    warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state), *_undetermined(last)]
+def result_warnings(
+    problem: Problem, state: State, last: StepResult, free: tuple[int, dict[str, list[str]]] | None = None
+) -> list[str]:
+    """Return the warnings about an analysis whose `last` step ended in a state.
+
+    `free` is the number of the first step in which nothing determines the position of bodies, and their free motions.
+    """
+    warnings = [*interpenetration(problem, state, last), *_carrying_springs(problem, state), *_undetermined(last, free)]
     if problem.model.strain == "small":
         warnings += [*_large_strain(problem, last), *_large_rotation(problem, state, last)]
     if problem.bodies is None:
@@ -185,14 +190,15 @@ def _carrying_springs(problem: Problem, state: State) -> Iterator[str]:
         )
 
 
-def _undetermined(last: StepResult) -> Iterator[str]:
-    """Yield a warning about bodies whose position nothing determines."""
-    free = last.iterations.get("regularised", {}).get("undetermined")
-    if free:
-        named = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in free.items())
+def _undetermined(last: StepResult, free: tuple[int, dict[str, list[str]]] | None) -> Iterator[str]:
+    """Yield a warning about bodies whose position nothing determines, for the first such step `free`."""
+    if free is not None:
+        index, bodies = free
+        named = "; ".join(f"{body}: {', '.join(motions)}" for body, motions in bodies.items())
+        when = "" if index == last.index else f" in load step {index}"
         yield (
-            f"nothing determines the position of bodies, since no contact force acts against their motion ({named}): any "
-            "position without such a force is a solution; hold them by supports or weak springs, or load them"
+            f"nothing determines the position of bodies{when}, since no contact force acts against their motion ({named}): "
+            "any position without such a force is a solution; hold them by supports or weak springs, or load them"
         )
 
 

@@ -273,9 +273,10 @@ def _warn_of_long_steps(work: Mapping[str, float]) -> None:
 def wear(model: Model, steps: Iterable[StepResult], name: str, coefficient: float) -> Array:
     """Return the depth of wear at the secondary nodes of a contact pair by Archard's law, accumulated over the load steps.
 
-    ``depth = sum of coefficient * pressure * slip``, with the mean of the pressures at both ends of a step. Slip is the
-    tangential displacement of a node relative to the opposite side at the end of the step, zero where it sticks. The
-    geometry does not change; use the option ``wear`` of the contact pair to include its change.
+    ``depth = sum of coefficient * integral of pressure over slip``. With friction the integral of a step is
+    `ContactResult.sliding_load`. Without friction it is the slip times the mean of the pressures at both ends, where slip is
+    the tangential displacement of a node relative to the opposite side at the end of the step. The geometry does not change;
+    use the option ``wear`` of the contact pair to include its change.
 
     Parameters
     ----------

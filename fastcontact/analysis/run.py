@@ -189,12 +189,15 @@ def _marched(
     doubtful += problem.doubtful
     state = problem.initial_state() if last is None else restart.put_back(problem, last, touched)
     begin, before = problem.ramp.table[0][0], 0
+    free: tuple[int, dict[str, list[str]]] | None = None  # first step in which nothing determines positions
     if last is not None:
         begin, before, last = last.load_factor, last.index, None  # frees the memory of the step
     for index, instant in enumerate(instants, start=before + 1):
         problem, state = go_on(prepared, model, problem, state, begin)
         state, step = step_halving.advance(problem, state, index, begin, instant)
-        warnings = result_warnings(problem, state, step) if instant == instants[-1] else []
+        free = free or (index, step.iterations.get("regularised", {}).get("undetermined", {}))
+        free = free if free[1] else None
+        warnings = result_warnings(problem, state, step, free) if instant == instants[-1] else []
         for text in warnings:
             warn(text)
         warned = (*doubtful * (index == 1), *warnings)

@@ -150,18 +150,19 @@ class SharedNodes:
         frame = self.frame
 
         def turned(along: Array) -> Array:
-            return np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[representative], frame)
+            at_first = np.einsum("md,mkd->mk", np.einsum("mk,mkd->md", along, frame)[representative], frame)
+            return np.where(self.idle[:, None], at_first, along)
 
         return replace(
             solution,
             multiplier=normal,
             gap=gap,
-            slip=np.where(self.idle[:, None], turned(solution.slip), solution.slip),
+            slip=turned(solution.slip),
             active=active,
             sticking=solution.sticking[representative],
             work=None if solution.work is None else self.along * solution.work[representative],
-            tangential=self.along[:, None]
-            * np.where(self.idle[:, None], turned(solution.tangential), solution.tangential),
+            approach=None if solution.approach is None else turned(solution.approach),
+            tangential=self.along[:, None] * turned(solution.tangential),
         )
 
 

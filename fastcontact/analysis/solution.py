@@ -168,6 +168,8 @@ class Slid:
     ----------
     slip : ndarray (m, dim)
         Slip vectors since the beginning of the step [length].
+    approach : ndarray (m, dim)
+        Part of `slip` before the constraint closed in this step, zero if it was closed at the beginning [length].
     work : ndarray (m,)
         Frictional work since the beginning of the step [energy].
     normal : ndarray (m,)
@@ -175,6 +177,7 @@ class Slid:
     """
 
     slip: Array
+    approach: Array
     work: Array
     normal: Array
 
@@ -207,6 +210,8 @@ class FrictionalEquilibrium:
         Unit tangents.
     work : ndarray (m,), optional
         Frictional work in the step [energy]; only if the step is solved in increments.
+    approach : ndarray (m, k), optional
+        Part of `slip` before the constraint closed in this step [length]; only if the step is solved in increments.
     slid : Slid, optional
         Data at the beginning of the last increment; only if the step is solved in increments.
     response : callable, optional
@@ -225,6 +230,7 @@ class FrictionalEquilibrium:
     iterations: int
     directions: tuple[Array, ...] = ()
     work: Array | None = None
+    approach: Array | None = None
     slid: Slid | None = None
     response: Callable[[], Response] | None = field(default=None, repr=False)
 

@@ -59,11 +59,13 @@ def worn_in_step(
     contact : ContactResult
         Contact result at the end of the step.
     before : ndarray (m,) or float
-        Nodal pressures at the beginning of the step [pressure]. Wear is computed with the mean of the pressures at the
-        beginning and at the end.
+        Nodal pressures at the beginning of the step [pressure]. Wear without friction is computed with the mean of the
+        pressures at the beginning and at the end, and the slip from the beginning of the step.
     coefficient : float
         Archard's coefficient divided by the hardness [1 / pressure].
     """
+    if contact.sliding_load is not None:
+        return coefficient * contact.sliding_load
     distance = np.linalg.norm(pair.nodal_slip(at), axis=1)
     if pair.friction:
         distance = np.where(contact.sticking, 0.0, distance)

@@ -156,7 +156,7 @@ class Work:
 def contact_work(
     pair: Formulation, constraints: Constraints, solution: Solution, rows: slice, at: Configuration, contact: ContactResult,
     before: ContactForces | None,
-) -> tuple[ContactForces, tuple[float, float, float]]:  # fmt: skip
+) -> tuple[ContactForces, tuple[float, float, float], Array]:  # fmt: skip
     """Return the contact forces of a pair at the end of a load step, and the works of contact in this step.
 
     Parameters
@@ -180,6 +180,8 @@ def contact_work(
     forces : ContactForces
     works : (float, float, float)
         Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
+    rubbed : ndarray (m,)
+        Integrals of the normal forces over the slips in the step [energy].
     """
     normal, tangents = constraints.contact_forces(solution.multiplier[rows]), np.zeros((len(constraints), 0))
     slip, directions = tangents, np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
@@ -196,17 +198,19 @@ def contact_work(
     pressure, traction = before.at(constraints.positions)
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
-    friction = float(np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0)).sum())
+    work = np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0))
     touching = float(along[pressure == 0.0].sum())
     if isinstance(solution, FrictionalEquilibrium) and solution.work is not None:
-        friction, touching = float(solution.work[rows].sum()), 0.0
+        work, touching = solution.work[rows], 0.0
+    friction, mu = float(work.sum()), constraints.coefficients
+    rubbed = np.divide(work, mu, out=0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1), where=mu > 0.0)
     sliding = float((along + earlier).sum())
     moved = _relative(pair, at)
     gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
     wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
     gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
     gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
-    return now, (friction, touching, gained - (now.stored - before.stored) - sliding)
+    return now, (friction, touching, gained - (now.stored - before.stored) - sliding), rubbed
 
 
 def _forces(

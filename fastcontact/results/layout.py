@@ -91,7 +91,7 @@ POINT_FIELDS = {
 # Additional point data of models with heat conduction.
 HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
 # Optional columns of contact tables.
-OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure")
+OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure", "sliding_load")
 
 # Cell data of models with material interfaces: the mean over the nodes of a cell of the nodal stress of its material.
 CELL_STRESS = "stress_in_cell"

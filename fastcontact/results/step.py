@@ -115,10 +115,12 @@ class ContactResult:
         Damage of the cohesive layer, from 0 (intact) to 1 (broken), with the option ``cohesion`` [-].
     fluid_pressure : ndarray (m,), optional
         Pressure of the fluid at the nodes that it has reached, with `Model.add_fluid_pressure` [pressure].
+    sliding_load : ndarray (m,), optional
+        Integral of the pressure over the slip in this step, in pairs with friction [pressure * length].
     slip, slip_total : ndarray (m, dim)
         Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps
-        [length]. At open and at sticking nodes `slip` is zero. Both are NaN if the result file was written by a version
-        that did not store them.
+        [length]. Where friction is solved in increments, it counts from the instant at which a node closes. At open and at
+        sticking nodes `slip` is zero. Both are NaN if the result file was written by a version that did not store them.
     primary_points : ndarray of int (k,)
         Point numbers of the nodes of the primary side; empty for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -170,6 +172,7 @@ class ContactResult:
     wear: Array | None = None
     damage: Array | None = None
     fluid_pressure: Array | None = None
+    sliding_load: Array | None = None
     slip: Array = None  # type: ignore[assignment]
     slip_total: Array = None  # type: ignore[assignment]
     heat_flux: Array | None = None

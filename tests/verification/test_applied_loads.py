@@ -325,6 +325,16 @@ def test_a_body_that_nothing_loads_has_no_determined_position(friction):
         assert not free or "body 'UPPER': translation along y" in texts[0]
 
 
+def test_an_undetermined_position_in_an_earlier_step_is_told_at_the_end():
+    """The block is free in the first step, and pushed in the second one."""
+    ramp = fc.Ramp((1.0, 2.0), ((0.0, 0.0), (1.0, 0.0), (2.0, 1.0)))
+    with pytest.warns(fc.FastcontactWarning, match="determines the position of bodies in load step 1, since") as told:
+        steps = fc.solve(floating_block(0.3, None), ramp)
+    assert steps[-1].iterations["regularised"]["undetermined"] == {}
+    assert sum("nothing determines" in str(one.message) for one in told) == 1
+    assert sum("nothing determines" in text for text in steps[-1].warnings) == 1
+
+
 def floating_block(push, friction):
     """A block that is free along y, between a block and an obstacle that goes down by `push`, each 0.1 from it."""
     mesh = fc.generate.block_on_block()

@@ -2,6 +2,8 @@
 
 import json
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import elastic_model, supported, united
@@ -287,6 +289,28 @@ def test_the_worn_volume_is_archards(formulation, options):
     assert np.ptp(steps[-1].contact["sole"].coordinates[steps[-1].contact["sole"].active, 0]) > np.ptp(
         steps[0].contact["sole"].coordinates[steps[0].contact["sole"].active, 0]
     )
+
+
+@pytest.mark.filterwarnings("ignore:contact 'ball' has only")
+@pytest.mark.parametrize("formulation", [None, "mortar"])
+@pytest.mark.parametrize("stroke", [0.0, 0.2])
+def test_the_worn_volume_does_not_depend_on_the_number_of_steps(formulation, stroke):
+    """A roller that is pressed and drawn in the same steps: k times force over slip, which is k times work over friction."""
+    volumes = []
+    for count in (80, 20, 5):
+        mesh = block((8.0, 4.0), (64, 16), "quad4", (-4.0, -4.0))
+        x, y = mesh.points.T
+        points = np.column_stack([4.0 * np.sign(x) * np.abs(x / 4.0) ** 1.5, -4.0 * np.abs(y / 4.0) ** 1.5])
+        model = elastic_model(mesh.replace(points=points), "plane_strain", E=1e5, BOTTOM="xy")
+        roller = fc.obstacles.Sphere(centre=(0.0, 10.0), R=10.0)
+        options = {"motion": {"x": stroke, "y": -0.05}, "friction": 0.1, "formulation": formulation}
+        model.add_obstacle("ball", secondary="TOP", obstacle=roller, **options)
+        steps = fc.solve(model, count)
+        contact = steps[-1].contact["ball"]
+        worn = volume(replace(contact, wear=fc.wear(model, steps, "ball", COEFFICIENT)[-1]))
+        assert worn == pytest.approx(COEFFICIENT * steps[-1].work["friction_work"] / 0.1, rel=0.02)
+        volumes.append(worn)
+    assert volumes[1:] == [pytest.approx(volumes[0], rel=0.01)] * 2
 
 
 def test_a_flat_block_wears_evenly():

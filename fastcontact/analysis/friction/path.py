@@ -40,7 +40,7 @@ GROWTH = 1 / 32
 
 def along(
     lag: Array, closing: Array, y: Array, waiting: Mask, solve: Increment
-) -> tuple[Forces, Array, tuple[Array, Array, Array]]:
+) -> tuple[Forces, Array, tuple[Array, Array, Array, Array]]:
     """Return the forces at the end of a load step that is solved in increments, which end where constraints close.
 
     Parameters
@@ -61,12 +61,13 @@ def along(
         Forces at the end of the step, with the slips of the last increment.
     gaps : ndarray (1 + k, m)
         Gaps at the end of the step, and the slips of the whole step [length].
-    before : (ndarray (k, m), ndarray (m,), ndarray (m,))
-        Slips along the tangents [length], frictional work [energy] and normal forces [force] at the beginning of the last
-        increment; see `Slid`.
+    before : (ndarray (k, m), ndarray (k, m), ndarray (m,), ndarray (m,))
+        Slips along the tangents, and slips when constraints close [length], frictional work [energy] and normal forces
+        [force] at the beginning of the last increment; see `Slid`.
     """
     closed, slip, work, iterations, settled = y[0] > 0.0, np.zeros_like(lag[1:]), np.zeros(lag.shape[1]), 0, True
     gap = now = closing[0]
+    approach = np.zeros_like(slip)
     added = np.where(gap > 0.0, closing[1:], 0.0)
     lag = lag + np.vstack([np.zeros_like(gap), added])
 
@@ -91,10 +92,11 @@ def along(
             slip = np.where(
                 touching, slid(np.where(touching, instants, 0.0) * forces.gaps[1:], np.zeros_like(gap)), slip
             )
+            approach = np.where(touching, slip, approach)
             waiting = waiting & ~touching
             forces = increment(end)
             iterations += forces.iterations
-        before = slip, work.copy(), y[0]
+        before = slip, approach, work.copy(), y[0]
         work += friction_work(y[0], forces.y[0], forces.y[1:], np.where(forces.closed, forces.gaps[1:], 0.0))
         whole = slip + forces.gaps[1:]
         slip = slid(forces.gaps[1:], forces.gaps[0])
@@ -152,5 +154,8 @@ def completed(solution: FrictionalEquilibrium, slid: Slid) -> FrictionalEquilibr
     """Return the solution with the slips and the frictional work of the step, given the solution of `shifted` constraints."""
     last = np.where(solution.active[:, None], solution.slip, 0.0)
     work = slid.work + friction_work(slid.normal, solution.multiplier, solution.tangential.T, last.T)
-    before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
-    return replace(solution, slip=solution.slip + before, work=work)
+    before, approach = (
+        np.stack([(vectors * tangent).sum(axis=1) for tangent in solution.directions], axis=1)
+        for vectors in (slid.slip, slid.approach)
+    )
+    return replace(solution, slip=solution.slip + before, work=work, approach=approach)

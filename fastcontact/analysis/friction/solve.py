@@ -235,13 +235,16 @@ def _response(
     return response(loaded, R, rows, forces_of)
 
 
-def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints) -> Slid:
+def _slid(
+    before: tuple[Array, Array, Array, Array], Q: csr_array | None, rows: Indices, constraints: Constraints
+) -> Slid:
     """Return the data at the beginning of the last increment, for all constraints.
 
     Parameters
     ----------
-    before : (ndarray (k, q), ndarray (q,), ndarray (q,))
-        Slips [length], frictional work [energy] and normal forces [force] that `path.along` returns.
+    before : (ndarray (k, q), ndarray (k, q), ndarray (q,), ndarray (q,))
+        Slips, slips when constraints close [length], frictional work [energy] and normal forces [force] that `path.along`
+        returns.
     Q : csr_array, optional
         Rotation of the tangents, which is undone.
     rows : ndarray of int (q,)
@@ -249,14 +252,15 @@ def _slid(before: tuple[Array, Array, Array], Q: csr_array | None, rows: Indices
     constraints : Constraints
         All m constraints.
     """
-    slip, work, normal = before
-    if Q is not None:
-        slip = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+    *slips, work, normal = before
     m, dim = constraints.positions.shape
-    slid = Slid(np.zeros((m, dim)), np.zeros(m), np.zeros(m))
-    slid.slip[rows] = sum(
-        along[:, None] * tangent[rows] for along, tangent in zip(slip, constraints.directions, strict=True)
-    )
+    slid = Slid(np.zeros((m, dim)), np.zeros((m, dim)), np.zeros(m), np.zeros(m))
+    for vectors, slip in zip((slid.slip, slid.approach), slips, strict=True):
+        turned = slip
+        if Q is not None:
+            turned = (Q.T @ np.vstack([np.zeros(len(rows)), slip]).ravel()).reshape(-1, len(rows))[1:]
+        tangents = np.stack([tangent[rows] for tangent in constraints.directions])
+        vectors[rows] = np.einsum("km,kmd->md", turned, tangents)
     slid.work[rows], slid.normal[rows] = work, normal
     return slid
 
