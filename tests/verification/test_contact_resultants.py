@@ -1,7 +1,6 @@
 """Force, moment, area, centre, mean gap, work of friction and wear of contacts with exact solutions."""
 
 import json
-
 from dataclasses import replace
 
 import numpy as np
