@@ -245,19 +245,27 @@ def approach(constraints: Constraints, solution: Solution, rows: slice, contact:
     return mean * np.divide(largest, length, out=np.ones_like(length), where=length > largest)[:, None]
 
 
-def sliding_load(constraints: Constraints, solution: Solution, rows: slice, rubbed: Array) -> Array:
+def sliding_load(
+    constraints: Constraints, solution: Solution, rows: slice, rubbed: Array, closed: Mask, side: Surface
+) -> Array:
     """Return the integrals (n_nodes,) of the pressure over the slip in the step [pressure * length].
 
-    `rubbed` (m,) are those of the normal forces of constraints [energy]; for other parameters see `contact_result`.
+    Parameters
+    ----------
+    constraints, solution, rows
+        See `contact_result`.
+    rubbed : ndarray (m,)
+        Integrals of the normal forces of the constraints over their slips [energy].
+    closed : ndarray of bool (n_nodes,)
+        Secondary nodes that are closed at the beginning or at the end of the step. Like the contact force, the integral is
+        distributed to them.
+    side : Surface
+        The secondary side.
     """
-    assert constraints.nodal is not None
     assert isinstance(solution, FrictionalEquilibrium)
     # The slip of a step as a whole may be elastic; that of increments is sliding, also if the constraint sticks at the end.
     slides = rubbed if solution.work is not None else np.where(solution.sticking[rows], 0.0, rubbed)
-    load, area = constraints.nodal.over_whole_side(constraints.normal_forces(slides)), constraints.nodal.nodal_areas
-    positive = np.maximum(load, 0.0)  # a field may undershoot beyond the edge of the contact; its integral is preserved
-    total = float(positive @ area)
-    return np.asarray(positive * (max(float(load @ area), 0.0) / total if total > 0.0 else 0.0))
+    return np.maximum(carried(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)
 
 
 def _on_deformed_surface(pair: Formulation, contact: ContactResult, displacement: Array) -> ContactResult:
