@@ -6,8 +6,9 @@ Shared arguments: ``F`` (3, 3) is the deformation gradient [-], ``P`` (3, 3) the
 part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin with the number of the law, see
 `nonlinear_materials`. `old` and `new` (9,) are the history at the beginning and the end of the load step. It consists of the
 plastic strain (xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume],
-and in plane stress F_zz - 1. At finite strains, the place of the plastic strain is that of L - I, where L is the lower
-triangular factor of the inverse plastic metric, C_p^-1 = L L^T. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of laws with a bulk modulus.
+and in plane stress F_zz - 1. At finite strains, L - I takes the place of the plastic strain, where L is the lower triangular
+factor of the inverse plastic metric, C_p^-1 = L L^T. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of
+laws with a bulk modulus.
 """
 
 import numpy as np
