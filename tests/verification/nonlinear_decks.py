@@ -26,7 +26,7 @@ ELEMENTS = {
 }  # fmt: skip
 LAWS = {
     "isotropic": "*ELASTIC\n200., .3\n*PLASTIC\n1., 0.\n1.5, .05\n2., .5\n3., 2.\n",
-    # Nearly rigid elastically, for CalculiX yields by the Cauchy stress: elsewhere here it is the Kirchhoff stress, J times it.
+    # Nearly rigid elastically: CalculiX yields by the Cauchy stress, fastcontact by the Kirchhoff stress, J times it.
     "stiff": "*ELASTIC\n20000., .3\n*PLASTIC\n1., 0.\n11., 1.\n",
     "kinematic": "*ELASTIC\n2000., .3\n*PLASTIC, HARDENING=KINEMATIC\n1., 0.\n101., 1.\n",
     "perfect": "*ELASTIC\n200., .3\n*PLASTIC\n1., 0.\n",
@@ -134,7 +134,8 @@ ONE_WAY = [(0.1, 0.15)]
 CASES = {
     **{f"isotropic, {kind}": (block, kind, "isotropic", SMALL, False) for kind in ("C3D8", "C3D10", "C3D20", "CPE8", "CAX8")},
     **{f"kinematic, {kind}": (block, kind, "kinematic", CYCLE) for kind in ("C3D20", "CPE8", "CAX8")},
-    **{f"isotropic at finite strains, {kind}": (block, kind, "stiff", ONE_WAY, True, 20) for kind in ("C3D20", "CPE8", "CAX8")},
+    **{f"isotropic at finite strains, {kind}": (block, kind, "stiff", ONE_WAY, True, 20)
+       for kind in ("C3D20", "CPE8", "CAX8")},
     **{f"neo-Hookean, {kind}": (block, kind, "neo-Hookean", FINITE)
        for kind in ("C3D8", "C3D10", "C3D15", "C3D20", "CPE8", "CPS8", "CAX8")},
     **{f"{law}, {kind}": (block, kind, law, FINITE)
