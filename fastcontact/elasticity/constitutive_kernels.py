@@ -6,7 +6,9 @@ Shared arguments: ``F`` (3, 3) is the deformation gradient [-], ``P`` (3, 3) the
 part of F - I; their P is the Cauchy stress. `constants` (n_constants,) begin with the number of the law, see
 `nonlinear_materials`. `old` and `new` (9,) are the history at the beginning and the end of the load step. It consists of the
 plastic strain (xx, yy, zz, xy, yz, xz, tensor components), the equivalent plastic strain, the plastic work [energy / volume],
-and in plane stress F_zz - 1. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of laws with a bulk modulus.
+and in plane stress F_zz - 1. At finite strains, L - I takes the place of the plastic strain, where L is the lower triangular
+factor of the inverse plastic metric, C_p^-1 = L L^T. The element loop adds the volumetric part, U(J) = K (J - 1)^2 / 2, of
+laws with a bulk modulus.
 """
 
 import numpy as np
@@ -271,24 +273,29 @@ def _bend(x, y, z):
 
 @kernel
 def _logarithmic(constants, F, everywhere, old, new, P, A):
-    """Apply plasticity in the space of logarithmic strains (Miehe, Apel and Lambrecht, 2002); return the elastic energy.
+    """Apply plasticity with logarithmic elastic strains (Eterovic and Bathe, 1990; Simo, 1992); return the elastic energy.
 
-    `_plastic` relates the strain ln(F^T F) / 2 and its conjugate stress T. Derivatives of the strain in principal axes are
-    divided differences (Daleckii and Krein).
+    With the plastic deformation before the load step fixed, `_plastic` relates the strain ln(C) / 2 of the elastic part of F
+    and its conjugate stress T. The flow is integrated exponentially, with the principal axes of C. Derivatives of the strain
+    in principal axes are divided differences of the logarithm (Daleckii and Krein).
     """
-    C, T, D, turn = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9))
-    right_cauchy_green(F, C)
+    C, T, D, turn, before = np.empty((3, 3)), np.empty((3, 3)), np.empty((9, 9)), np.empty((9, 9)), np.eye(3)
+    for i in range(3):
+        for j in range(i + 1):
+            before[i, j] += old[voigt(i, j)]
+    right_cauchy_green(F @ before, C)
     squared, axes = np.linalg.eigh(C)
-    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, old, new, T, D)
-    slope = np.empty((3, 3))
+    unstrained = old.copy()
+    unstrained[:6] = 0.0
+    energy = _plastic(constants, (axes * (0.5 * np.log(squared))) @ axes.T, True, unstrained, new, T, D)
+    slope, carried = np.empty((3, 3)), before @ axes
+    _flow(carried, axes, old, new)
     for a in range(3):
         for b in range(3):
             slope[a, b] = 2.0 * _slope(squared[a], squared[b])
-            for i in range(3):
-                for j in range(3):
-                    turn[3 * i + j, 3 * a + b] = axes[i, a] * axes[j, b]
+    _fill_turn(axes, turn)
     T, factor = axes.T @ T @ axes, slope.reshape(9)
-    S = axes @ (slope * T) @ axes.T
+    S = carried @ (slope * T) @ carried.T
     _rotate(F, S, P)
     if not everywhere:
         return energy
@@ -303,8 +310,39 @@ def _logarithmic(constants, F, everywhere, old, new, P, A):
                     for column in (3 * b + c, 3 * c + b):
                         moduli[row, column] += value
                         moduli[column, row] += value
+    _fill_turn(carried, turn)
     _pushed(F, S, turn @ moduli @ turn.T, A)
     return energy
+
+
+@kernel
+def _fill_turn(axes, turn):
+    """Fill `turn` (9, 9) such that it transforms a tensor M, as 9 components, to `axes` (3, 3) M `axes`^T."""
+    for a in range(3):
+        for b in range(3):
+            for i in range(3):
+                for j in range(3):
+                    turn[3 * i + j, 3 * a + b] = axes[i, a] * axes[j, b]
+
+
+@kernel
+def _flow(carried, axes, old, new):
+    """Replace the increment of plastic strain in `new` by the factor of the inverse plastic metric after the load step.
+
+    The increment has the principal axes `axes` (3, 3); `carried` (3, 3) are the factor before the load step times `axes`.
+    """
+    if new[6] > old[6]:
+        increment = np.empty((3, 3))
+        for i in range(3):
+            for j in range(3):
+                increment[i, j] = new[voigt(i, j)]
+        metric = (carried * np.exp(-2.0 * np.diag(axes.T @ increment @ axes))) @ carried.T
+        factor = np.linalg.cholesky(metric)
+        for i in range(3):
+            for j in range(i + 1):
+                new[voigt(i, j)] = factor[i, j] - (1.0 if i == j else 0.0)
+    else:
+        new[:6] = old[:6]
 
 
 @kernel

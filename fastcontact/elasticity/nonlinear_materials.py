@@ -58,9 +58,10 @@ class NonlinearElastic(LinearElastic):
 class ElasticPlastic(NonlinearElastic):
     """Von Mises plasticity with associated flow (Simo and Hughes, 1998, chapter 3).
 
-    With ``strain="finite"`` the same law relates the logarithmic strain and its conjugate stress (Miehe, Apel and Lambrecht,
-    Comput. Methods Appl. Mech. Engrg. 191, 2002): uniaxial stresses and strains are true ones, up to the elastic change of
-    volume, and the yield stress is one of the Kirchhoff stress.
+    With ``strain="finite"`` the same law relates the logarithmic elastic strain, of a multiplicative split of the deformation
+    gradient, and the Kirchhoff stress (Simo, Comput. Methods Appl. Mech. Engrg. 99, 1992): uniaxial stresses and strains are
+    true ones, up to the elastic change of volume. Load steps must be small where the principal axes of strain rotate: in
+    simple shear, steps of 0.1 cause a normal stress of 5 % of the shear stress.
 
     Parameters
     ----------

@@ -130,6 +130,39 @@ def test_a_bar_yields_to_twice_its_length(kinematics: str, element: str) -> None
         assert step.work["plastic_work"] == pytest.approx(work, rel=1e-8)
 
 
+@pytest.mark.parametrize("count", [10, 100])
+@pytest.mark.parametrize(
+    ("kinematics", "element"),
+    [("plane_strain", "quad8"), ("plane_stress", "quad4"), ("plane_stress", "tri6"), ("axisymmetric", "quad8"),
+     ("3d", "hex8"), ("3d", "hex20"), ("3d", "tet10")],
+)  # fmt: skip
+def test_a_plastic_body_in_simple_shear(kinematics: str, element: str, count: int) -> None:
+    """A step g of a rigid-plastic body: p grows by 2 asinh(g / 2) / sqrt(3), the axes are those of f f^T with f = I + g xy.
+
+    In small steps the stress tends to Y(g / sqrt(3)) / sqrt(3), without normal stresses.
+    """
+    law = fc.ElasticPlastic(E=1e6, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (0.05, 1.5), (0.5, 2.0)])
+    mesh = fc.generate.box((1.0,) * 3, (1, 1, 1), element=element) if kinematics == "3d" else fc.generate.block(
+        element=element, origin=(float(kinematics == "axisymmetric"), 0.0)
+    )  # fmt: skip
+    model = fc.Model(mesh, kinematics, strain="finite")
+    model.add_material(law)
+    bodies = NonlinearBodies(mesh, kinematics, "finite", model.material_field())
+    along, across = (1, 0) if kinematics == "axisymmetric" else (0, 1)
+    moved, step = np.zeros_like(mesh.points), 1.0 / count
+    history = bodies.beginning
+    for number in range(1, count + 1):
+        moved[:, along] = number * step * mesh.points[:, across]
+        here = bodies.at(moved, history, tangent=False)
+        history = here.history
+    limit = law.yield_at(count * 2.0 * np.arcsinh(0.5 * step) / np.sqrt(3.0)) / np.sqrt(3.0)
+    exact = np.zeros(6)
+    exact[[along, across, 3]] = np.array([0.5 * step, -0.5 * step, 1.0]) * limit / np.hypot(1.0, 0.5 * step)
+    for stress in here.stress.values():
+        assert np.abs(stress - exact[: stress.shape[2]]).max() <= 2e-5
+    assert bodies.cell_fields(here, moved)["yield_ratio"] == pytest.approx(1.0, rel=1e-8)
+
+
 def test_plastic_history_turns_with_the_body() -> None:
     """A block that yields, turns and is deformed further has the stress of one that does not turn, turned."""
     law = fc.ElasticPlastic(E=200.0, nu=0.3, yield_stress=1.0, hardening=[(0.0, 1.0), (2.0, 21.0)])
