@@ -71,10 +71,6 @@ class Touching:
             near and not self.done and self._allowed < 1.0 and _slides(step, constraints, solution, self._allowed)
         )
 
-    def give_up(self) -> None:
-        """Solve friction in the whole step."""
-        self.due, self.done, self.unfinished = False, True, False
-
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
     """Return whether nodes that close in the step carry more shear than the fraction `allowed` of the friction capacity."""
