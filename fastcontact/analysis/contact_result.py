@@ -246,7 +246,7 @@ def approach(constraints: Constraints, solution: Solution, rows: slice, contact:
 
 
 def sliding_load(
-    constraints: Constraints, solution: Solution, rows: slice, rubbed: Array, closed: Mask, side: Surface
+    constraints: Constraints, solution: Solution, rows: slice, over_slip: Array, closed: Mask, side: Surface
 ) -> Array:
     """Return the integrals (n_nodes,) of the pressure over the slip in the step [pressure * length].
 
@@ -254,7 +254,7 @@ def sliding_load(
     ----------
     constraints, solution, rows
         See `contact_result`.
-    rubbed : ndarray (m,)
+    over_slip : ndarray (m,)
         Integrals of the normal forces of the constraints over their slips [energy].
     closed : ndarray of bool (n_nodes,)
         Secondary nodes that are closed at the beginning or at the end of the step. Like the contact force, the integral is
@@ -264,7 +264,7 @@ def sliding_load(
     """
     assert isinstance(solution, FrictionalEquilibrium)
     # The slip of a step as a whole may be elastic; that of increments is sliding, also if the constraint sticks at the end.
-    slides = rubbed if solution.work is not None else np.where(solution.sticking[rows], 0.0, rubbed)
+    slides = over_slip if solution.work is not None else np.where(solution.sticking[rows], 0.0, over_slip)
     return np.maximum(carried(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)
 
 

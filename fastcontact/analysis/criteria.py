@@ -11,6 +11,8 @@ from fastcontact.errors import ModelError
 # Relative error of displacements or forces above which a warning is given. It is also the largest admissible value of
 # criteria, because with larger ones the result need not be close to the solution.
 NOTABLE = 1e-2
+# Largest number of halvings of an iteration: of displacements that invert cells, or of positions of floating bodies.
+HALVINGS = 6
 
 
 @typed(ModelError)

@@ -28,6 +28,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.anderson import Anderson
+from fastcontact.analysis.criteria import HALVINGS
 from fastcontact.analysis.solution import Response, Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
@@ -42,9 +43,9 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 # under load. The reference is the softest body, because a contact is not stiffer than the softer one
 # of its bodies (for a layer that is softer by 2e5, 100 positions did not suffice with the stiffness of the other body).
 SOFT, STIFF = 1e-3, 1.0
-# Newton steps of the positions are halved, at the shortest to SHORTEST, until they reduce the elongation of the springs by
-# DECREASE of the expected reduction: the contact state changes along a step.
-SHORTEST, DECREASE = 1 / 64, 1e-4
+# Newton steps of the positions are halved until they reduce the elongation of the springs by this fraction of the expected
+# reduction (Nocedal and Wright, 2006, equation 3.4), because the contact state changes along a step.
+DECREASE = 1e-4
 # Largest number of positions for one pairing.
 MAX_POSITIONS = 100
 # Weight of the displacements that springs held before, in the choice of new ones: with it, multigrid takes 142 iterations
@@ -300,7 +301,7 @@ class FloatingBodies:
                 slack = left <= max(LENGTH_ROUND_OFF * force, round_off)
             if slack or not state.settled or positions == MAX_POSITIONS:
                 break
-            if step is not None and length > SHORTEST and left > before - DECREASE * length * (before - step[1]):
+            if step is not None and length > 0.5**HALVINGS and left > before - DECREASE * length * (before - step[1]):
                 length *= 0.5
                 position = position - length * step[0]
                 continue

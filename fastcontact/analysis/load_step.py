@@ -224,12 +224,12 @@ def keep_path(
             results_so_far[name] = replace(results_so_far[name], damage=end.bonds[name].at(contact.coordinates)[1])
         elif not (pair.options.tied or pair.options.gap_only):
             given = constraints, settled.solution, rows, at, contact, start.forces.get(name)
-            forces[name], work_of_pair, rubbed = contact_work(pair, *given)
+            forces[name], work_of_pair, over_slip = contact_work(pair, *given)
             load_of_pair = None
             if pair.friction:
                 earlier = start.forces[name].pressing > 0.0 if name in start.forces else False
-                rubs = constraints, settled.solution, rows, rubbed, contact.active | earlier, pair.secondary
-                load_of_pair = sliding_load(*rubs)
+                closed = contact.active | earlier
+                load_of_pair = sliding_load(constraints, settled.solution, rows, over_slip, closed, pair.secondary)
             results_so_far[name] = replace(results_so_far[name], dissipation=work_of_pair[0], sliding_load=load_of_pair)
             works += work_of_pair
         if pair.options.wear is not None:

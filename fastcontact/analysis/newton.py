@@ -17,7 +17,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array, vstack
 
 from fastcontact._jit.norms_kernels import largest, largest_difference
 from fastcontact.analysis.anderson import DEPTH, Anderson
-from fastcontact.analysis.criteria import NOTABLE
+from fastcontact.analysis.criteria import HALVINGS, NOTABLE
 from fastcontact.analysis.equilibrium import (
     Balance,
     FollowingForce,
@@ -40,8 +40,8 @@ from fastcontact.linear.protocol import Loaded
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Largest number of Newton iterations of a load step, and of halvings of an iteration that inverts cells.
-MOST, HALVINGS = 40, 6
+# Largest number of Newton iterations of a load step.
+MOST = 40
 # Trials of a line search.
 SEARCHES = 3
 # Number of iterations within which the change of the displacement must have decreased at least once by the factor DECLINE.

@@ -180,7 +180,7 @@ def contact_work(
     forces : ContactForces
     works : (float, float, float)
         Increments of `Work.friction`, `Work.touching` and `Work.imbalance` [energy].
-    rubbed : ndarray (m,)
+    over_slip : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
     """
     normal, tangents = constraints.contact_forces(solution.multiplier[rows]), np.zeros((len(constraints), 0))
@@ -203,14 +203,15 @@ def contact_work(
     if isinstance(solution, FrictionalEquilibrium) and solution.work is not None:
         work, touching = solution.work[rows], 0.0
     friction, mu = float(work.sum()), constraints.coefficients
-    rubbed = np.divide(work, mu, out=0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1), where=mu > 0.0)
+    over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1)
+    np.divide(work, mu, out=over_slip, where=mu > 0.0)
     sliding = float((along + earlier).sum())
     moved = _relative(pair, at)
     gained = now.kept(before, moved) + before.kept(now, moved) + now.alone(before) - before.alone(now)
     wider = np.where((now.pressing != 0.0) & (before.pressing != 0.0), now.added - before.added, 0.0)
     gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
     gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
-    return now, (friction, touching, gained - (now.stored - before.stored) - sliding), rubbed
+    return now, (friction, touching, gained - (now.stored - before.stored) - sliding), over_slip
 
 
 def _forces(
