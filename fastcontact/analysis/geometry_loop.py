@@ -125,7 +125,7 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
     for update in range(limit + 1):
         constraints = pair_surfaces(problem, step.state, step.load, iterate)
         active = initially_active(constraints, iterate, step.extrapolation if extrapolates and update == 0 else None)
-        accuracy = tolerances.accuracy(step.dofs.scale(iterate.u, step.load.lift))
+        accuracy = tolerances.accuracy(largest(step.load.lift) + largest(iterate.u))
         # Constraints of several pairs, or of both ends of a period, may be at one node.
         ends = problem.model.periodic_interfaces
         nodes = SharedNodes.of(constraints, ends) if len(problem.pairs) > 1 or ends else None

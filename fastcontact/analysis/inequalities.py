@@ -14,7 +14,7 @@ import numpy as np
 
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.analysis import active_set
-from fastcontact.analysis.active_dofs import ActiveDofs, constraints_on_unknowns
+from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.convergence_messages import friction_exceeded, not_balanced
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
@@ -230,7 +230,7 @@ def _solve(
     `lift` (n_dofs,) are the displacements that supports and multi-point constraints prescribe if all unknowns are zero, and
     `guess` (n_dofs,) are initial displacements [length].
     """
-    condensed = constraints_on_unknowns(step.dofs, constraints, lift, step.state.u)
+    condensed = step.dofs.constraints(constraints, lift, step.state.u)
     u = step.dofs.unknowns(guess, lift)
     if not constraints.tangents:
         return active_set.solve(step.loaded, condensed, active, accuracy, u)

@@ -305,9 +305,9 @@ class _Newton:
             u0, bodies = self._iterate.u, problem.floating_bodies
             lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
             dofs = problem.dofs.for_step(u0, lift)
-            condensed = dofs.loaded(loaded)
+            reduced = loaded.condensed() if dofs.condensed else None
             step = replace(
-                self._begin, problem=problem, load=load, loaded=condensed, dofs=dofs, extrapolation=extrapolation
+                self._begin, problem=problem, load=load, loaded=reduced or loaded, dofs=dofs, extrapolation=extrapolation
             )
             settled = settle_geometry(step, self._iterate)
             self._iterate = settled.iterate

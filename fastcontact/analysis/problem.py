@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import parallel
-from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
+from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.floating_bodies import SOFT, STIFF, FloatingBodies, RigidPosition
 from fastcontact.analysis.heat import Heat, prepared_heat
@@ -438,9 +438,8 @@ def _prepared_dofs(
     kept = solver.prepare(matrix, modes, involved, release=True)
     if matrix is system.matrix:
         system.keep(kept)
-    if model.contact and solver.condenses:
-        return SurfaceDofs(system, contact_dofs, np.empty(0, np.intp) if bodies is None else bodies.dofs, involved)
-    return ActiveDofs(system, contact_dofs)
+    springs = np.empty(0, np.intp) if bodies is None else bodies.dofs
+    return ActiveDofs(system, contact_dofs, springs, involved if model.contact and solver.condenses else None)
 
 
 def near_nullspace(model: Model, displacement: Array | float = 0.0) -> Array:

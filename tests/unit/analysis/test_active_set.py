@@ -13,7 +13,7 @@ from stepping import Stepping
 
 import fastcontact as fc
 from fastcontact.analysis import active_set
-from fastcontact.analysis.active_dofs import ActiveDofs, SurfaceDofs
+from fastcontact.analysis.active_dofs import ActiveDofs
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.contact.configuration import Configuration
@@ -128,9 +128,9 @@ def contact_dofs(analysis):
 @pytest.fixture(params=[False, True], ids=["supports", "relations"])
 def both(request):
     analysis = started(request.param)
-    everything = ActiveDofs(analysis.system, contact_dofs(analysis))
+    everything = ActiveDofs(analysis.system, contact_dofs(analysis), np.empty(0, int))
     surfaces = analysis.dofs
-    assert isinstance(surfaces, SurfaceDofs)
+    assert surfaces.condensed
     return analysis, everything, surfaces
 
 
@@ -146,9 +146,9 @@ def test_rows_are_those_for_all_unknowns(both):
     u, lift = obeying(analysis)
     surfaces = surfaces.for_step(u, lift)
     part = analysis.pairs["c"].constraints(Configuration.displaced(np.zeros((len(u) // 2, 2))))
-    B, offset = everything.rows(part.B, part.gap0, lift)
-    own, offset_too = surfaces.rows(part.B, part.gap0, lift)
-    np.testing.assert_array_equal(offset_too, offset)
+    at_all, at_surfaces = (dofs.constraints(part, lift, 0.0 * u) for dofs in (everything, surfaces))
+    B, own = at_all.B, at_surfaces.B
+    np.testing.assert_array_equal(at_surfaces.gap0, at_all.gap0)
     v = everything.unknowns(u, lift)
     np.testing.assert_allclose(own @ surfaces.unknowns(u, lift), B @ v, atol=1e-14)
     np.testing.assert_array_equal(np.diff(own.indptr) > 0, np.diff(B.indptr) > 0)
@@ -158,10 +158,9 @@ def test_rows_are_those_for_all_unknowns(both):
 def test_displacements_and_sizes_are_those_of_all(both):
     analysis, everything, surfaces = both
     u, lift = obeying(analysis)
-    surfaces, copy = surfaces.for_step(u, lift), u.copy()
+    everything, surfaces, copy = everything.for_step(u, lift), surfaces.for_step(u, lift), u.copy()
     v = surfaces.unknowns(u, lift)
     np.testing.assert_allclose(surfaces.displacement(v, lift), surfaces.of(u), atol=1e-14)
-    assert surfaces.scale(u, lift) == everything.scale(u, lift)
     assert surfaces.size(v) == everything.size(everything.unknowns(u, lift))
     assert surfaces.size(100.0 + v) == (100.0 + v).max()
     changed = surfaces.put(copy, surfaces.of(u) + 100.0)
@@ -175,7 +174,7 @@ def test_displacements_and_sizes_are_those_of_all(both):
 @pytest.mark.parametrize("name", ["direct", "cholmod"])
 def test_steps_end_where_those_of_all_displacements_end(name, friction):
     analysis, other = started(friction=friction, name=name), started(friction=friction, name=name)
-    other.problem = replace(other.problem, dofs=ActiveDofs(other.system, contact_dofs(other)))
+    other.problem = replace(other.problem, dofs=ActiveDofs(other.system, contact_dofs(other), np.empty(0, int)))
     for index, instant in enumerate(analysis.ramp.instants, start=1):
         result, expected = analysis.step(index, instant), other.step(index, instant)
         scale = np.abs(expected.displacement).max()
@@ -187,7 +186,7 @@ def test_steps_end_where_those_of_all_displacements_end(name, friction):
 
 
 def test_solvers_that_do_not_condense_find_all_displacements():
-    assert not isinstance(started(name="amg").dofs, SurfaceDofs)
+    assert not started(name="amg").dofs.condensed
 
 
 def test_the_condensed_problem_is_that_of_all_unknowns():
