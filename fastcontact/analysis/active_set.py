@@ -25,7 +25,7 @@ from functools import partial
 import numpy as np
 from scipy.linalg import lu_solve
 
-from fastcontact.analysis.solution import Accuracy, Equilibrium, Response, response
+from fastcontact.analysis.solution import Accuracy, Response, Solution, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.linear.delassus import lu_factors
@@ -34,7 +34,7 @@ from fastcontact.linear.protocol import Loaded
 
 def solve(
     loaded: Loaded, constraints: Constraints, active: Mask, accuracy: Accuracy, guess: Array | None = None
-) -> Equilibrium:
+) -> Solution:
     """Return the displacements and the contact forces that satisfy all inequalities.
 
     Parameters
@@ -52,7 +52,7 @@ def solve(
 
     Returns
     -------
-    Equilibrium
+    Solution
         The solution. Its `settled` is False if the iteration has reached ``accuracy.max_iterations``.
     """
     equations = np.zeros(len(active), bool)
@@ -112,7 +112,7 @@ def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Respon
 
 def _with_next_set(
     constraints: Constraints, accuracy: Accuracy, equations: Mask, u: Array, forces: Array, active: Mask, error: float = 0.0
-) -> Equilibrium:  # fmt: skip
+) -> Solution:  # fmt: skip
     """Return the solution with its next active set, by the signs of gaps and multipliers.
 
     Parameters
@@ -138,4 +138,4 @@ def _with_next_set(
     pull = max(accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
     penetration = max(accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else accuracy.gap
     wanted = np.where(active, multiplier > -pull, gap < -penetration) & constraints.usable | equations
-    return Equilibrium(u, multiplier, gap, active, wanted, 0)
+    return Solution.frictionless(u, multiplier, gap, active, wanted)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.contact.closed_nodes import carried
@@ -155,7 +155,7 @@ def _along_the_surface(
         _, tangential = constraints.tied.forces(multiplier)
         shear = _nodal_shear(constraints, constraints.tied.directions, tangential, normal)
         return np.where(closed[:, None], shear, 0.0), all_nodes, None
-    if not (isinstance(solution, FrictionalEquilibrium) and constraints.tangents):
+    if not constraints.tangents:
         return np.zeros_like(normal), all_nodes, None
     tangential = solution.tangential[rows]
     shear = _nodal_shear(constraints, constraints.directions, tangential, normal, constraints.normal_forces(multiplier))
@@ -228,7 +228,7 @@ def approach(constraints: Constraints, solution: Solution, rows: slice, contact:
 
     They are known, and not zero, if the step was solved in increments. For parameters see `contact_result`.
     """
-    if not isinstance(solution, FrictionalEquilibrium) or solution.approach is None or not constraints.tangents:
+    if solution.approach is None or not constraints.tangents:
         return np.zeros_like(contact.coordinates)
     assert constraints.nodal is not None
     forces = np.maximum(constraints.normal_forces(solution.multiplier[rows]), 0.0)
@@ -262,7 +262,6 @@ def sliding_load(
     side : Surface
         The secondary side.
     """
-    assert isinstance(solution, FrictionalEquilibrium)
     # The slip of a step as a whole may be elastic; that of increments is sliding, also if the constraint sticks at the end.
     slides = over_slip if solution.work is not None else np.where(solution.sticking[rows], 0.0, over_slip)
     return np.maximum(carried(constraints, constraints.normal_forces(slides), closed, side)[1], 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem
-from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.tolerances import WINDOW
 from fastcontact.arrays import Array, Indices
@@ -52,7 +52,7 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
 
 def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:
     """Return the message for an active set that did not converge; `nodes` are those nearest to the constraints."""
-    if isinstance(solution, FrictionalEquilibrium):
+    if constraints.tangents:
         return (
             f"contact with friction did not converge in {solution.iterations} Newton iterations from several starts: the "
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "

@@ -26,7 +26,7 @@ from fastcontact.analysis.convergence_messages import active_set_cycles, geometr
 from fastcontact.analysis.inequalities import Iterate, StepContext, initially_active, pair_surfaces, solve_inequalities
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Solution
+from fastcontact.analysis.solution import Accuracy, Solution
 from fastcontact.analysis.tolerances import Scatter, Tolerances, Watch
 from fastcontact.analysis.touching import Touching
 from fastcontact.arrays import AnyArray, Array
@@ -135,7 +135,6 @@ def _settle(step: StepContext, iterate: Iterate, touching: Touching) -> SettledC
             accuracy = Accuracy(0.0, residual=problem.solver.tolerance)
         solution, displacement = solve_inequalities(along, once, iterate, closed & once.usable, accuracy)
         if touching.unfinished:
-            assert isinstance(solution, FrictionalEquilibrium)
             if not solution.settled:
                 raise ConvergenceError("an increment does not converge", iterate.history)
             step = replace(step, path=solution.slid)
@@ -355,12 +354,9 @@ def _linearised(
     parts = []
     for name, rows in constraints.rows.items():
         part, multiplier = constraints.parts[name], solution.multiplier[rows]
-        tangential = np.zeros((len(part), 0))
-        if solution.tangential is not None:
-            tangential = solution.tangential[rows, : len(part.tangents)]
         if part.tied is not None or not multiplier.any():
             continue
         if part.geometry is None:
             return []
-        parts.append((rows, part.geometry(multiplier, tangential, displacement)))
+        parts.append((rows, part.geometry(multiplier, solution.tangential[rows, : len(part.tangents)], displacement)))
     return parts

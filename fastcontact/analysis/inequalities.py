@@ -19,7 +19,7 @@ from fastcontact.analysis.convergence_messages import friction_exceeded, not_bal
 from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.floating_bodies import FloatingBodies, RigidPosition
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Slid, Solution
+from fastcontact.analysis.solution import Accuracy, Path, Slid, Solution
 from fastcontact.analysis.state import State
 from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints, stacked
@@ -47,7 +47,7 @@ class Iterate:
         For each contact pair, the active set that the last solution predicts for the next one.
     pressure : dict of str to ndarray (n_nodes,)
         Last nodal pressures of each contact pair [pressure].
-    frictional : FrictionalEquilibrium, optional
+    frictional : Solution, optional
         The last solution with friction.
     rigid : RigidPosition, optional
         The last position of floating bodies.
@@ -62,7 +62,7 @@ class Iterate:
     u: Array
     active: dict[str, Mask]
     pressure: dict[str, Array]
-    frictional: FrictionalEquilibrium | None = None
+    frictional: Solution | None = None
     rigid: RigidPosition | None = None
     history: list[dict[str, Any]] = field(default_factory=list)
     rounded: bool = False

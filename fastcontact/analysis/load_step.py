@@ -22,7 +22,6 @@ from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.inequalities import StepContext
 from fastcontact.analysis.newton import newton
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.analysis.thermal_coupling import Heated, expanded, expansion_as_force, first_rise, settle_heat
 from fastcontact.analysis.wear import Worn
@@ -187,7 +186,7 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
             closed = solution.active[rows] | (False if part.equality is None else part.equality)
             never_opening[name] = part.positions, closed
         compliant = part.compliance is not None or part.tangential_softness is not None
-        if compliant and part.tangents and isinstance(solution, FrictionalEquilibrium):
+        if compliant and part.tangents:
             slips = part.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
             elastic_slip[name] = part.positions, slips
         if isinstance(part.tied, Layer):

@@ -31,7 +31,6 @@ from fastcontact.analysis.extrapolation import Extrapolation
 from fastcontact.analysis.geometry_loop import SettledContact, settle_geometry
 from fastcontact.analysis.inequalities import Iterate, StepContext
 from fastcontact.analysis.problem import Problem, StepLoad, linearised
-from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.tolerances import DECLINE
 from fastcontact.arrays import Array
 from fastcontact.elasticity.nonlinear_bodies import WHOLE
@@ -307,7 +306,12 @@ class _Newton:
             dofs = problem.dofs.for_step(u0, lift)
             reduced = loaded.condensed() if dofs.condensed else None
             step = replace(
-                self._begin, problem=problem, load=load, loaded=reduced or loaded, dofs=dofs, extrapolation=extrapolation
+                self._begin,
+                problem=problem,
+                load=load,
+                loaded=reduced or loaded,
+                dofs=dofs,
+                extrapolation=extrapolation,
             )
             settled = settle_geometry(step, self._iterate)
             self._iterate = settled.iterate
@@ -327,8 +331,7 @@ class _Newton:
             constraints, solution = self._settled.constraints, self._settled.solution
             dry = np.concatenate([part.contact_forces(np.ones(len(part))) for part in constraints.parts.values()])
             closed = solution.active & (dry > 0.0)
-            sticking = closed & solution.sticking if isinstance(solution, FrictionalEquilibrium) else closed
-            stuck = [tangent[np.flatnonzero(sticking)] for tangent in constraints.tangents]
+            stuck = [tangent[np.flatnonzero(closed & solution.sticking)] for tangent in constraints.tangents]
             rows = csr_array(vstack([constraints.B[np.flatnonzero(closed)], *stuck]))
             sizes = np.asarray(rows.multiply(rows).sum(axis=1)).ravel()  # zero for tangents of pairs without friction
             stiffness = by.held * float(K.diagonal().max()) / np.where(sizes > 0.0, sizes, np.inf)

@@ -27,7 +27,7 @@ from fastcontact.analysis.sensitivity.adjoint import Adjoint, Change, Gradient
 from fastcontact.analysis.sensitivity.moving_contact import REMEDY, MovingContact
 from fastcontact.analysis.sensitivity.parameters import KINDS, check_parameter
 from fastcontact.analysis.sensitivity.quantities import check_quantity, with_gradient
-from fastcontact.analysis.solution import Equilibrium
+from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.stages import stage_of
 from fastcontact.arrays import Array
 from fastcontact.errors import ModelError
@@ -214,8 +214,8 @@ def settled_step(
     balanced = newton(prepare_start(problem, state, step.index, load), load)
     settled, u = balanced.settled, balanced.u
     if settled is None:
-        none = np.empty(0)
-        solution = Equilibrium(u, none, none, np.empty(0, bool), np.empty(0, bool), 1)
+        none, inactive = np.empty(0), np.empty(0, bool)
+        solution = Solution.frictionless(u, none, none, inactive, inactive)
         return problem, MovingContact(problem, state, load, step.load_factor, u, solution)
     return problem, MovingContact(problem, state, load, step.load_factor, u, settled.solution)
 

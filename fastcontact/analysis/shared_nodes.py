@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints, StackedConstraints
 from fastcontact.model.periodicity import PeriodicInterface
@@ -145,8 +145,6 @@ class SharedNodes:
         normal, gap = self.part * solution.multiplier[representative], solution.gap[representative]
         gap[self.behind] = constraints.gaps(u)[self.behind]
         active = solution.active[representative]
-        if not isinstance(solution, FrictionalEquilibrium):
-            return replace(solution, multiplier=normal, gap=gap, active=active, wanted=active)
         frame = self.frame
 
         def turned(along: Array) -> Array:
@@ -159,6 +157,7 @@ class SharedNodes:
             gap=gap,
             slip=turned(solution.slip),
             active=active,
+            wanted=active,
             sticking=solution.sticking[representative],
             work=None if solution.work is None else self.along * solution.work[representative],
             approach=None if solution.approach is None else turned(solution.approach),

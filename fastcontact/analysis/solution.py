@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -68,45 +67,6 @@ def response(loaded: Loaded, R: csr_array, rows: Indices, forces_of: Callable[[A
 
 
 @dataclass(frozen=True, eq=False)
-class Equilibrium:
-    """Solution of the frictionless contact problem for one active set.
-
-    Attributes
-    ----------
-    u : ndarray (n,)
-        Unknowns [length].
-    multiplier : ndarray (m,)
-        Lagrange multipliers of all constraints, which are zero for inactive constraints [force].
-    gap : ndarray (m,)
-        Gaps of all constraints [length].
-    active : ndarray of bool (m,)
-        Active set of this solution.
-    wanted : ndarray of bool (m,)
-        Next active set, which follows from the signs of gaps and multipliers; it equals `active` if all inequalities hold.
-    iterations : int
-        Number of linear solutions.
-    response : callable, optional
-        Function without arguments that returns the `Response` of this solution, for a constant active set.
-    """
-
-    u: Array
-    multiplier: Array
-    gap: Array
-    active: Mask
-    wanted: Mask
-    iterations: int
-    response: Callable[[], Response] | None = field(default=None, repr=False)
-    # Both as in `FrictionalEquilibrium`: each active set is solved exactly, and there are no tangential forces.
-    residual: ClassVar[float] = 0.0
-    tangential: ClassVar[None] = None
-
-    @property
-    def settled(self) -> bool:
-        """Whether all inequalities hold."""
-        return bool(np.array_equal(self.active, self.wanted))
-
-
-@dataclass(frozen=True, eq=False)
 class Path:
     """Data of the constraints at the beginning of a load step, for friction along the load path in increments.
 
@@ -130,34 +90,21 @@ class Path:
     closing: Array
     waiting: Mask
 
-    def forces(self, directions: tuple[Array, ...], rows: Indices) -> Array:
-        """Return the normal forces of the constraints `rows` (q,), and their components along each of k tangents (m, dim).
+    def along(self, directions: tuple[Array, ...], rows: Indices) -> tuple[Array, Array]:
+        """Return the data of the constraints `rows` (q,), with components along each of k tangents (m, dim).
 
         Returns
         -------
-        ndarray (1 + k, q)
-            [force].
+        forces : ndarray (1 + k, q)
+            Normal forces, then tangential forces [force].
+        closed : ndarray (1 + k, q)
+            Gaps, then the components of `closing` [length].
         """
-        return _components(self.normal, self.traction, directions, rows)
-
-    def closed(self, directions: tuple[Array, ...], rows: Indices) -> Array:
-        """Return the gaps of the constraints `rows` (q,), and the components of `closing` along each of k tangents (m, dim).
-
-        Returns
-        -------
-        ndarray (1 + k, q)
-            [length].
-        """
-        return _components(self.gap, self.closing, directions, rows)
-
-
-def _components(normal: Array, vectors: Array, directions: tuple[Array, ...], rows: Indices) -> Array:
-    """Return values `normal` (m,), and components of `vectors` (m, dim) along k directions (m, dim), at `rows` (q,).
-
-    The result is an array (1 + k, q).
-    """
-    along = [(vectors[rows] * tangent[rows]).sum(axis=1) for tangent in directions]
-    return np.vstack([normal[rows], *along])
+        forces, closed = (
+            np.vstack([normal[rows], *((vectors[rows] * tangent[rows]).sum(axis=1) for tangent in directions)])
+            for normal, vectors in ((self.normal, self.traction), (self.gap, self.closing))
+        )
+        return forces, closed
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,56 +130,68 @@ class Slid:
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionalEquilibrium:
-    """Solution of the contact problem with friction.
+class Solution:
+    """Solution of the contact problem of one pairing, with or without friction.
 
     Attributes
     ----------
     u : ndarray (n,)
         Unknowns [length].
     multiplier : ndarray (m,)
-        Normal forces [force].
+        Lagrange multipliers of all constraints, the normal forces, which are zero for inactive constraints [force].
     gap : ndarray (m,)
         Gaps [length].
-    tangential : ndarray (m, k)
-        Tangential forces on the secondary side, along each of k tangents [force].
-    slip : ndarray (m, k)
-        Slips of the load step along each tangent [length].
-    active, sticking : ndarray of bool (m,)
-        Constraints that are closed, and closed constraints that stick.
+    active : ndarray of bool (m,)
+        Active set of this solution: constraints that are closed.
+    wanted : ndarray of bool (m,)
+        Initial active set of the next solution. Without friction it follows from the signs of gaps and multipliers, and
+        equals `active` if all inequalities hold.
     settled : bool
         Whether all inequalities hold.
-    residual : float
-        Residual of the complementarity function, relative to the largest force [-].
     iterations : int
-        Number of Newton iterations.
+        Number of linear solutions, with friction of Newton iterations.
+    tangential : ndarray (m, k)
+        Tangential forces on the secondary side, along each of k tangents; k is zero without friction [force].
+    slip : ndarray (m, k)
+        Slips of the load step along each tangent [length].
+    sticking : ndarray of bool (m,)
+        Closed constraints that do not slide.
+    residual : float
+        Residual of the complementarity function, relative to the largest force; zero without friction [-].
     directions : tuple of k ndarray (m, dim)
         Unit tangents.
+    response : callable, optional
+        Function without arguments that returns the `Response` of this solution, for a constant contact state.
     work : ndarray (m,), optional
         Frictional work in the step [energy]; only if the step is solved in increments.
     approach : ndarray (m, k), optional
         Part of `slip` before the constraint closed in this step [length]; only if the step is solved in increments.
     slid : Slid, optional
         Data at the beginning of the last increment; only if the step is solved in increments.
-    response : callable, optional
-        Function without arguments that returns the `Response` of this solution, for a constant contact state.
     """
 
     u: Array
     multiplier: Array
     gap: Array
+    active: Mask
+    wanted: Mask
+    settled: bool
+    iterations: int
     tangential: Array
     slip: Array
-    active: Mask
     sticking: Mask
-    settled: bool
-    residual: float
-    iterations: int
+    residual: float = 0.0
     directions: tuple[Array, ...] = ()
+    response: Callable[[], Response] | None = field(default=None, repr=False)
     work: Array | None = None
     approach: Array | None = None
     slid: Slid | None = None
-    response: Callable[[], Response] | None = field(default=None, repr=False)
+
+    @classmethod
+    def frictionless(cls, u: Array, multiplier: Array, gap: Array, active: Mask, wanted: Mask) -> Solution:
+        """Return the solution for one active set without friction."""
+        settled, none = bool(np.array_equal(active, wanted)), np.zeros((len(gap), 0))
+        return cls(u, multiplier, gap, active, wanted, settled, 1, none, none, active)
 
     def forces_along(self, directions: tuple[Array, ...], m: int) -> Array | None:
         """Return normal and tangential forces (1 + k, m) in components along different tangents (m, dim) [force].
@@ -244,11 +203,3 @@ class FrictionalEquilibrium:
             return None
         vectors = sum(t[:, None] * along for t, along in zip(self.tangential.T, self.directions, strict=True))
         return np.vstack([self.multiplier, *((vectors * along).sum(axis=1) for along in directions)])
-
-    @property
-    def wanted(self) -> Mask:
-        """Initial active set (m,) of the next solution."""
-        return self.active
-
-
-Solution = Equilibrium | FrictionalEquilibrium

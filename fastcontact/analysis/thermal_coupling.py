@@ -20,7 +20,6 @@ from fastcontact.analysis.equilibrium import StepEquilibrium
 from fastcontact.analysis.geometry_loop import SettledContact
 from fastcontact.analysis.heat import Heat, Temperatures
 from fastcontact.analysis.problem import Problem, StepLoad
-from fastcontact.analysis.solution import FrictionalEquilibrium
 from fastcontact.analysis.state import State
 from fastcontact.arrays import Array
 from fastcontact.contact.cohesive_layer import Layer
@@ -171,7 +170,7 @@ def _conducted(problem: Problem, start: State, load: StepLoad, instant: float, e
                     given + link.secondary.T @ (h * link.area * obstacle_rise),
                 )
             crossings[name] = link, constraints.nodal, h, obstacle_rise, grown[pair.secondary.points]
-        if pair.options.friction_heat and isinstance(solution, FrictionalEquilibrium):
+        if pair.options.friction_heat:
             work = np.maximum(-(solution.tangential[rows] * solution.slip[rows]).sum(axis=1), 0.0)
             rubbed += link.shared(pair.options.friction_heat * work / (instant - start.instant))
     steady = heat.temperatures(instant, displacement, matrix, rubbed, (obstacles, given))

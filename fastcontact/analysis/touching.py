@@ -14,7 +14,7 @@ from fastcontact.analysis.criteria import NOTABLE
 from fastcontact.analysis.inequalities import Iterate, StepContext, pair_surfaces
 from fastcontact.analysis.problem import Problem
 from fastcontact.analysis.shared_nodes import SharedNodes
-from fastcontact.analysis.solution import FrictionalEquilibrium, Path, Solution
+from fastcontact.analysis.solution import Path, Solution
 from fastcontact.arrays import Array
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.contact.surface import Surface
@@ -74,7 +74,7 @@ class Touching:
 
 def _slides(step: StepContext, constraints: StackedConstraints, solution: Solution, allowed: float) -> bool:
     """Return whether nodes that close in the step carry more shear than the fraction `allowed` of the friction capacity."""
-    if not isinstance(solution, FrictionalEquilibrium) or (forces := _forces(step, constraints)) is None:
+    if not constraints.tangents or (forces := _forces(step, constraints)) is None:
         return False
     shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.coefficients * solution.multiplier
     rubs = solution.active & (constraints.coefficients > 0.0)

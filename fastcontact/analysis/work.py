@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
-from fastcontact.analysis.solution import FrictionalEquilibrium, Solution
+from fastcontact.analysis.solution import Solution
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
@@ -183,14 +183,10 @@ def contact_work(
     over_slip : ndarray (m,)
         Integrals of the normal forces over the slips in the step [energy].
     """
-    normal, tangents = constraints.contact_forces(solution.multiplier[rows]), np.zeros((len(constraints), 0))
-    slip, directions = tangents, np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
-    if isinstance(solution, FrictionalEquilibrium) and constraints.tangents:
-        tangents, slip, directions = (
-            solution.tangential[rows],
-            solution.slip[rows],
-            np.stack(constraints.directions, axis=1),
-        )
+    normal, k = constraints.contact_forces(solution.multiplier[rows]), len(constraints.tangents)
+    tangents, slip = solution.tangential[rows, :k], solution.slip[rows, :k]
+    none = np.zeros((len(constraints), 0, contact.coordinates.shape[1]))
+    directions = np.stack(constraints.directions, axis=1) if k else none
     force, moved = (np.einsum("mk,mkd->md", values, directions) for values in (tangents, slip))
     now = _forces(pair, constraints, normal, tangents, force, contact, _added(pair, at, contact))
     before = before or _nothing(now)
@@ -200,7 +196,7 @@ def contact_work(
     along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
     work = np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0))
     touching = float(along[pressure == 0.0].sum())
-    if isinstance(solution, FrictionalEquilibrium) and solution.work is not None:
+    if solution.work is not None:
         work, touching = solution.work[rows], 0.0
     friction, mu = float(work.sum()), constraints.coefficients
     over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1)

@@ -26,7 +26,7 @@ from dataclasses import replace
 import numpy as np
 
 from fastcontact.analysis.friction.cone_newton import Forces
-from fastcontact.analysis.solution import FrictionalEquilibrium, Slid
+from fastcontact.analysis.solution import Slid, Solution
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.round_off import SINGLE_PRECISION
@@ -48,7 +48,7 @@ def along(
     lag : ndarray (1 + k, m)
         Gaps and slips at the beginning of the step, minus those at its end under the forces of its beginning [length].
     closing : ndarray (1 + k, m)
-        Gaps at the beginning of the step, and the slips that closing them would add, see `Path.closed` [length].
+        Gaps at the beginning of the step, and the slips that closing them would add, see `Path.along` [length].
     y : ndarray (1 + k, m)
         Normal and tangential forces at the beginning of the step [force].
     waiting : ndarray of bool (m,)
@@ -150,7 +150,7 @@ def shifted(constraints: Constraints, slid: Slid) -> Constraints:
     return replace(constraints, slip0=-before if constraints.slip0 is None else constraints.slip0 - before)
 
 
-def completed(solution: FrictionalEquilibrium, slid: Slid) -> FrictionalEquilibrium:
+def completed(solution: Solution, slid: Slid) -> Solution:
     """Return the solution with the slips and the frictional work of the step, given the solution of `shifted` constraints."""
     last = np.where(solution.active[:, None], solution.slip, 0.0)
     work = slid.work + friction_work(slid.normal, solution.multiplier, solution.tangential.T, last.T)

@@ -22,7 +22,7 @@ from scipy.sparse import csr_array, vstack
 from fastcontact.analysis.friction import dense, eliminated
 from fastcontact.analysis.friction.path import along
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
-from fastcontact.analysis.solution import Accuracy, FrictionalEquilibrium, Path, Response, Slid, response
+from fastcontact.analysis.solution import Accuracy, Path, Response, Slid, Solution, response
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.pairing import normals
@@ -35,8 +35,8 @@ log = logging.getLogger("fastcontact")
 
 def solve(
     loaded: Loaded, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array,
-    guess: FrictionalEquilibrium | None = None, path: Path | None = None,
-) -> FrictionalEquilibrium:  # fmt: skip
+    guess: Solution | None = None, path: Path | None = None,
+) -> Solution:  # fmt: skip
     """Return the displacements and the contact forces that satisfy unilateral contact and Coulomb's law.
 
     Each constraint in F costs columns of the inverse stiffness matrix. The problem therefore begins with the constraints that
@@ -57,7 +57,7 @@ def solve(
     u : ndarray (n,)
         Initial guess of iterative solvers, and values of the unknowns that constraints do not involve, see
         `Loaded.involved_solution` [length].
-    guess : FrictionalEquilibrium, optional
+    guess : Solution, optional
         Solution of a similar problem, from whose forces to start; ignored if its number of constraints is different.
     path : Path, optional
         Data at the beginning of the step, if it is solved in increments along the load path.
@@ -87,7 +87,7 @@ def solve(
 def _eliminated(
     loaded: LoadedNonsymmetric, constraints: Constraints, closed: Mask, accuracy: Accuracy, u: Array, forces: Array | None,
     path: Path | None,
-) -> FrictionalEquilibrium | None:  # fmt: skip
+) -> Solution | None:  # fmt: skip
     """Return the solution by `eliminated`, without the Delassus operator; None if this fails. Parameters as in `solve`."""
     usable, before = constraints.usable, None
 
@@ -111,18 +111,17 @@ def _eliminated(
         if path is None:
             cone = solved(constraints, closed, accuracy, forces)
         else:
-            y = path.forces(constraints.directions, np.arange(len(constraints)))
-            closing = path.closed(constraints.directions, np.arange(len(constraints)))
+            y, closing = path.along(constraints.directions, np.arange(len(constraints)))
             lag = _lag(loaded, constraints, path, y)
             far = 4.0 * float(np.abs(lag[0]).max())  # further than constraints can close
             cone, gaps, before = along(lag, closing, y, path.waiting, beside)
             cone = replace(cone, gaps=gaps)
     except ConvergenceError:
         return None
-    gap = np.where(usable, cone.gaps[0], np.inf)
-    return FrictionalEquilibrium(
-        u, cone.y[0], gap, cone.y[1:].T, cone.gaps[1:].T, cone.closed & usable, cone.sticking, cone.settled,
-        cone.residual, cone.iterations, constraints.directions,
+    gap, active = np.where(usable, cone.gaps[0], np.inf), cone.closed & usable
+    return Solution(
+        u, cone.y[0], gap, active, active, cone.settled, cone.iterations, cone.y[1:].T, cone.gaps[1:].T, cone.sticking,
+        cone.residual, constraints.directions,
         slid=None if before is None else _slid(before, None, np.arange(len(constraints)), constraints),
     )  # fmt: skip
 
@@ -138,7 +137,7 @@ def _lag(loaded: Loaded, constraints: Constraints, path: Path, y: Array) -> Arra
 
 def _among(
     chosen: Mask, loaded: Loaded, constraints: Constraints, closed: Mask, u: Array, forces: Array | None, path: Path | None
-) -> FrictionalEquilibrium:  # fmt: skip
+) -> Solution:  # fmt: skip
     """Return the solution with the `chosen` constraints (m,) alone, by the dense Delassus operator.
 
     The gaps and slips of the other constraints follow from the displacements. The other parameters are those of `solve`, with
@@ -162,7 +161,7 @@ def _among(
     start = None if forces is None else forces[:, rows]
     begin, closing = np.zeros_like(free), np.zeros_like(free)
     if path is not None:
-        begin, closing = path.forces(constraints.directions, rows), path.closed(constraints.directions, rows)
+        begin, closing = path.along(constraints.directions, rows)
     if Q is not None:
         F = np.asarray(Q @ (Q @ F).T)
         free, begin, closing = ((Q @ values.ravel()).reshape(free.shape) for values in (free, begin, closing))
@@ -202,9 +201,9 @@ def _among(
     # Constraints that are equations have no friction, and slips along idle tangents do not vary.
     mu = np.where(equations, 0.0, mu)
     at_end = replace(result, sticking=result.sticking & ~equations)
-    return FrictionalEquilibrium(
-        u, full[0], gaps[0], full[1:].T, gaps[1:].T, active, sticking, result.settled, result.residual, result.iterations,
-        constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
+    return Solution(
+        u, full[0], gaps[0], active, active, result.settled, result.iterations, full[1:].T, gaps[1:].T, sticking,
+        result.residual, constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
         response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, mu, at_end)),
     )  # fmt: skip
 

@@ -11,7 +11,7 @@ import fastcontact as fc
 from fastcontact.analysis.floating_bodies import MAX_POSITIONS, FloatingBodies, Freed
 from fastcontact.analysis.load_step import load_step
 from fastcontact.analysis.problem import prepare
-from fastcontact.analysis.solution import Equilibrium
+from fastcontact.analysis.solution import Solution
 
 DOFS = np.array([0])
 
@@ -24,9 +24,8 @@ def bodies_at(dofs):
 
 def solution(elongation, settled=True):
     active = np.array([True])
-    return Equilibrium(
-        np.atleast_1d(elongation), np.zeros(1), np.zeros(1), active, active if settled else ~active, iterations=1
-    )
+    wanted = active if settled else ~active
+    return Solution.frictionless(np.atleast_1d(elongation), np.zeros(1), np.zeros(1), active, wanted)
 
 
 def test_a_contact_problem_that_does_not_settle_is_returned():
