@@ -98,8 +98,7 @@ def complementarity(settled, sizes: Sizes) -> tuple[float, float, float]:
     """
     state, constraints = settled.solution, settled.constraints
     usable = np.diff(constraints.B.indptr) > 0
-    if constraints.equality is not None:
-        usable &= ~constraints.equality
+    usable &= ~constraints.equality
     gap, force = np.minimum(state.gap[usable] / sizes.length, 1e6), state.multiplier[usable] / sizes.force
     product = float(np.abs(gap * force).max(initial=0.0))
     return float(-gap.min(initial=0.0)), float(-force.min(initial=0.0)), product
@@ -111,7 +110,7 @@ def friction(settled, sizes: Sizes) -> tuple[float, float]:
     if not constraints.tangents:
         return 0.0, 0.0
     rubbing = np.linalg.norm(state.tangential, axis=1)
-    outside = (rubbing - constraints.coefficients * state.multiplier).max(initial=0.0)
+    outside = (rubbing - constraints.friction * state.multiplier).max(initial=0.0)
     # In steps that are solved in increments, slips may turn round between them.
     work = -np.einsum("mk,mk->m", state.tangential, state.slip) if state.work is None else state.work
     driving = -work.min(initial=0.0)

@@ -98,13 +98,10 @@ class ActiveDofs:
             return without_remnants(csr_array(reduced[:, self._unknowns]), rows, HELD), offset
 
         B, gap0 = on_unknowns(constraints.B, constraints.gap0)
-        slip0 = constraints.slip0 if constraints.slip0 is not None else np.zeros((len(constraints.tangents), 1))
-        slips = [slip - T @ start for T, slip in zip(constraints.tangents, slip0, strict=True)]
+        slips = [slip - T @ start for T, slip in zip(constraints.tangents, constraints.slip0, strict=True)]
         pairs = [on_unknowns(T, slip) for T, slip in zip(constraints.tangents, slips, strict=True)]
-        tangents = tuple(T for T, _ in pairs)
-        return replace(
-            constraints, B=B, gap0=gap0, tangents=tangents, slip0=np.stack([s for _, s in pairs]) if pairs else None
-        )
+        slip0 = np.reshape([slip for _, slip in pairs], constraints.slip0.shape)
+        return replace(constraints, B=B, gap0=gap0, tangents=tuple(T for T, _ in pairs), slip0=slip0)
 
     def unknowns(self, u: Array, lift: Array) -> Array:
         """Return the active unknowns (l,) of displacements `u` that satisfy supports and multi-point constraints."""

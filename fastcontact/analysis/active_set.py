@@ -55,9 +55,7 @@ def solve(
     Solution
         The solution. Its `settled` is False if the iteration has reached ``accuracy.max_iterations``.
     """
-    equations = np.zeros(len(active), bool)
-    if constraints.equality is not None:
-        equations = constraints.usable & constraints.equality
+    equations = constraints.usable & constraints.equality
     active = (active & constraints.usable) | equations
     seen: set[bytes] = set()
     changed = np.zeros(len(active), bool)  # constraints that a monitored, unconverged solution has changed

@@ -194,7 +194,7 @@ def _closed(
         # Nodes of a cohesive layer are closed under tension as well.
         closed = field.closed_nodes(active, gap, over_side if pair.options.cohesion is None else np.abs(over_side))
         for_good = pair.never_opening(pair.points[pair.secondary.points], at)
-        closed = closed if for_good is None else closed | (for_good & np.isfinite(gap))
+        closed = closed | (for_good & np.isfinite(gap))
     closed, pressure = carried(constraints, forces, closed & ~excluded, pair.secondary)
     raw = field.pressure(forces) * covered  # averaged at each node like the frictional tractions
     fraction = np.divide(pressure, raw, out=np.ones_like(pressure), where=raw > 0.0)

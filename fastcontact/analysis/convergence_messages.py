@@ -56,7 +56,7 @@ def active_set_cycles(problem: Problem, constraints: StackedConstraints, solutio
         return (
             f"contact with friction did not converge in {solution.iterations} Newton iterations from several starts: the "
             f"residual of its equations is {solution.residual:.1e} of the largest force. With the coefficient of friction "
-            f"{constraints.coefficients.max():g} there may be no solution: use more load steps or less friction"
+            f"{constraints.friction.max():g} there may be no solution: use more load steps or less friction"
         )
     count = int((solution.active != solution.wanted).sum())
     many = "1 constraint still changes" if count == 1 else f"{count} constraints still change"

@@ -235,10 +235,9 @@ class FloatingBodies:
             Scale of the loads, as in `settle` [force].
         """
         elastic = self.stiffness * float(np.abs(u).max())
-        carries = np.abs(multiplier) > LENGTH_ROUND_OFF * (min(load, elastic) if load else elastic)
-        if constraints.equality is not None:
-            carries = carries | constraints.equality
-        rubs = carries & (constraints.coefficients > 0.0)
+        significant = LENGTH_ROUND_OFF * (min(load, elastic) if load else elastic)
+        carries = (np.abs(multiplier) > significant) | constraints.equality
+        rubs = carries & (constraints.friction > 0.0)
         along = [constraints.B[carries], *(tangent[rubs] for tangent in constraints.tangents)]
         _, values, V = np.linalg.svd(np.vstack([rows @ self.motions.displacement for rows in along]))
         free = np.append(values, np.zeros(len(V) - len(values))) <= SINGLE_PRECISION

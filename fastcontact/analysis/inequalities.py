@@ -113,7 +113,7 @@ def initially_active(constraints: StackedConstraints, iterate: Iterate, extrapol
 
 def _start_of(name: str, constraints: Constraints, iterate: Iterate, extrapolation: Extrapolation | None) -> Mask:
     """Return the initial active set of the contact pair `name`; see `initially_active`."""
-    if constraints.equality is not None and constraints.equality.all():
+    if constraints.equality.all():
         return constraints.equality
     if name not in iterate.active:
         return np.zeros(len(constraints), bool)
@@ -181,7 +181,7 @@ class StepContext:
         slips = np.stack([T @ self.prescribed_motion for T in constraints.tangents])
         # Without prescribed displacements in this step, `prescribed_motion` is the round-off of earlier displacements.
         scale = max(largest(self.prescribed_motion), largest(self.state.u))
-        if constraints.slip0 is not None and isinstance(constraints, StackedConstraints):
+        if isinstance(constraints, StackedConstraints):
             begin, end = self.state.obstacles, self.load.obstacles
             for name, rows in constraints.rows.items():
                 if isinstance(self.problem.pairs[name].primary, RigidSide):
@@ -271,7 +271,7 @@ def _with_floating_bodies(
 
     def failure(text: str, **options: bool) -> ConvergenceError:
         more = needed_friction(constraints, modes, iterate.u, *loads)
-        text = text if more is None else friction_exceeded(bodies, more, constraints.coefficients)
+        text = text if more is None else friction_exceeded(bodies, more, constraints.friction)
         return ConvergenceError(text, iterate.history, **options)
 
     start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
@@ -285,8 +285,7 @@ def _with_floating_bodies(
             names = grouped(bodies.names)
             text = f"the loads pull bodies away, and no contact stops them ({names}): reverse the loads or add supports"
             raise failure(text, smaller_steps_help=False)
-        unilateral = active if constraints.equality is None else active & ~constraints.equality
-        if not unilateral.any():
+        if not (active & ~constraints.equality).any():
             start, u = start + moved, iterate.u + bodies.rigid(moved)
             # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
             known = active | constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
@@ -298,9 +297,7 @@ def _with_floating_bodies(
     )
     if rigid.state.settled and not rigid.slack:
         gaps = gaps_at_rest(problem.model, bodies.motions)
-        raise failure(
-            not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.coefficients.any()), gaps)
-        )
+        raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
     solution = rigid.state
     held = solution.response

@@ -183,7 +183,7 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
             first_contact[name] = pair.first_contact(problem.configuration(name, start, load, displacement, end.u))
         if pair.options.kind == "bilateral_once_closed":
             # Points that have slid beyond the other side may return to it.
-            closed = solution.active[rows] | (False if part.equality is None else part.equality)
+            closed = solution.active[rows] | part.equality
             never_opening[name] = part.positions, closed
         compliant = part.compliance is not None or part.tangential_softness is not None
         if compliant and part.tangents:

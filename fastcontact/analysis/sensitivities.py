@@ -271,8 +271,7 @@ def checked_margin(contact: MovingContact, least: float) -> float:
         force = solution.multiplier[rows] / (1.0 if areas is None else areas)
         largest = float(np.abs(force).max(initial=0.0)) or 1.0
         near[rows] = np.where(active, force / largest, np.where(usable, gap[rows] / size, np.inf))
-    if constraints.equality is not None:
-        near[constraints.equality] = np.inf
+    near[constraints.equality] = np.inf
     wrong = np.flatnonzero(~(near >= least))
     if len(wrong):
         nodes = nearest_nodes(contact.problem, constraints, wrong)

@@ -83,9 +83,10 @@ class SharedNodes:
             "B": csr_array(mean @ constraints.B),
             "gap0": mean @ constraints.gap0,
             "tangents": self._tangents(constraints),
+            "equality": constraints.equality & ~self.idle,
+            "slip0": self._mean(constraints.slip0.T, self.along).T,
+            "friction": self.summed(self.part * constraints.friction),
         }
-        if constraints.equality is not None:
-            merged["equality"] = constraints.equality & ~self.idle
         if constraints.softness is not None:
             total = self.summed(_stiffness(constraints.softness))
             merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
@@ -97,10 +98,6 @@ class SharedNodes:
             if constraints.elastic_slip is not None:
                 weight = np.divide(stiffness, total[self.place], out=np.ones_like(total), where=np.isfinite(stiffness))
                 merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
-        if constraints.slip0 is not None:
-            merged["slip0"] = self._mean(constraints.slip0.T, self.along).T
-        if constraints.friction is not None:
-            merged["friction"] = self.summed(self.part * constraints.friction)
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
 
     def _at_places(self, weight: Array) -> csr_array:
@@ -192,9 +189,7 @@ def _at_periodic_interfaces(
             both = row[np.stack([interface.first, interface.second])]
             pairs.append(both[:, (both >= 0).all(axis=0) & (both[0] != both[1])])
     ends = np.hstack(pairs)
-    if constraints.equality is not None:
-        ends = ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
-    return ends
+    return ends[:, constraints.equality[ends[0]] == constraints.equality[ends[1]]]
 
 
 def _places(constraints: Constraints, pairs: Indices) -> Indices:
@@ -204,7 +199,7 @@ def _places(constraints: Constraints, pairs: Indices) -> Indices:
     """
     m = len(constraints)
     label = connected_components(csr_array((np.ones(pairs.shape[1]), tuple(pairs)), shape=(m, m)), directed=False)[1]
-    last_to_first = np.lexsort((np.arange(m), constraints.coefficients == 0.0))[::-1]
+    last_to_first = np.lexsort((np.arange(m), constraints.friction == 0.0))[::-1]
     first = np.empty(m, np.intp)
     first[label[last_to_first]] = last_to_first
     return first[label]
@@ -229,7 +224,7 @@ def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Ar
         held = np.bincount(representative, hard, minlength=m)[representative] > 0
         weight = np.where(several & ~held, _stiffness(constraints.softness), np.where(hard | ~several, weight, 0.0))
     fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
-    if constraints.friction is None:
+    if not constraints.tangents:
         return fraction, fraction
     rubbing = fraction * constraints.friction
     total = np.bincount(representative, rubbing, minlength=m)[representative]
@@ -263,8 +258,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
         return first, first, first
     difference = abs(constraints.B[first] - constraints.B[second]).max(axis=1).toarray().ravel()
     alike = difference <= LENGTH_ROUND_OFF
-    if constraints.equality is not None:
-        alike &= ~(constraints.equality[first] | constraints.equality[second])
+    alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
     level = constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
     yields = np.zeros(len(constraints), bool) if constraints.softness is None else constraints.softness > 0.0

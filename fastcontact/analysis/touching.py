@@ -76,8 +76,8 @@ def _slides(step: StepContext, constraints: StackedConstraints, solution: Soluti
     """Return whether nodes that close in the step carry more shear than the fraction `allowed` of the friction capacity."""
     if not constraints.tangents or (forces := _forces(step, constraints)) is None:
         return False
-    shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.coefficients * solution.multiplier
-    rubs = solution.active & (constraints.coefficients > 0.0)
+    shear, capacity = np.linalg.norm(solution.tangential, axis=1), constraints.friction * solution.multiplier
+    rubs = solution.active & (constraints.friction > 0.0)
     return bool(shear[rubs & (forces[0] == 0.0)].sum() > allowed * capacity[rubs].sum())
 
 
@@ -94,9 +94,7 @@ def _path(
     slips = _closing(step, constraints, gap)
     if nodes is not None:
         gap, normal, traction, slips = nodes.gathered(constraints, gap, normal, traction, slips)
-    waiting = gap > LENGTH_ROUND_OFF * size
-    if constraints.equality is not None:
-        waiting &= ~constraints.equality
+    waiting = (gap > LENGTH_ROUND_OFF * size) & ~constraints.equality
     return Path(gap, normal, traction, slips, waiting) if waiting.any() else None
 
 
@@ -123,7 +121,7 @@ def _closing(step: StepContext, constraints: StackedConstraints, gap: Array) -> 
     """
     closing = np.zeros_like(constraints.positions)
     for name, rows in constraints.rows.items():
-        if constraints.slip0 is not None and isinstance(step.problem.pairs[name].primary, Surface):
+        if isinstance(step.problem.pairs[name].primary, Surface):
             tangents = np.stack([tangent[rows] for tangent in constraints.directions])
             now = constraints.parts[name].gaps(step.state.u)
             more = np.divide(gap[rows], now, out=np.ones_like(now), where=now > 0.0)
@@ -142,7 +140,7 @@ def _forces(step: StepContext, constraints: StackedConstraints) -> tuple[Array, 
         if before is not None and part.areas is not None and part.wetted is None:
             pressure, shear = before.at(part.positions)
             normal[rows], traction[rows] = part.finite_areas * pressure, part.finite_areas[:, None] * shear
-        elif name in step.state.touched and not (part.equality is not None and part.equality.all()):
+        elif name in step.state.touched and not part.equality.all():
             return None
     return normal, traction
 

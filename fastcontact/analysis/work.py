@@ -198,7 +198,7 @@ def contact_work(
     touching = float(along[pressure == 0.0].sum())
     if solution.work is not None:
         work, touching = solution.work[rows], 0.0
-    friction, mu = float(work.sum()), constraints.coefficients
+    friction, mu = float(work.sum()), constraints.friction
     over_slip = 0.5 * (1.0 + ratio) * normal * np.linalg.norm(moved, axis=1)
     np.divide(work, mu, out=over_slip, where=mu > 0.0)
     sliding = float((along + earlier).sum())

@@ -35,7 +35,7 @@ def carried(constraints: Constraints, forces: Array, closed: Mask, side: Surface
     side : Surface
         The secondary side.
     """
-    field, may_pull = constraints.nodal, constraints.equality is not None
+    field, may_pull = constraints.nodal, bool(constraints.equality.any())
     assert field is not None
     nodal, shares, areas = field.over_whole_side(forces), field.shares(forces), field.nodal_areas
     with_area = areas > NO_AREA * np.abs(areas).mean()  # these may receive shares of other nodes

@@ -86,8 +86,7 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying:
     lying = none if law.reversible else lying
     sliding, damage = before.at(constraints.positions)
     before = Bond(constraints.positions, sliding, damage, before.released)
-    slips0 = np.zeros((len(constraints.tangents), m)) if constraints.slip0 is None else constraints.slip0
-    known = zip(constraints.tangents, constraints.directions, slips0, strict=True)
+    known = zip(constraints.tangents, constraints.directions, constraints.slip0, strict=True)
     along = [slip0 + np.einsum("md,md->m", t, sliding) - T @ start for T, t, slip0 in known]
     slides = [rest + T @ u for T, rest in zip(constraints.tangents, along, strict=True)]
     opening = constraints.gaps(at.displacement) - lying
@@ -111,6 +110,6 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying:
         positions=np.tile(constraints.positions, (len(now), 1)),
         areas=np.tile(constraints.areas, len(now)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(now)),
-        compliance=None, tangents=(), directions=(), slip0=None, friction=None, tied=layer,
+        compliance=None, tangents=(), directions=(), slip0=np.empty(0), friction=np.empty(0), tied=layer,
         branches=(falls + 2 * (opening < 0.0) + 4 * ~intact).ravel().astype(np.int8),
     ).without(np.concatenate([none > 0.0, *[~intact] * len(along)]))  # fmt: skip

@@ -173,7 +173,8 @@ class Tied(Protocol):
 class Constraints:
     """Inequality constraints ``gap = gap0 + B u + C multiplier >= 0`` with multipliers that are not negative.
 
-    An optional attribute that is None means zero, or means that the constraints do not have the feature.
+    An optional attribute that is None means zero, or means that the constraints do not have the feature. An empty array means
+    zero for all constraints, and is replaced by zeros.
 
     Attributes
     ----------
@@ -193,12 +194,12 @@ class Constraints:
     coupled_directions : tuple of k ndarray (m, dim)
         Unit tangents in the axes in which C couples the components of force vectors; empty if these are the axes of the mesh
         [-].
-    slip0 : ndarray (k, m), optional
+    slip0 : ndarray (k, m)
         Part of the slips of the load step that does not depend on its displacements: that due to the motion of a rigid
         primary side, or minus that due to closing gaps [length].
-    friction : ndarray (m,), optional
+    friction : ndarray (m,)
         Coefficients of friction [-].
-    equality : ndarray of bool (m,), optional
+    equality : ndarray of bool (m,)
         Constraints that are equations, with multipliers of either sign.
     softness : ndarray (m,), optional
         Compliance of each constraint along its normal, in addition to C [length / force].
@@ -236,9 +237,9 @@ class Constraints:
     compliance: Compliance | None = None
     tangents: tuple[csr_array, ...] = ()
     directions: tuple[Array, ...] = ()
-    friction: Array | None = None
-    slip0: Array | None = None
-    equality: Mask | None = None
+    friction: Array = field(default_factory=lambda: np.empty(0))
+    slip0: Array = field(default_factory=lambda: np.empty(0))
+    equality: Mask = field(default_factory=lambda: np.empty(0, bool))
     softness: Array | None = None
     low_rank_compliance: Array | None = None
     tangential_softness: Array | None = None
@@ -253,6 +254,12 @@ class Constraints:
     wetted: Wetted | None = None
     coupled_directions: tuple[Array, ...] = ()
     geometry: Geometry | None = None
+
+    def __post_init__(self) -> None:
+        m = len(self.gap0)
+        for name, shape in (("friction", (m,)), ("slip0", (len(self.tangents), m)), ("equality", (m,))):
+            if not (values := getattr(self, name)).size:
+                object.__setattr__(self, name, np.zeros(shape, values.dtype))
 
     def __len__(self) -> int:
         return len(self.gap0)
@@ -271,11 +278,6 @@ class Constraints:
     def coupled(self) -> bool:
         """Whether a compliance couples different constraints."""
         return self.compliance is not None or self.low_rank_compliance is not None
-
-    @property
-    def coefficients(self) -> Array:
-        """Coefficients of friction (m,); zero without friction [-]."""
-        return np.zeros(len(self)) if self.friction is None else self.friction
 
     @property
     def finite_areas(self) -> Array:
@@ -309,8 +311,7 @@ class Constraints:
 
     def gaps_at_rest(self) -> Array:
         """Return the gaps, then the slips along each tangent, at u = 0 without contact forces (1 + k, m) [length]."""
-        slip0 = np.zeros((len(self.tangents), len(self))) if self.slip0 is None else self.slip0
-        return np.vstack([self.gap0, slip0 if self.elastic_slip is None else slip0 + self.elastic_slip])
+        return np.vstack([self.gap0, self.slip0 if self.elastic_slip is None else self.slip0 + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
         """Return the nodal contact forces (n_dofs,) for multipliers (m,) and tangential forces (m, k) [force]."""
@@ -356,7 +357,7 @@ class Constraints:
         `u` (n_dofs,) are displacements [length], `pressure` (n_nodes,) the last nodal pressures [pressure].
         """
         assert self.nodal is not None
-        if self.tied is not None and self.equality is not None:
+        if self.tied is not None:
             return self.equality | (self.gap0 + self.B @ u < 0.0)
         return self.nodal.initially_active(self.gap0 + self.B @ u, pressure)
 
@@ -406,9 +407,9 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
             for j in range(count)
         ),
         _stacked_directions(pairs),
-        np.concatenate([pair.coefficients for pair in pairs]),
-        _stacked_values([pair.slip0 for pair in pairs], still),
-        _stacked_values([pair.equality for pair in pairs], [zero > 0.0 for zero in numbers]),
+        np.concatenate([pair.friction for pair in pairs]),
+        np.hstack([pair.slip0 if pair.tangents else zero for pair, zero in zip(pairs, still, strict=True)]),
+        np.concatenate([pair.equality for pair in pairs]),
         _stacked_values([pair.softness for pair in pairs], numbers),
         _stacked_low_rank(pairs, count),
         _stacked_values([pair.tangential_softness for pair in pairs], numbers),

@@ -139,8 +139,8 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
             far / (at.fluid_pressure * constraints.areas),
             none if constraints.softness is None else constraints.softness,
         ),
-        equality=rows if constraints.equality is None else constraints.equality | rows,
-        friction=None if constraints.friction is None else np.where(rows, 0.0, constraints.friction),
+        equality=constraints.equality | rows,
+        friction=np.where(rows, 0.0, constraints.friction),
         wetted=Wetted(rows, np.where(nodes, at.fluid_pressure, 0.0), csr_array(weights.T @ at_nodes), areas),
     )
 

@@ -144,8 +144,8 @@ class ForceDrivenObstacles:
             return dataclasses.replace(constraints, B=self._wider(constraints.B), tangents=wider)
         B, normal = self._free(constraints.B, number)
         tangents = tuple(self._free(tangent, number)[0] for tangent in constraints.tangents)
-        slip0 = None
-        if moved is not None and constraints.slip0 is not None:
+        slip0 = np.zeros_like(constraints.slip0)
+        if moved is not None and constraints.tangents:
             slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
         return dataclasses.replace(
             constraints, B=B, gap0=constraints.gap0 + normal @ position, tangents=tangents, slip0=slip0

@@ -263,8 +263,6 @@ def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array,
     coefficients of friction.
     """
     rows, gap0 = _edges(constraints, factor)
-    if constraints.equality is None:
-        return rows, gap0
     backwards = np.flatnonzero(np.tile(constraints.equality, len(gap0) // len(constraints.equality)))
     both = csr_array(vstack([rows, -rows[backwards]], format="csr"))
     return both, np.concatenate([gap0, -gap0[backwards]])
@@ -272,7 +270,7 @@ def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array,
 
 def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
     """Return the rows and gaps of contact that may open."""
-    if not constraints.tangents or constraints.friction is None:
+    if not constraints.tangents:
         return constraints.B, constraints.gap0
     if len(constraints.tangents) == 1:
         around = np.array([[1.0], [-1.0]])
@@ -348,7 +346,7 @@ def needed_friction(constraints: Constraints, motions: Array, u: Array, work: Ar
     `motions` (n_dofs, k) are the rigid-body motions, `u` (n_dofs,) displacements [length]; `work` and `size` are as in
     `stopped_at`.
     """
-    if not constraints.coefficients.any():
+    if not constraints.friction.any():
         return None
     inside = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
     low, high = inside, MOST_FRICTION

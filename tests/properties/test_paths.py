@@ -79,7 +79,7 @@ def test_work_is_strain_energy_and_friction(recipe, levels):
         now = step.displacement.ravel()
         state, constraints, change = analysis.settled.solution, analysis.settled.constraints, now - u
         opened = constraints.gap0 + constraints.B @ u
-        turned = 0.0 if constraints.slip0 is None else float((state.tangential * constraints.slip0.T).sum())
+        turned = float((state.tangential * constraints.slip0.T).sum())
         new = 0.5 * now @ (K @ now)
         scale = recipe.stiffest * np.abs(now).max() ** 2
         assert step.contact["pair 0"].dissipation >= -BALANCE * scale

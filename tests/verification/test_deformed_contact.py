@@ -363,8 +363,7 @@ def test_forces_gaps_and_slips_vary_as_their_differences(make, mesh, options, er
         followed = [t - (t * now).sum(axis=1)[:, None] * mean for t in here.directions]
         vector = sum(t[:, None] * along for t, along in zip(tangential.T, followed, strict=True))
         forces = np.column_stack([(vector * along).sum(axis=1) for along in at.directions])
-        constant = at.slip0 if at.slip0 is not None else np.zeros((len(at.tangents), 1))
-        slips = [T @ (u - start) + more for T, more in zip(at.tangents, constant, strict=True)]
+        slips = [T @ (u - start) + more for T, more in zip(at.tangents, at.slip0, strict=True)]
         slip = sum(s[:, None] * along for s, along in zip(slips, at.directions, strict=True))
         return at.force(multiplier, forces), np.stack([gap, *((slip * t).sum(axis=1) for t in followed)])
 

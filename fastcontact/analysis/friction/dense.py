@@ -19,9 +19,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from scipy.linalg import lu_solve
 
-from fastcontact.analysis.friction import lemke
-from fastcontact.analysis.friction.cone_newton import Forces, newton
-from fastcontact.analysis.friction.coulomb_law import Law
+from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
 from fastcontact.arrays import Array, Indices, Mask
 from fastcontact.linear.delassus import lu_factors
 from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
@@ -36,7 +34,9 @@ EDGES, LARGEST = (8, 32), 2500
 REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
 
 
-def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None) -> Forces:
+def solve(
+    F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = None, equality: Mask | None = None
+) -> Forces:
     """Return the forces that satisfy unilateral contact and Coulomb's law.
 
     Parameters
@@ -53,8 +53,12 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
         with a negative gap without forces.
     guess : ndarray (1 + k, m), optional
         Another initial guess of the forces, which is tried first [force].
+    equality : ndarray of bool (m,), optional
+        Constraints that are equations, without friction.
     """
     n_components, m = free.shape
+    equality = np.zeros(m, bool) if equality is None else equality
+    law = Law(np.where(equality, 0.0, mu), equality)
     if not m:
         return Forces(free * 0.0, free, closed, closed, True, 0.0, 0)
     unit = _units(F, m)
@@ -66,8 +70,8 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     for compliance in REGULARISATION if _dependent(F) else (0.0,):
         slips = np.arange(m, len(F))
         F[slips, slips] += compliance
-        problem = _Problem(F, free * unit / length, mu)
-        for start, line_search in _starts(problem, closed, guess):
+        problem = _Problem(F, free * unit / length, law)
+        for start, line_search in problem.starts(closed, guess):
             # At least one iteration: the residual of forces of an earlier pairing may be below the round-off common to
             # all constraints, although gaps of constraints with a large compliance are not closed.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
@@ -83,7 +87,7 @@ def solve(F: Array, free: Array, mu: Array, closed: Mask, guess: Array | None = 
     settled = (best.settled or best.residual <= LENGTH_ROUND_OFF) and not jammed
     residual = max(best.residual, elastic_slip) if jammed else best.residual
     gaps = best.gaps * length / unit
-    return Forces(best.y * length * unit, gaps, best.closed, best.sticking, settled, residual, iterations)
+    return Forces(best.y * length * unit, gaps, best.closed, best.sticking | equality, settled, residual, iterations)
 
 
 def _dependent(F: Array) -> bool:
@@ -100,8 +104,8 @@ class _Problem:
     F is scaled such that the compliance of each gap is one.
     """
 
-    def __init__(self, F: Array, free: Array, mu: Array) -> None:
-        self.F, self.free, self.mu, self.law = F, free, mu, Law(mu)
+    def __init__(self, F: Array, free: Array, law: Law) -> None:
+        self.F, self.free, self.law = F, free, law
         self.round_off = float(16 * np.finfo(float).eps * np.abs(free).max())
 
     def gaps(self, y: Array) -> Array:
@@ -110,38 +114,33 @@ class _Problem:
 
     def step(self, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> tuple[Array, Array]:
         """See `cone_newton.Linearised`."""
-        new = _step(self, y, gaps, closed, sticking)
+        new, rows = np.zeros_like(y), np.flatnonzero(closed)
+        if len(rows):
+            A, D = _equations(self.law, self.F, y, gaps, rows, sticking)
+            right = -np.einsum("abq,bq->aq", D, self.free[:, rows])
+            new[:, rows] = _solved(A, right.ravel()).reshape(right.shape)
         return new, self.gaps(new)
 
+    def starts(self, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
+        """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in order of increasing cost.
 
-def _starts(problem: _Problem, closed: Mask, guess: Array | None) -> Iterator[tuple[Array, bool]]:
-    """Yield initial forces (1 + k, m) of Newton's method and whether to use a line search, in order of increasing cost.
-
-    The same initial forces are tried with and without a line search: at a kink of the residual, Newton's method may converge
-    with full steps although no shortened step decreases the residual.
-    """
-    if guess is not None and guess.any():
-        yield guess, True
-    sticking = closed | (problem.free[0] < 0) if not closed.any() else closed
-    stuck = _step(problem, np.zeros_like(problem.free), problem.free, sticking, sticking)
-    yield stuck, True
-    if guess is not None and guess.any():
-        yield guess, False
-    yield stuck, False
-    for edges in EDGES if len(problem.free) == 3 else (2,):
-        edge_forces = _on_edges(problem, edges)
-        if edge_forces is not None:
-            yield edge_forces, True
-
-
-def _step(problem: _Problem, y: Array, gaps: Array, closed: Mask, sticking: Mask) -> Array:
-    """Return the forces (1 + k, m) after a Newton step; see `cone_newton.Linearised.step`."""
-    new, rows = np.zeros_like(y), np.flatnonzero(closed)
-    if len(rows):
-        A, D = _equations(problem.law, problem.F, y, gaps, rows, sticking)
-        right = -np.einsum("abq,bq->aq", D, problem.free[:, rows])
-        new[:, rows] = _solved(A, right.ravel()).reshape(right.shape)
-    return new
+        The same initial forces are tried with and without a line search: at a kink of the residual, Newton's method may
+        converge with full steps although no shortened step decreases the residual.
+        """
+        guess = None if guess is None or not guess.any() else guess
+        if guess is not None:
+            yield guess, True
+        equality = self.law.equality
+        sticking = closed & ~equality if (closed & ~equality).any() else (self.free[0] < 0) & ~equality
+        stuck = self.step(np.zeros_like(self.free), self.free, sticking | equality, sticking)[0]
+        yield stuck, True
+        if guess is not None:
+            yield guess, False
+        yield stuck, False
+        for edges in EDGES if len(self.free) == 3 else (2,):
+            edge_forces = _on_edges(self, edges)
+            if edge_forces is not None:
+                yield edge_forces, True
 
 
 def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, sticking: Mask) -> tuple[Array, Array]:
@@ -158,18 +157,18 @@ def _equations(law: Law, F: Array, y: Array, gaps: Array, rows: Indices, stickin
     return A.reshape(unknown.size, -1), D
 
 
-def response(F: Array, mu: Array, forces: Forces) -> Callable[[Array], Array]:
+def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
     """Return the derivative of the solution `forces`, as a function.
 
     The function returns the change (1 + k, m) of the forces due to a change (1 + k, m) of the gaps and slips without forces.
-    F and mu are those of `solve`.
+    F is that of `solve`, and `law` the law of its constraints.
     """
     rows = np.flatnonzero(forces.closed)
     if not len(rows):
         return np.zeros_like
-    unit = _units(F, len(mu))
+    unit = _units(F, len(law.mu))
     units = np.tile(unit, len(forces.y))
-    A, D = _equations(Law(mu), units[:, None] * F * units, forces.y / unit, forces.gaps * unit, rows, forces.sticking)
+    A, D = _equations(law, units[:, None] * F * units, forces.y / unit, forces.gaps * unit, rows, forces.sticking)
     factors = lu_factors(A)
 
     def varied(gaps: Array) -> Array:
@@ -203,24 +202,96 @@ def _solved(A: Array, right: Array) -> Array:
 def _on_edges(problem: _Problem, edges: int) -> Array | None:
     """Return the forces (1 + k, m) for a friction cone of `edges` edges; None if it is too large or Lemke's method fails.
 
-    The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, and the
-    largest slip along an edge (Stewart and Trinkle, 1996).
+    The unknowns of the linear complementarity problem are the normal forces, the tangential forces along each edge, the
+    tensile forces of equations, and the largest slip along an edge (Stewart and Trinkle, 1996).
     """
     k, m = len(problem.free) - 1, problem.free.shape[1]
-    size, last = (2 + edges) * m, (1 + edges) * m
+    pulled = np.flatnonzero(problem.law.equality)
+    along_edges, last = (1 + edges) * m, (1 + edges) * m + len(pulled)
+    size = last + m
     if size > LARGEST:
         return None
     angle = 2 * np.pi * np.arange(edges) / edges
     along = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
     X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), along.T]]), np.eye(m))
+    X = np.hstack([X, -np.eye(len(X))[:, pulled]])
     M = np.zeros((size, size))
     M[:last, :last] = X.T @ problem.F @ X
-    M[last:, :m] = np.diag(problem.mu)
-    M[last:, m:last] = -np.tile(np.eye(m), edges)
-    M[m:last, last:] = np.tile(np.eye(m), edges).T
+    M[last:, :m] = np.diag(problem.law.mu)
+    M[last:, m:along_edges] = -np.tile(np.eye(m), edges)
+    M[m:along_edges, last:] = np.tile(np.eye(m), edges).T
     # The problem of a polyhedral cone is degenerate. Its right-hand side is therefore perturbed by the fractional parts of
     # multiples of the golden ratio, which are distinct.
     q = SINGLE_PRECISION * (0.5 + np.arange(size) * 0.6180339887498949 % 1.0)
     q[:last] += X.T @ problem.free.ravel()
-    z, _ = lemke.solved(M, q, 5 * size)
+    z, _ = lemke(M, q, 5 * size)
     return None if z is None else (X @ z[:last]).reshape(1 + k, m)
+
+
+def lemke(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
+    """Return z (n,) by Lemke's pivoting method (Lemke, 1965), with ``w = M z + q``, ``w >= 0``, ``z >= 0`` and ``w.T z = 0``.
+
+    The pivots end with a solution if M is copositive, if ``q.T v >= 0`` for all solutions v of the homogeneous problem
+    (q = 0), and if no basis is degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
+
+    Parameters
+    ----------
+    M : ndarray (n, n)
+    q : ndarray (n,)
+    most : int
+        Largest number of pivots.
+
+    Returns
+    -------
+    z : ndarray (n,) or None
+        The solution; None if the pivots end on a ray, or if their number exceeds `most`.
+    count : int
+        Number of pivots.
+    """
+    n, z = len(q), np.zeros(len(q))
+    if not (q < 0.0).any():
+        return z, 0
+    # Rows: basic variables as affine functions of the nonbasic ones. The variable w_i has the number i, z_i the number n + i,
+    # and the artificial variable the number 2 n.
+    table = np.column_stack([M, np.ones(n), q])
+    basic, others = np.arange(n), np.arange(n, 2 * n + 1)
+    row, column = int(q.argmin()), n
+    for count in range(1, most + 1):
+        _exchange(table, row, column)
+        leaving = int(basic[row])
+        basic[row], others[column] = others[column], leaving
+        if leaving == 2 * n:
+            in_basis = basic >= n
+            z[basic[in_basis] - n] = np.maximum(table[in_basis, -1], 0.0)
+            return z, count
+        column = int(np.flatnonzero(others == (leaving + n if leaving < n else leaving - n))[0])
+        blocking = _blocking(table, basic, column)
+        if blocking is None:
+            return None, count
+        row = blocking
+    return None, most
+
+
+def _exchange(table: Array, row: int, column: int) -> None:
+    """Pivot in place: exchange the basic variable of `row` with the nonbasic variable of `column`."""
+    at, factors = table[row, column], table[:, column].copy()
+    table[:, column], factors[row] = 0.0, 0.0
+    table[row] /= -at
+    table[row, column] = 1.0 / at
+    table += factors[:, None] * table[row]
+
+
+def _blocking(table: Array, basic: Indices, column: int) -> int | None:
+    """Return the row whose basic variable vanishes first as the nonbasic variable of `column` grows (ratio test).
+
+    None if no basic variable decreases. Among rows with the same ratio, the row of the artificial variable has priority, then
+    the row with the largest pivot.
+    """
+    slope = -table[:, column]
+    falling = np.flatnonzero(slope > ROUND_OFF * np.abs(slope).max())
+    if not len(falling):
+        return None
+    ratio = np.maximum(table[falling, -1], 0.0) / slope[falling]
+    first = falling[ratio <= ratio.min() * (1.0 + ROUND_OFF)]
+    artificial = first[basic[first] == 2 * len(basic)]
+    return int(artificial[0] if len(artificial) else first[slope[first].argmax()])

@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_array, vstack
 
-from fastcontact.analysis.friction.cone_newton import Forces, newton
-from fastcontact.analysis.friction.coulomb_law import Law
+from fastcontact.analysis.friction.cone_newton import Forces, Law, newton
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, compliance_of_rows, idle
 from fastcontact.analysis.solution import Accuracy
 from fastcontact.analysis.tolerances import RESIDUAL
@@ -76,8 +75,7 @@ def solve(
     try:
         if forces is None or not forces.any():
             sticking = closed if closed.any() else gaps[0] < 0.0
-            equality = constraints.equality
-            state = sticking if equality is None else sticking | equality, sticking
+            state = sticking | constraints.equality, sticking
         else:
             state = problem.law.state(y, gaps)
         # At least one step is necessary, because initial forces and displacements are not in equilibrium.
@@ -117,7 +115,7 @@ class Eliminated:
     def __init__(
         self, loaded: LoadedNonsymmetric, constraints: Constraints, u: Array, tolerance: float, inexact: bool
     ) -> None:
-        usable, mu = constraints.usable, constraints.coefficients
+        usable, mu = constraints.usable, constraints.friction
         rows, free = (constraints.B, *constraints.tangents), constraints.gaps_at_rest()
         self._loaded, self._usable, self._tolerance = loaded, usable, tolerance
         self._inexact, self._last = inexact, tolerance
@@ -141,8 +139,7 @@ class Eliminated:
         self._slips = ~still | moved
         softer = SOFTER / np.sqrt(max(1.0, loaded.contrast / MILD))
         self._unit = np.sqrt(1.0 / (np.where(compliance[0, 0] > 0.0, compliance[0, 0], 1.0) / softer + self._gives[0]))
-        equality = constraints.equality
-        self.law = Law(np.where(usable, mu, 0.0), None if equality is None else equality & usable)
+        self.law = Law(np.where(usable, mu, 0.0), constraints.equality & usable)
         self.u = u
         self.round_off = float(
             16 * np.finfo(float).eps * np.abs(self._unit * self._gaps(u))[:, usable].max(initial=0.0)

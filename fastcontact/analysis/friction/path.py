@@ -147,7 +147,7 @@ def friction_work(before: Array, normal: Array, tangential: Array, slip: Array) 
 def shifted(constraints: Constraints, slid: Slid) -> Constraints:
     """Return the constraints with slips measured from the beginning of the last increment."""
     before = np.stack([(slid.slip * tangent).sum(axis=1) for tangent in constraints.directions])
-    return replace(constraints, slip0=-before if constraints.slip0 is None else constraints.slip0 - before)
+    return replace(constraints, slip0=constraints.slip0 - before)
 
 
 def completed(solution: Solution, slid: Slid) -> Solution:

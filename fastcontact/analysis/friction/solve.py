@@ -16,10 +16,10 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from scipy.linalg import lstsq
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.analysis.friction import dense, eliminated
+from fastcontact.analysis.friction.cone_newton import Law
 from fastcontact.analysis.friction.path import along
 from fastcontact.analysis.friction.slip_directions import GIVING, aligning, idle, own_compliance
 from fastcontact.analysis.solution import Accuracy, Path, Response, Slid, Solution, response
@@ -70,8 +70,7 @@ def solve(
             return equilibrium
         log.info("friction: the iteration on eliminated constraints did not converge, their compliance is formed")
     usable = constraints.usable
-    begun = closed if constraints.equality is None else closed | constraints.equality
-    begun = begun if path is None else begun | ~path.waiting
+    begun = closed | constraints.equality if path is None else closed | constraints.equality | ~path.waiting
     chosen = usable if together else usable & begun
     iterations = 0
     while True:
@@ -172,18 +171,16 @@ def _among(
         F[still, still] = np.where(moved, GIVING * C[0, 0], np.diag(F).max())[idle_slips]
         free[1:][idle_slips & ~moved] = 0.0
         begin[1:][idle_slips], closing[1:][idle_slips] = 0.0, 0.0
-    equations = np.zeros(len(rows), bool) if constraints.equality is None else constraints.equality[rows]
-
-    mu = constraints.coefficients[rows]
+    mu, equations = constraints.friction[rows], constraints.equality[rows]
     if path is None:
-        result, before = _on_delassus_operator(F, free, mu, closed[rows], equations, start), None
+        result, before = dense.solve(F, free, mu, closed[rows], start, equations), None
         relative = result.gaps
     else:
         lag = -free - (F @ begin.ravel()).reshape(free.shape)
         lag[0] += closing[0]
 
         def increment(beside: Array, among: Mask, closed: Mask, start: Array | None) -> dense.Forces:
-            return _on_part_of_delassus_operator(F, free + beside, mu, among, closed, equations, start)
+            return _with_forces_among(F, free + beside, mu, among, closed, equations, start)
 
         result, relative, before = along(lag, closing, begin, path.waiting[rows], increment)
     y = result.y
@@ -204,12 +201,12 @@ def _among(
     return Solution(
         u, full[0], gaps[0], active, active, result.settled, result.iterations, full[1:].T, gaps[1:].T, sticking,
         result.residual, constraints.directions, slid=None if before is None else _slid(before, Q, rows, constraints),
-        response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, mu, at_end)),
+        response=partial(_response, loaded, (R, rows, Q), idle_slips, (F, Law(mu, equations), at_end)),
     )  # fmt: skip
 
 
 def _response(
-    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held: Mask, forces: tuple[Array, Array, dense.Forces]
+    loaded: Loaded, among: tuple[csr_array, Indices, csr_array | None], held: Mask, forces: tuple[Array, Law, dense.Forces]
 ) -> Response:  # fmt: skip
     """Return the linear response of a solution to additional forces and gaps.
 
@@ -276,40 +273,14 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
         F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
 
 
-def _on_delassus_operator(
-    F: Array, free: Array, friction: Array, closed: Mask, equality: Mask, start: Array | None
+def _with_forces_among(
+    F: Array, free: Array, mu: Array, among: Mask, closed: Mask, equality: Mask, start: Array | None
 ) -> dense.Forces:
-    """Return the solution of `dense.solve`, where constraints that are equations are eliminated first.
-
-    `equality` (m,) are these constraints; the other parameters are those of `dense.solve`.
-    """
-    if not equality.any():
-        return dense.solve(F, free, friction, closed, start)
-    index = np.arange(free.size).reshape(free.shape)
-    h, r = index[0, equality], index[:, ~equality].ravel()
-    give = lstsq(F[np.ix_(h, h)], np.column_stack([F[np.ix_(h, r)], free.ravel()[h]]))[0]
-    rest = free.ravel()[r] - F[np.ix_(r, h)] @ give[:, -1]
-    remaining = F[np.ix_(r, r)] - F[np.ix_(r, h)] @ give[:, :-1]
-    start = None if start is None else start[:, ~equality]
-    forces = dense.solve(remaining, rest.reshape(len(free), -1), friction[~equality], closed[~equality], start)
-    y, gaps = np.zeros(free.shape), np.zeros(free.shape)
-    y[:, ~equality], gaps[:, ~equality] = forces.y, forces.gaps
-    y[0, equality] = -(give[:, -1] + give[:, :-1] @ forces.y.ravel())
-    now, sticking = equality.copy(), equality.copy()
-    now[~equality], sticking[~equality] = forces.closed, forces.sticking
-    return replace(forces, y=y, gaps=gaps, closed=now, sticking=sticking)
-
-
-def _on_part_of_delassus_operator(
-    F: Array, free: Array, friction: Array, among: Mask, closed: Mask, equality: Mask, start: Array | None
-) -> dense.Forces:
-    """Return the solution of `_on_delassus_operator` if only the constraints `among` (m,) carry forces."""
+    """Return the solution of `dense.solve` if only the constraints `among` (m,) carry forces."""
     rows = np.flatnonzero(among)
     unknown = (np.arange(len(free))[:, None] * len(among) + rows).ravel()
     start = None if start is None else start[:, rows]
-    part = _on_delassus_operator(
-        F[np.ix_(unknown, unknown)], free[:, rows], friction[rows], closed[rows], equality[rows], start
-    )
+    part = dense.solve(F[np.ix_(unknown, unknown)], free[:, rows], mu[rows], closed[rows], start, equality[rows])
     y = np.zeros_like(free)
     y[:, rows] = part.y
     now, sticking = np.zeros((2, len(among)), bool)

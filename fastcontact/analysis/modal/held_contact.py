@@ -128,12 +128,11 @@ def _conditions(
         if directions:
             yield _along(directions, tied.rows[1:], np.arange(n), owners, areas)
         return
-    always = np.zeros(len(part), bool) if part.equality is None else part.equality
-    closed = abs(moments) @ always.astype(float) > 0.0
+    closed = abs(moments) @ part.equality.astype(float) > 0.0
     sticking = np.zeros(len(closed), bool)
     if contact is not None:
         closed |= contact.active[node]
-        rubs = abs(moments) @ (part.coefficients > 0.0).astype(float) > 0.0
+        rubs = abs(moments) @ (part.friction > 0.0).astype(float) > 0.0
         sticking = (contact.active & (contact.sticking | hold_sliding))[node] & rubs
     held, stuck = np.flatnonzero(closed), np.flatnonzero(sticking)
     tested = csr_array(moments[held])

@@ -213,8 +213,7 @@ class Formulation(ABC):
             before = _at_places(at.elastic_slip, constraints.positions)
             given = np.stack([-np.einsum("md,md->m", t, before) for t in constraints.directions])
             constraints = replace(constraints, elastic_slip=given)
-        if constraints.friction is not None and at.friction_factor != 1.0:
-            constraints = replace(constraints, friction=at.friction_factor * constraints.friction)
+        constraints = replace(constraints, friction=at.friction_factor * constraints.friction)
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
@@ -295,12 +294,10 @@ class Formulation(ABC):
         order = np.argsort(points)
         return np.asarray(order[np.searchsorted(points, constraints.nodes[: moments.shape[0]], sorter=order)])
 
-    def never_opening(self, positions: Array, at: Configuration) -> Mask | None:
-        """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]; None if all can."""
-        if self.options.always_closed:
-            return np.ones(len(positions), bool)
+    def never_opening(self, positions: Array, at: Configuration) -> Mask:
+        """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
         if at.never_opening is None:
-            return None
+            return np.full(len(positions), self.options.always_closed)
         return np.asarray(_at_places(at.never_opening, positions))
 
     def facing(self, candidates: Candidates, at: Configuration, tolerance: float | None = None) -> Pairing:
@@ -414,7 +411,7 @@ class Formulation(ABC):
 
     def slips(
         self, candidates: Candidates, pairing: Pairing, directions: Sequence[Array], at: Configuration
-    ) -> tuple[tuple[csr_array, ...], Array | None]:
+    ) -> tuple[tuple[csr_array, ...], Array]:
         """Return the slips of candidates in the load step, as an affine function of the displacements.
 
         Parameters
@@ -429,12 +426,12 @@ class Formulation(ABC):
         -------
         rows : tuple of k csr_array (n, n_dofs)
             Derivatives of the slips along each tangent with respect to the displacements [-].
-        slip0 : ndarray (k, n) or None
+        slip0 : ndarray (k, n)
             Minus the motion of a rigid primary side in the step; between two bodies, minus the tangential displacement that
-            closes the gap, if `slip` is ``"symmetric"`` [length]. None means zero.
+            closes the gap, if `slip` is ``"symmetric"`` [length].
         """
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
-        slip0: Array | None = None
+        slip0 = np.zeros((len(along), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
             slip0 = -np.stack([t @ at.obstacle_motion for t in directions])
             turning = self.turning(candidates, at)
@@ -668,7 +665,7 @@ class Formulation(ABC):
         directions = tangents(pairing.normal)
         rows, slip0 = self.slips(nodes, pairing, directions, at)
         along = np.stack([row @ (at.displacement - at.start).ravel() for row in rows])
-        along += 0.0 if slip0 is None else slip0
+        along += slip0
         slip = np.einsum("kn,knd->nd", along, np.stack(directions))
         return np.where(pairing.paired[:, None], slip, 0.0)
 

@@ -288,6 +288,6 @@ class PressureFieldFormulation(Formulation):
                 )
                 factor = components[:, :, None] * Z
                 pressure, shear = (np.linalg.norm(part, axis=(0, 1)) for part in (factor[:1], factor[1:]))
-                factor[0, :, pressure > PART_OF_CONE * constraints.coefficients.max() * shear] = 0.0
+                factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
         return np.concatenate(factors, axis=2) if factors else None

@@ -151,7 +151,7 @@ class Continuous(PressureFieldFormulation):
         at_axis = self._at_axis
         pairing.paired[~(areas > ROUND_OFF * areas.max()) & ~at_axis] = False
         constraints = self.of_points(self._candidates, pairing, self._field, at)
-        if constraints.friction is not None and at_axis.any():  # There is no slip on the axis.
+        if at_axis.any():  # There is no slip on the axis.
             constraints = replace(constraints, friction=np.where(at_axis, 0.0, constraints.friction))
         return constraints
 

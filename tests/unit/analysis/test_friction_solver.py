@@ -10,7 +10,7 @@ from scipy.sparse.linalg import splu
 
 import fastcontact as fc
 from fastcontact.analysis import newton, step_halving
-from fastcontact.analysis.friction import cone_newton, dense, lemke
+from fastcontact.analysis.friction import cone_newton, dense
 from fastcontact.analysis.friction import solve as friction
 from fastcontact.analysis.friction.slip_directions import aligning, compliance_of_rows, idle, own_compliance
 from fastcontact.contact.configuration import Configuration
@@ -171,7 +171,7 @@ def test_pivots_against_all_bases():
         n = 5
         A = rng.normal(size=(n, n))
         M, q = A @ A.T + 0.1 * np.eye(n) + (A - A.T), rng.normal(size=n)
-        z, _ = lemke.solved(M, q, 100)
+        z, _ = dense.lemke(M, q, 100)
         wanted = None
         for basis in itertools.product([False, True], repeat=n):
             on, x = np.flatnonzero(basis), np.zeros(n)
@@ -182,8 +182,8 @@ def test_pivots_against_all_bases():
 
 
 def test_pivots_tell_a_problem_without_a_solution():
-    assert lemke.solved(np.array([[-1.0]]), np.array([-1.0]), 10)[0] is None
-    z, count = lemke.solved(np.array([[1.0]]), np.array([2.0]), 10)
+    assert dense.lemke(np.array([[-1.0]]), np.array([-1.0]), 10)[0] is None
+    z, count = dense.lemke(np.array([[1.0]]), np.array([2.0]), 10)
     assert (z.tolist(), count) == ([0.0], 0)
 
 
@@ -191,10 +191,10 @@ def test_pivots_are_counted():
     n = 6
     A = np.random.default_rng(1).normal(size=(n, n))
     problem = A @ A.T + np.eye(n), -np.ones(n)
-    z, needed = lemke.solved(*problem, 1000)
+    z, needed = dense.lemke(*problem, 1000)
     assert z is not None
     assert needed > 1
-    assert lemke.solved(*problem, needed - 1)[0] is None
+    assert dense.lemke(*problem, needed - 1)[0] is None
 
 
 def test_compliance_of_rows_against_dense_products():
