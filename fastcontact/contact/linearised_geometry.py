@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -40,19 +40,6 @@ from fastcontact.contact.surface import Surface
 from fastcontact.linear.sparse_rows import shapes_at
 from fastcontact.mesh import elements
 from fastcontact.round_off import DIFFERENCES, TINY
-
-
-class Linearised(Protocol):
-    """Contact forces, gaps and slips of one pair, linearised at its pairing, and at multipliers and displacements."""
-
-    def along(self, du: Array) -> tuple[Array, Array]:
-        """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
-        ...
-
-
-# A function of the multipliers (m,) and tangential forces (m, k) [force] and the displacements (n_points, dim) [length] of
-# the solution.
-Geometry = Callable[[Array, Array, Array], Linearised]
 
 
 class NodalNormals:
@@ -391,9 +378,8 @@ class Slips:
         return np.einsum("nk,knd->nd", self.forces, self.tangents)
 
     def along(
-        self, du: Array, varied: Variation, points: Points, weights: csr_array | None, normal: tuple[Array, Array],
-        primary: Array | None = None,
-    ) -> Array:  # fmt: skip
+        self, du: Array, varied: Variation, points: Points, weights: csr_array, normals: tuple[Array, Array, Array]
+    ) -> Array:
         """Return how slips (k, n) vary with displacements [length].
 
         Parameters
@@ -403,27 +389,23 @@ class Slips:
         varied : Variation
             Variation of `points`.
         points : Points
-        weights : csr_array (n, n_points), optional
-            Weights of the points in the slips; by default each slip belongs to one point.
-        normal : (ndarray (n, dim), ndarray (n, dim))
-            Normals of the constraints, and how they vary.
-        primary : ndarray (n, dim), optional
-            How the `primary` normals of `closing` vary; as `normal` by default.
+        weights : csr_array (n, n_points)
+            Weights of the points in the slips.
+        normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
+            Normals of the constraints, how they vary, and how the `primary` normals of `closing` vary.
         """
 
         def faced(values: Array) -> Array:
-            moved = -np.einsum("nid,ni->nd", points.slopes(values), varied.xi)
-            return np.asarray(moved if weights is None else weights @ moved)
+            return np.asarray(-(weights @ np.einsum("nid,ni->nd", points.slopes(values), varied.xi)))
 
-        change = faced(self.motion)
+        change, (normal, turned, primary) = faced(self.motion), normals
         if self.turning is not None:
-            shared = points.motion @ du @ self.turning
-            change -= shared if weights is None else weights @ shared
+            change -= weights @ (points.motion @ du @ self.turning)
         if self.closing is not None:
-            change += self.closing.along(du, normal, normal[1] if primary is None else primary, faced(self.start))
-        leaning = np.einsum("nd,nd->n", normal[0], self.total)
+            change += self.closing.along(du, (normal, turned), primary, faced(self.start))
+        leaning = np.einsum("nd,nd->n", normal, self.total)
         return np.einsum("knd,nd->kn", self.tangents, change) - np.einsum(
-            "knd,nd,n->kn", self.tangents, normal[1], leaning
+            "knd,nd,n->kn", self.tangents, turned, leaning
         )
 
 
@@ -436,74 +418,52 @@ def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: 
 
 
 @dataclass(frozen=True, eq=False)
-class PointForces:
-    """`Linearised` for forces (n,) at paired points, whose constraints are the `rows` (n,) of m.
-
-    `smooth` are the primary normals of the slips, where they are not those of the points.
-    """
-
-    points: Points
-    rows: Indices
-    m: int
-    multiplier: Array
-    slips: Slips | None = None
-    smooth: tuple[InterpolatedNormals, Array] | None = None
-
-    def along(self, du: Array) -> tuple[Array, Array]:
-        """See `Linearised`."""
-        points, normal, slips = self.points, self.points.normal, self.slips
-        varied = points.along(du)
-        gap = np.einsum("nd,nd->n", points.apart, varied.normal) - np.einsum("nd,nd->n", normal, varied.foot)
-        gaps = np.zeros((1 if slips is None else 1 + len(slips.tangents), self.m))
-        gaps[0, self.rows] = gap
-        if slips is not None:
-            primary = varied.normal
-            if self.smooth is not None:
-                primary = self.smooth[0].along(du) + np.einsum("nid,ni->nd", self.smooth[1], varied.xi)
-            gaps[1:, self.rows] = slips.along(du, varied, points, None, (normal, varied.normal), primary)
-        tangential = None if slips is None else slips.force
-        force = self.multiplier[:, None] * normal
-        force = force if tangential is None else force + tangential
-        return points.spread(force, _turned(self.multiplier, tangential, normal, varied.normal), varied.xi), gaps
-
-
-@dataclass(frozen=True, eq=False)
-class WeightedForces:
-    """`Linearised` for forces (m,) of gaps that are weighted over n points.
+class Linearised:
+    """Contact forces, gaps and slips of one pair, linearised at its pairing, and at multipliers and displacements.
 
     Attributes
     ----------
     side : Surface
         The secondary side.
     points : Points
-    functions, tests : csr_array (m, n)
-        Weights of the points in the gaps, divided by the weight of each constraint, and in the mean normals.
+    functions : csr_array (m, n)
+        Weights of the n points in the gaps, divided by the weight of each constraint; one where
+        each gap is that of one point.
     normal : ndarray (m, dim)
         Normals of the constraints.
     multiplier : ndarray (m,)
+    tests : csr_array (m, n), optional
+        Weights of the points in the mean normals, if these are the normals of the constraints.
     nodal : NodalNormals or Points, optional
-        Source of the normals of the constraints if they are not means over the points.
+        Source of the normals of the constraints if they are neither means over the points nor those of the points.
     slips : Slips, optional
+    smooth : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
+        Primary normals of the slips, and their derivatives along facets, where they are not those of the points.
     """
 
     side: Surface
     points: Points
     functions: csr_array
-    tests: csr_array
     normal: Array
     multiplier: Array
+    tests: csr_array | None = None
     nodal: NodalNormals | Points | None = None
     slips: Slips | None = None
+    smooth: tuple[InterpolatedNormals, Array] | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
-        """See `Linearised`."""
+        """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
         varied = self.points.along(du)
         normal = self._normals(du, varied.normal)
         gaps = np.einsum("md,md->m", self.functions @ self.points.apart, normal)[None]
         gaps -= np.einsum("md,md->m", self.normal, self.functions @ varied.foot)
         if self.slips is not None:
-            slips = self.slips.along(du, varied, self.points, self.functions, (self.normal, normal))
-            gaps = np.vstack([gaps, slips])
+            primary = normal
+            if self.smooth is not None:
+                turned = self.smooth[0].along(du) + np.einsum("nid,ni->nd", self.smooth[1], varied.xi)
+                primary = self.functions @ turned
+            normals = self.normal, normal, primary
+            gaps = np.vstack([gaps, self.slips.along(du, varied, self.points, self.functions, normals)])
         tangential = None if self.slips is None else self.slips.force
         force = self.functions.T @ _turned(self.multiplier, tangential, self.normal, normal)
         return self.points.spread(self._force, force, varied.xi), gaps
@@ -522,6 +482,8 @@ class WeightedForces:
 
     def _normals(self, du: Array, at_points: Array) -> Array:
         """Return how the normals (m, dim) of the constraints vary, from the variation of those at the points (n, dim)."""
+        if self.tests is None:
+            return np.asarray(self.functions @ at_points)
         if isinstance(self.nodal, NodalNormals):
             return -self.nodal.along(du)
         if self.nodal is not None:
@@ -530,9 +492,15 @@ class WeightedForces:
 
     def _mean(self, vectors: Array) -> Array:
         """Return integrals (m, dim) of vectors at the points (n, dim) with the tests of nodes."""
+        assert self.tests is not None
         total = np.asarray(self.tests @ vectors)
         self.side.add_across_ends(total)
         return total
+
+
+# A function of the multipliers (m,) and tangential forces (m, k) [force] and the displacements (n_points, dim) [length] of
+# the solution.
+Geometry = Callable[[Array, Array, Array], Linearised]
 
 
 def faced(

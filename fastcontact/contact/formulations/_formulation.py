@@ -21,8 +21,8 @@ from fastcontact.contact.linearised_geometry import (
     Closing,
     Geometry,
     InterpolatedNormals,
+    Linearised,
     NodalNormals,
-    PointForces,
     Slips,
     faced,
 )
@@ -365,14 +365,16 @@ class Formulation(ABC):
             return None
         coordinates = self.points + at.displacement
 
-        def linearised(multiplier: Array, tangential: Array, displacement: Array) -> PointForces:
-            rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
+        def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
+            acts = pairing.paired & (multiplier != 0.0)
+            rows = np.flatnonzero(acts)
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
-            forces = PointForces(points, rows, len(multiplier), multiplier[rows])
+            of_points = csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(len(acts), len(rows)))
+            forces = Linearised(self.secondary, points, of_points, of_points @ points.normal, multiplier)
             if not directions:
                 return forces
-            moved = replace(at, displacement=displacement)
-            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
+            moved, motion = replace(at, displacement=displacement), csr_array(of_points @ points.motion)
+            slips = self._sliding(motion, np.where(acts[:, None], directions, 0.0), tangential, moved)
             if not isinstance(self.primary, Surface) or self.slip != "symmetric":
                 return replace(forces, slips=slips)
             averaged, smooth = points.averaged, None
@@ -383,8 +385,8 @@ class Formulation(ABC):
             local = np.zeros(len(coordinates), np.intp)
             local[self.secondary.points] = np.arange(len(self.secondary.points))
             nodal = NodalNormals(self.secondary, coordinates)
-            opposite = InterpolatedNormals(nodal, local[candidates.nodes[rows]], candidates.shape[rows])
-            closing = Closing.of(averaged.normal, opposite, points.motion @ slips.start)
+            opposite = InterpolatedNormals(nodal, local[candidates.nodes], candidates.shape)
+            closing = Closing.of(of_points @ averaged.normal, opposite, motion @ slips.start)
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
             return replace(forces, slips=slips, smooth=smooth)
 

@@ -34,7 +34,7 @@ from fastcontact.contact.formulations._dual_basis import COVERED, dual_functions
 from fastcontact.contact.formulations._formulation import Formulation
 from fastcontact.contact.formulations._overlap import Overlap, OverlapPoints, obstacle_overlap
 from fastcontact.contact.integration import areas_of_rule, nodal_areas
-from fastcontact.contact.linearised_geometry import Closing, NodalNormals, Points, WeightedForces, faced
+from fastcontact.contact.linearised_geometry import Closing, Linearised, NodalNormals, Points, faced
 from fastcontact.contact.obstacles.rigid_side import Pose, RigidSide
 from fastcontact.contact.pairing import Candidates, Normals, filled_up, pair, tangents
 from fastcontact.contact.projection import facet_normals, nodal_normals, smooth_normals
@@ -176,7 +176,7 @@ class WeightedMortar(Formulation):
     def _linearised(
         self, at: Configuration, coverage: Coverage, normal: Array, weight: Array, multiplier: Array, tangential: Array,
         displacement: Array, slipping: tuple[Array, csr_array, Array] | None = None,
-    ) -> WeightedForces:  # fmt: skip
+    ) -> Linearised:  # fmt: skip
         """Return the linearisation of contact forces, mean gaps and slips; see `linearised_geometry`.
 
         `slipping` are tangents (k, m, dim), mean relative motions (m, n_points), and lengths by which gaps close (m,). Where
@@ -217,7 +217,7 @@ class WeightedMortar(Formulation):
             if not isinstance(self.primary, RigidSide) and self.slip == "symmetric":
                 closing = Closing.of(normal, NodalNormals(self.secondary, deformed), motion @ slips.start, length)
                 slips = replace(slips, total=slips.total + closing.vector, closing=closing)
-        return WeightedForces(self.secondary, points, weighted, mean, normal, multiplier, own_normals, slips)
+        return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
 
     def _whole_facets(self, block: FacetBlock) -> OverlapPoints:
         """Return Gauss points of whole facets."""
