@@ -185,7 +185,7 @@ def save_contact_history(problem: Problem, start: State, load: StepLoad, settled
             # Points that have slid beyond the other side may return to it.
             closed = solution.active[rows] | part.equality
             never_opening[name] = part.positions, closed
-        compliant = part.compliance is not None or part.tangential_softness is not None
+        compliant = part.compliance is not None or part.tangential_softness.any()
         if compliant and part.tangents:
             slips = part.elastic_slips(solution.multiplier[rows], solution.tangential[rows])
             elastic_slip[name] = part.positions, slips

@@ -87,17 +87,14 @@ class SharedNodes:
             "slip0": self._mean(constraints.slip0.T, self.along).T,
             "friction": self.summed(self.part * constraints.friction),
         }
-        if constraints.softness is not None:
-            total = self.summed(_stiffness(constraints.softness))
-            merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-        slides = self.along > 0.0
-        if constraints.tangential_softness is not None:
-            stiffness = np.where(slides, _stiffness(constraints.tangential_softness), 0.0)
+        total = self.summed(_stiffness(constraints.softness))
+        merged["softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
+        if constraints.tangential_softness.any():
+            stiffness = np.where(self.along > 0.0, _stiffness(constraints.tangential_softness), 0.0)
             total = self.summed(stiffness)
             merged["tangential_softness"] = np.divide(1.0, total, out=np.zeros_like(total), where=total > 0.0)
-            if constraints.elastic_slip is not None:
-                weight = np.divide(stiffness, total[self.place], out=np.ones_like(total), where=np.isfinite(stiffness))
-                merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
+            weight = np.divide(stiffness, total[self.place], out=np.ones_like(total), where=np.isfinite(stiffness))
+            merged["elastic_slip"] = self._mean(constraints.elastic_slip.T, weight).T
         return replace(constraints, **merged).without(self.idle)  # type: ignore[arg-type]
 
     def _at_places(self, weight: Array) -> csr_array:
@@ -219,10 +216,9 @@ def _parts(constraints: StackedConstraints, representative: Indices) -> tuple[Ar
     m = len(representative)
     several = np.bincount(representative, minlength=m)[representative] > 1  # others need not have an area
     weight = np.where(several, _areas(constraints), 1.0)
-    if constraints.softness is not None:
-        hard = constraints.softness == 0.0
-        held = np.bincount(representative, hard, minlength=m)[representative] > 0
-        weight = np.where(several & ~held, _stiffness(constraints.softness), np.where(hard | ~several, weight, 0.0))
+    hard = constraints.softness == 0.0
+    held = np.bincount(representative, hard, minlength=m)[representative] > 0
+    weight = np.where(several & ~held, _stiffness(constraints.softness), np.where(hard | ~several, weight, 0.0))
     fraction = weight / np.bincount(representative, weight, minlength=m)[representative]
     if not constraints.tangents:
         return fraction, fraction
@@ -242,7 +238,7 @@ def _nodes(constraints: StackedConstraints) -> Indices:
     """Return the node of each constraint (m,), -1 without one or where a compliance couples it with others."""
     nodes = []
     for part in constraints.parts.values():
-        coupled = part.compliance is not None or part.low_rank_compliance is not None
+        coupled = part.coupled
         nodes.append(np.full(len(part), -1) if part.nodes is None or coupled else part.nodes)
     return np.concatenate(nodes).astype(np.intp)
 
@@ -261,8 +257,7 @@ def _alike(constraints: StackedConstraints) -> tuple[Indices, Indices, Indices]:
     alike &= ~(constraints.equality[first] | constraints.equality[second])
     first, second = first[alike], second[alike]
     level = constraints.gap0[second] - constraints.gap0[first] <= LENGTH_ROUND_OFF * np.abs(constraints.positions).max()
-    yields = np.zeros(len(constraints), bool) if constraints.softness is None else constraints.softness > 0.0
-    behind = np.setdiff1d(second[~level & ~yields[first]], [])
+    behind = np.setdiff1d(second[~level & (constraints.softness[first] == 0.0)], [])
     first, second = first[level], second[level]
     kept = ~(np.isin(first, behind) | np.isin(second, behind))
     return first[kept], second[kept], behind

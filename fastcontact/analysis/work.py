@@ -259,15 +259,10 @@ def _stored(constraints: Constraints, normal: Array, tangents: Array, give: Arra
     `normal` (m,) and `tangents` (m, k) are normal and tangential forces [force], and `give` (m,) the penetrations under the
     normal forces [length].
     """
-    total = float(normal @ give)
-    if constraints.tangential_softness is not None:
-        total += float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
-    if constraints.low_rank_compliance is not None:
-        all_forces = np.column_stack([normal, tangents]).T
-        total += float(
-            (np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)]) ** 2).sum()
-        )
-    return 0.5 * total
+    total = float(normal @ give) + float(constraints.tangential_softness @ (tangents**2).sum(axis=1))
+    all_forces = np.column_stack([normal, tangents]).T
+    along = np.einsum("am,amh->h", all_forces, constraints.low_rank_compliance[: len(all_forces)])
+    return 0.5 * (total + float((along**2).sum()))
 
 
 def _relative(pair: Formulation, at: Configuration) -> Array:

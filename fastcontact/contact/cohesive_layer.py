@@ -100,6 +100,7 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying:
     secant[0, opening < 0.0] = 1.0
     falls = intact & (damage > (0.0 if law.reversible else before.damage)) & (secant > LEVEL)
     slope = np.where(falls, LEVEL, secant)
+    unused = np.empty(0)
     layer = Layer(law, constraints.directions, constraints.areas, before, damage, now, now * (1.0 - secant / slope))
     return replace(
         constraints,
@@ -110,6 +111,7 @@ def bonded(law: CohesiveLaw, constraints: Constraints, at: Configuration, lying:
         positions=np.tile(constraints.positions, (len(now), 1)),
         areas=np.tile(constraints.areas, len(now)),
         nodes=None if constraints.nodes is None else np.tile(constraints.nodes, len(now)),
-        compliance=None, tangents=(), directions=(), slip0=np.empty(0), friction=np.empty(0), tied=layer,
+        compliance=None, tangents=(), directions=(), tied=layer,
+        friction=unused, slip0=unused, tangential_softness=unused, elastic_slip=unused, low_rank_compliance=unused,
         branches=(falls + 2 * (opening < 0.0) + 4 * ~intact).ravel().astype(np.int8),
     ).without(np.concatenate([none > 0.0, *[~intact] * len(along)]))  # fmt: skip

@@ -6,7 +6,7 @@ secondary nodes, and k the number of tangents: one in 2D, two in 3D, none withou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -201,14 +201,14 @@ class Constraints:
         Coefficients of friction [-].
     equality : ndarray of bool (m,)
         Constraints that are equations, with multipliers of either sign.
-    softness : ndarray (m,), optional
+    softness : ndarray (m,)
         Compliance of each constraint along its normal, in addition to C [length / force].
-    tangential_softness : ndarray (m,), optional
+    tangential_softness : ndarray (m,)
         Compliance of each constraint along its tangents [length / force].
-    elastic_slip : ndarray (k, m), optional
+    elastic_slip : ndarray (k, m)
         Minus the elastic slip of the tangential compliance under the forces at the beginning of the load step. It is added to
         the slip of the step, so that only the change of the forces since then causes elastic slip [length].
-    low_rank_compliance : ndarray (1 + k, m, h), optional
+    low_rank_compliance : ndarray (1 + k, m, h)
         Factor Z of a compliance ``Z @ Z.T`` in addition to C. Its rows belong to the normal forces, then to the forces along
         each tangent.
     driven : ndarray (k, m), optional
@@ -240,10 +240,10 @@ class Constraints:
     friction: Array = field(default_factory=lambda: np.empty(0))
     slip0: Array = field(default_factory=lambda: np.empty(0))
     equality: Mask = field(default_factory=lambda: np.empty(0, bool))
-    softness: Array | None = None
-    low_rank_compliance: Array | None = None
-    tangential_softness: Array | None = None
-    elastic_slip: Array | None = None
+    softness: Array = field(default_factory=lambda: np.empty(0))
+    low_rank_compliance: Array = field(default_factory=lambda: np.empty(0))
+    tangential_softness: Array = field(default_factory=lambda: np.empty(0))
+    elastic_slip: Array = field(default_factory=lambda: np.empty(0))
     areas: Array | None = None
     nodes: Indices | None = None
     nodal: NodalField | None = None
@@ -256,8 +256,14 @@ class Constraints:
     geometry: Geometry | None = None
 
     def __post_init__(self) -> None:
-        m = len(self.gap0)
-        for name, shape in (("friction", (m,)), ("slip0", (len(self.tangents), m)), ("equality", (m,))):
+        k, m = len(self.tangents), len(self.gap0)
+        shapes: dict[str, tuple[int, ...]] = {
+            "slip0": (k, m),
+            "elastic_slip": (k, m),
+            "low_rank_compliance": (1 + k, m, 0),
+        }
+        shapes |= dict.fromkeys(("friction", "equality", "softness", "tangential_softness"), (m,))
+        for name, shape in shapes.items():
             if not (values := getattr(self, name)).size:
                 object.__setattr__(self, name, np.zeros(shape, values.dtype))
 
@@ -272,12 +278,12 @@ class Constraints:
     @property
     def normal_compliance(self) -> Compliance | None:
         """Total compliance along the normals, the sum of C and `softness`; None if it is zero."""
-        return self.compliance if self.softness is None else _Softened(self.compliance, self.softness)
+        return _Softened(self.compliance, self.softness) if self.softness.any() else self.compliance
 
     @property
     def coupled(self) -> bool:
         """Whether a compliance couples different constraints."""
-        return self.compliance is not None or self.low_rank_compliance is not None
+        return self.compliance is not None or self.low_rank_compliance.size > 0
 
     @property
     def finite_areas(self) -> Array:
@@ -311,7 +317,7 @@ class Constraints:
 
     def gaps_at_rest(self) -> Array:
         """Return the gaps, then the slips along each tangent, at u = 0 without contact forces (1 + k, m) [length]."""
-        return np.vstack([self.gap0, self.slip0 if self.elastic_slip is None else self.slip0 + self.elastic_slip])
+        return np.vstack([self.gap0, self.slip0 + self.elastic_slip])
 
     def force(self, multiplier: Array, tangential: Array | None = None) -> Array:
         """Return the nodal contact forces (n_dofs,) for multipliers (m,) and tangential forces (m, k) [force]."""
@@ -336,9 +342,7 @@ class Constraints:
 
         Elastic slips are the tangential components of the product of compliance and forces.
         """
-        slips = np.zeros_like(tangential)
-        if self.tangential_softness is not None:
-            slips += self.tangential_softness[:, None] * tangential
+        slips = self.tangential_softness[:, None] * tangential
         if self.compliance is not None:
             along = self.coupled_directions or self.directions
             forces = multiplier[:, None] * normals(along) + np.einsum("mk,kmd->md", tangential, np.stack(along))
@@ -396,36 +400,34 @@ def stacked(by_pair: Mapping[str, Constraints]) -> StackedConstraints:
         values = {entry.name: getattr(pairs[0], entry.name) for entry in fields(Constraints)}
         return StackedConstraints(**values, parts=by_pair)
     count, nodes = max(len(pair.tangents) for pair in pairs), [pair.nodes for pair in pairs if pair.nodes is not None]
-    numbers, still = [np.zeros(len(pair)) for pair in pairs], [np.zeros((count, len(pair))) for pair in pairs]
+    tangents = [pair.tangents or (csr_array(pair.B.shape),) * count for pair in pairs]
+
+    def joined(name: str) -> Any:
+        return np.concatenate([getattr(pair, name) for pair in pairs])
+
+    def of_tangents(name: str) -> Array:  # zero for pairs without tangents
+        return np.hstack([np.resize(getattr(pair, name), (count, len(pair))) for pair in pairs])
+
+    factors = [np.zeros((1 + count, *pair.low_rank_compliance.shape[1:])) for pair in pairs]
+    for factor, pair in zip(factors, pairs, strict=True):
+        factor[: 1 + len(pair.tangents)] = pair.low_rank_compliance
     return StackedConstraints(
         csr_array(vstack([pair.B for pair in pairs], format="csr")),
-        np.concatenate([pair.gap0 for pair in pairs]),
-        np.vstack([pair.positions for pair in pairs]),
+        joined("gap0"),
+        joined("positions"),
         _BlockDiagonal(pairs) if any(pair.compliance is not None for pair in pairs) else None,
-        tuple(
-            csr_array(vstack([p.tangents[j] if p.tangents else csr_array(p.B.shape) for p in pairs], format="csr"))
-            for j in range(count)
-        ),
+        tuple(csr_array(vstack(along, format="csr")) for along in zip(*tangents, strict=True)),
         _stacked_directions(pairs),
-        np.concatenate([pair.friction for pair in pairs]),
-        np.hstack([pair.slip0 if pair.tangents else zero for pair, zero in zip(pairs, still, strict=True)]),
-        np.concatenate([pair.equality for pair in pairs]),
-        _stacked_values([pair.softness for pair in pairs], numbers),
-        _stacked_low_rank(pairs, count),
-        _stacked_values([pair.tangential_softness for pair in pairs], numbers),
-        _stacked_values([pair.elastic_slip for pair in pairs], still),
+        joined("friction"),
+        of_tangents("slip0"),
+        joined("equality"),
+        joined("softness"),
+        np.stack([block_diag(*component) for component in zip(*factors, strict=True)]),
+        joined("tangential_softness"),
+        of_tangents("elastic_slip"),
         nodes=None if len(nodes) < len(pairs) else np.concatenate(nodes),
         coupled_directions=_stacked_directions(pairs, coupled=True),
         parts=by_pair,
-    )
-
-
-def _stacked_values(values: Sequence[Any], zeros: Sequence[AnyArray]) -> Any:
-    """Return the concatenated values (..., m) of all pairs, with `zeros` for pairs without them; None if no pair has any."""
-    if all(value is None for value in values):
-        return None
-    return np.concatenate(
-        [zero if value is None else value for value, zero in zip(values, zeros, strict=True)], axis=-1
     )
 
 
@@ -441,18 +443,6 @@ def _stacked_directions(pairs: list[Constraints], coupled: bool = False) -> tupl
         )
         for j in range(max(map(len, directions)))
     )
-
-
-def _stacked_low_rank(pairs: list[Constraints], count: int) -> Array | None:
-    """Return the block-diagonal factor Z (1 + count, m, h) of all pairs, where `count` is the number of tangents.
-
-    None if no pair has a `low_rank_compliance`.
-    """
-    if all(pair.low_rank_compliance is None for pair in pairs):
-        return None
-    none = [np.zeros((1 + count, len(pair), 0)) for pair in pairs]
-    factors = [z if p.low_rank_compliance is None else p.low_rank_compliance for p, z in zip(pairs, none, strict=True)]
-    return np.stack([block_diag(*component) for component in zip(*factors, strict=True)])
 
 
 class _Softened:

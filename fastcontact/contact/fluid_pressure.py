@@ -126,7 +126,6 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
     rows = nodes[node] & constraints.usable
     # A force independent of the gap is represented by a linear law of small slope, whose zero lies far beyond the side.
     far = size / SINGLE_PRECISION
-    none = np.zeros(len(constraints))
     B, weights = _along(constraints.B, rows, side, vectors[node])
     strength = np.where(rows, at.fluid_pressure * constraints.areas, 0.0)
     at_nodes = csr_array((strength, (np.arange(len(node)), node)), shape=(len(node), len(nodes)))
@@ -137,7 +136,7 @@ def wetted(constraints: Constraints, at: Configuration, areas: AreaVectors, sour
         softness=np.where(
             rows,
             far / (at.fluid_pressure * constraints.areas),
-            none if constraints.softness is None else constraints.softness,
+            constraints.softness,
         ),
         equality=constraints.equality | rows,
         friction=np.where(rows, 0.0, constraints.friction),

@@ -253,12 +253,7 @@ class Eliminated:
 
 def diagonal_compliance(constraints: Constraints) -> Array:
     """Return the diagonal compliance (1 + k, m) of constraints, along normals and then each tangent [length / force]."""
-    compliance = np.zeros((1 + len(constraints.tangents), len(constraints)))
-    if constraints.softness is not None:
-        compliance[0] = constraints.softness
-    if constraints.tangential_softness is not None:
-        compliance[1:] = constraints.tangential_softness
-    return compliance
+    return np.stack([constraints.softness, *[constraints.tangential_softness] * len(constraints.tangents)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -102,7 +102,9 @@ def _eliminated(
     def beside(offset: Array, among: Mask, closed: Mask, forces: Array | None) -> dense.Forces:
         at = constraints.gaps_at_rest() + offset
         at[0, ~among] += far
-        cone = solved(replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=None), closed, accuracy, forces)
+        cone = solved(
+            replace(constraints, gap0=at[0], slip0=at[1:], elastic_slip=np.empty(0)), closed, accuracy, forces
+        )
         cone.gaps[0, ~among] -= far
         return cone
 
@@ -148,9 +150,9 @@ def _among(
     R = csr_array(vstack([matrix[rows] for matrix in (constraints.B, *constraints.tangents)], format="csr"))
     at_rest = constraints.gaps_at_rest()
     free, F = loaded.delassus(R)
-    if constraints.tangential_softness is not None:  # before idle tangents are detected: compliant ones are not idle
-        slips = np.arange(len(rows), len(F))
-        F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
+    slips = np.arange(len(rows), len(F))
+    # Before idle tangents are detected: compliant ones are not idle.
+    F[slips, slips] += np.tile(constraints.tangential_softness[rows], k)
     Q = aligning(own_compliance(F, 3)) if k == 2 else None
     C = own_compliance(F if Q is None else np.asarray(Q @ (Q @ F).T), 1 + k)
     idle_slips = idle(C)
@@ -266,11 +268,10 @@ def _add_compliance(F: Array, constraints: Constraints, rows: Indices) -> None:
     if constraints.compliance is not None and len(rows):
         frame = np.stack([direction[rows] for direction in constraints.coupled_directions or constraints.directions])
         F += _turned(constraints.compliance.block(rows), frame)
-    if constraints.low_rank_compliance is not None and len(rows):
+    if constraints.low_rank_compliance.size and len(rows):
         Z = constraints.low_rank_compliance[:, rows].reshape(len(F), -1)
         F += Z @ Z.T
-    if constraints.softness is not None:
-        F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
+    F[np.arange(len(rows)), np.arange(len(rows))] += constraints.softness[rows]
 
 
 def _with_forces_among(

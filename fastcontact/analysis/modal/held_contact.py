@@ -157,7 +157,7 @@ def _along(
     return Conditions(stacked, np.tile(owners[kept], count), np.tile(areas[kept], count), tangents, give)
 
 
-def _compliance(tested: csr_array, softness: Array | None) -> csr_array | None:
-    if softness is None or not (tested @ softness).any():
+def _compliance(tested: csr_array, softness: Array) -> csr_array | None:
+    if not (tested @ softness).any():
         return None
     return csr_array(tested @ diags_array(softness) @ tested.T)

@@ -259,14 +259,14 @@ class PressureFieldFormulation(Formulation):
             axes = turning.axes(constraints.positions), turning.axes(self.points[self.secondary.points])
             field = replace(field, axes=axes)
             along = tuple(np.einsum("mde,md->me", axes[0], t) for t in along)
-        undetermined = self._undetermined(field, constraints, along, at) if self.friction else None
+        undetermined = self._undetermined(field, constraints, along, at) if self.friction else np.empty(0)
         return replace(
             constraints, low_rank_compliance=undetermined, areas=field.areas, nodal=field, coupled_directions=along
         )  # fmt: skip
 
     def _undetermined(
         self, field: PressureField, constraints: Constraints, directions: tuple[Array, ...], at: Configuration
-    ) -> Array | None:
+    ) -> Array:
         """Return the factor of a compliance that determines tangential tractions at nodes where both sides are held.
 
         Supports prevent slip there, so that these tractions do no work, and no equation determines them. The compliance makes
@@ -274,7 +274,7 @@ class PressureFieldFormulation(Formulation):
         inclined so much that its component takes a large part of the friction cone, as on facets that meet a plane of
         symmetry at an angle, the support carries it, and the compliance must not act on the pressure: the bodies would
         penetrate. `directions` are the tangents (m, dim) in the axes of the field. See
-        `Constraints.low_rank_compliance`; None if no such node exists.
+        `Constraints.low_rank_compliance`; empty if no such node exists.
         """
         factors = []
         for held, nodes in self.without_slip(at):
@@ -290,4 +290,4 @@ class PressureFieldFormulation(Formulation):
                 pressure, shear = (np.linalg.norm(part, axis=(0, 1)) for part in (factor[:1], factor[1:]))
                 factor[0, :, pressure > PART_OF_CONE * constraints.friction.max() * shear] = 0.0
                 factors.append(factor)
-        return np.concatenate(factors, axis=2) if factors else None
+        return np.concatenate(factors, axis=2) if factors else np.empty(0)
