@@ -28,7 +28,7 @@ LOST = 0.98
 
 def scaled(factor: float, a: AnyArray, b: AnyArray) -> None:
     """Fill `b` (n,) with ``factor * a``, in the precision of b."""
-    np.multiply(a, factor, out=b, dtype=float, casting="same_kind")
+    spread(krylov_kernels.scaled, len(a), WORK_OF_NUMBER, factor, a, b)
 
 
 class Iteration:

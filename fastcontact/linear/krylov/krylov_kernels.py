@@ -65,3 +65,10 @@ def turn(low, high, beta, z, p):
     """Update the search direction: ``p = z + beta p``."""
     for i in range(low, high):
         p[i] = z[i] + beta * p[i]
+
+
+@kernel
+def scaled(low, high, factor, a, b):
+    """Fill `b` with ``factor a``, in the precision of b."""
+    for i in range(low, high):
+        b[i] = factor * a[i]
