@@ -15,10 +15,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import bsr_array, csr_array, diags_array
 
-from fastcontact._jit import parallel
 from fastcontact._jit.norms_kernels import largest
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.elasticity import system_kernels
 from fastcontact.elasticity.multipoint_constraints import Elimination, MultiPointConstraint, eliminate, stacked_rows
 from fastcontact.errors import ModelError
 from fastcontact.round_off import ROUND_OFF
@@ -156,7 +154,7 @@ class System(ConstrainedMotion):
         related[R.indices] = True
         if without_stiffness is None:
             without_stiffness = np.zeros(K.shape[0], bool)
-        diagonal = diagonal_of(K)
+        diagonal = K.diagonal()
         super().__init__(supported | ((diagonal == 0.0) & ~related & ~without_stiffness), relations)
         self._reacting: Mask = self.fixed | related  # supports and constraints may exert forces here
         self._independent, self._without_stiffness = self.free, without_stiffness
@@ -165,27 +163,27 @@ class System(ConstrainedMotion):
     def renewed(self, K: bsr_array) -> System:
         """Return the system with another stiffness K (n, n), which is modified in place, as by the constructor."""
         system = copy.copy(self)
-        system._set_stiffness(K, diagonal_of(K))
+        system._set_stiffness(K, K.diagonal())
         return system
 
     def _set_stiffness(self, K: bsr_array, diagonal_of_K: Array) -> None:
         """Set the stiffness K (n, n), given its diagonal (n,)."""
         self.free = self._independent.copy()
         if self.T is None:
-            self.K = Stiffness(supports_apart(K, self.fixed, diagonal_of_K))
+            self.K = Stiffness(supports_apart(K, self.fixed))
             self.matrix = self.K.parts[0]
             self.weightless: Mask = self.free & (diagonal_of_K == 0.0)
         else:
             self.K = Stiffness((K,))
             transformed = (self.T.T @ csr_array(K) @ self.T).tobsr(K.blocksize)
             transformed.sort_indices()
-            diagonal = diagonal_of(transformed)
+            diagonal = transformed.diagonal()
             # The transformed diagonal without the terms between different components, which may cancel.
             uncancelled = self.T.multiply(self.T).T @ diagonal_of_K
             # Excludes points without stiffness that constraints couple only with each other.
             self.free &= (uncancelled > 0.0) | self._without_stiffness
             self.weightless = self.free & (diagonal <= ROUND_OFF * uncancelled)
-            self.matrix = supports_apart(transformed, ~self.free, diagonal)[0]
+            self.matrix = supports_apart(transformed, ~self.free)[0]
         self._no_unknowns = np.flatnonzero(~self.free)
 
     def keep(self, matrix: Any) -> None:
@@ -247,10 +245,8 @@ class System(ConstrainedMotion):
         return np.where(self._reacting, out, 0.0), largest(residual)
 
 
-def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> tuple[bsr_array, csr_array]:
+def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     """Remove the rows and columns of supported degrees of freedom from K (n, n), in place.
-
-    The `diagonal` (n,) of K may be given if it is known.
 
     Returns
     -------
@@ -260,26 +256,22 @@ def supports_apart(K: bsr_array, fixed: Mask, diagonal: Array | None = None) -> 
         The removed entries: the original K minus `matrix`.
     """
     K = _with_diagonal(K)
-    if diagonal is None:
-        diagonal = diagonal_of(K)
-    pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0))
-    supported = fixed.reshape(-1, K.blocksize[0])
-    arguments = K.indptr, K.indices, K.data, supported, supported.any(axis=1), pivots
-    parts, start = parallel.portions(len(supported)), np.zeros(K.shape[0] + 1, np.int32)
-    columns, removed = np.empty(0, np.int32), np.empty(0)
-    parallel.shared(lambda part: system_kernels.take_out(*arguments, *part, start, columns, removed, False), parts)
-    np.cumsum(start, out=start)
-    columns, removed = np.empty(start[-1], np.int32), np.empty(start[-1])
-    if len(removed):
-        parallel.shared(lambda part: system_kernels.take_out(*arguments, *part, start, columns, removed, True), parts)
-    return K, csr_array((removed, columns, start), shape=K.shape)
-
-
-def diagonal_of(K: bsr_array) -> Array:
-    """Return the diagonal (n,) of a matrix of square blocks, six times as fast as SciPy."""
-    out = np.empty(K.shape[0])
-    system_kernels.diagonal(K.indptr, K.indices, K.data, out)
-    return out
+    diagonal, size = K.diagonal(), K.blocksize[0]
+    pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0)).reshape(-1, size)
+    supported, row = fixed.reshape(-1, size), np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
+    on_support = supported.any(axis=1)
+    near = np.flatnonzero(on_support[row] | on_support[K.indices])
+    row, column, blocks = row[near], K.indices[near], K.data[near]
+    remaining, own = np.zeros_like(blocks), np.flatnonzero(row == column)
+    remaining[own[:, None], range(size), range(size)] = pivots[row[own]]
+    moves = (supported[row][:, :, None] | supported[column][:, None]) & (blocks != remaining)
+    block, i, j = np.nonzero(moves)
+    K.data[near[block], i, j] = remaining[moves]
+    rows = size * row[block] + i
+    order = np.argsort(rows, kind="stable")
+    start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=K.shape[0]))])
+    columns, removed = size * column[block] + j, (blocks - remaining)[moves]
+    return K, csr_array((removed[order], columns[order], start), shape=K.shape)
 
 
 def _with_diagonal(K: bsr_array) -> bsr_array:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bsr_array
+from scipy.sparse import bsr_array, csr_array
 
 from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Mask, Numbers
@@ -63,16 +63,16 @@ class Sparsity:
 def sparsity(mesh: Mesh) -> Sparsity:
     """Return the sparsity of the stiffness matrix of `mesh`."""
     blocks = mesh.solids
-    sizes = np.concatenate([[0], *(np.full(len(b), b.shape[1]) for b in blocks.values())])
-    start = np.cumsum(sizes, dtype=np.int64)
-    nodes = np.concatenate([np.empty(0, np.int32), *(b.ravel() for b in blocks.values())])
-    first, cells = pattern_kernels.cells_at_nodes(start, nodes, mesh.n_points)
-    arguments, portions = (start, nodes, first, cells), parallel.portions(mesh.n_points)
-    count = np.empty(mesh.n_points, np.int32)
-    parallel.shared(lambda portion: pattern_kernels.count_neighbours(*arguments, *portion, count), portions)
-    indptr = np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
-    indices = np.empty(indptr[-1], np.int32)
-    parallel.shared(lambda portion: pattern_kernels.neighbours(*arguments, *portion, indptr, indices), portions)
+    nodes = np.concatenate([np.empty(0, np.int32), *(block.ravel() for block in blocks.values())])
+    lone = np.flatnonzero(np.bincount(nodes, minlength=mesh.n_points) == 0)  # nodes without cells have a diagonal block
+    sizes = np.concatenate(
+        [[0], *(np.full(len(block), block.shape[1]) for block in blocks.values()), np.ones_like(lone)]
+    )
+    nodes = np.concatenate([nodes, lone])
+    of_cells = csr_array((np.ones(len(nodes), bool), nodes, np.cumsum(sizes)), shape=(len(sizes) - 1, mesh.n_points))
+    pattern = csr_array(of_cells.T @ of_cells)
+    pattern.sort_indices()
+    indptr, indices = pattern.indptr, pattern.indices
     return Sparsity(indptr, indices, {name: _slots(block, indptr, indices) for name, block in blocks.items()})
 
 

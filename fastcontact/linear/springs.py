@@ -10,7 +10,6 @@ from numpy.typing import DTypeLike
 from scipy.sparse import csr_array, vstack
 
 from fastcontact.arrays import AnyArray, Indices
-from fastcontact.linear import springs_kernels
 from fastcontact.linear.sparse_rows import scaled
 
 # Relative difference below which two sets of springs, or of weights of eliminated unknowns, are equally good in a
@@ -42,7 +41,9 @@ class Springs:
         if self.through is not None:
             r -= factor * (self.through.T @ (self.stiffness * (R @ u)))
             return
-        springs_kernels.subtract(R.indptr, R.indices, R.data, self.stiffness, r.dtype.type(factor), u, r)
+        row = np.repeat(np.arange(len(self.stiffness)), np.diff(R.indptr))
+        force = r.dtype.type(factor) * self.stiffness * np.bincount(row, R.data * u[R.indices], len(self.stiffness))
+        np.subtract.at(r, R.indices, R.data * force[row])
 
     def beside(self, others: Springs | None) -> Springs:
         """Return these springs together with `others`."""

@@ -21,7 +21,7 @@ from scipy.sparse.csgraph import breadth_first_order, connected_components
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.errors import MeshError
-from fastcontact.mesh import elements, topology_kernels
+from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
 Found = TypeVar("Found")
@@ -75,14 +75,13 @@ def _check_folds(mesh: Mesh) -> None:
             folds.append(_direction(block[:, list(facet)[: elements.get(facet_element).n_corners]].astype(np.int64)))
             owners.append(numbers)
     keys, owner = np.concatenate(folds), np.concatenate(owners)
-    order = np.lexsort(keys.T)
-    same = np.flatnonzero((keys[order[1:]] == keys[order[:-1]]).all(axis=1))
-    if len(same):
-        first, second = sorted((int(owner[order[same[0]]]), int(owner[order[same[0] + 1]])))
-        where = ", ".join(f"{x:.6g}" for x in mesh.points[keys[order[same[0]]][:2]].mean(axis=0))
+    rows, others = equal_rows(keys)
+    if len(rows):
+        first, second = sorted((int(owner[rows[0]]), int(owner[others[0]])))
+        where = ", ".join(f"{x:.6g}" for x in mesh.points[keys[rows[0]][:2]].mean(axis=0))
         raise MeshError(
             f"cells {first} and {second} lie on the same side of the facet between them, near ({where}), one of "
-            f"{len(same)} such pairs: the mesh is folded there; move its nodes or remesh"
+            f"{len(rows)} such pairs: the mesh is folded there; move its nodes or remesh"
         )
 
 
@@ -170,18 +169,28 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
         for facet, facet_element in zip(element.facets, element.facet_elements, strict=True):
             facets_of_kind.setdefault(facet_element, []).append(block[:, list(facet)])
             owners.setdefault(facet_element, []).append(numbers)
-    parent, outer, behind = np.arange(sum(map(len, mesh.cells.values())), dtype=np.int32), {}, {}
+    outer, behind, pairs = {}, {}, [np.empty((2, 0), np.int32)]
     for name, blocks in facets_of_kind.items():
-        facets = np.ascontiguousarray(np.concatenate(blocks))
-        single = np.empty(len(facets), bool)
-        owner = np.concatenate(owners[name])
-        topology_kernels.alone(facets, owner, mesh.n_points, single, parent)
+        facets, owner = np.concatenate(blocks), np.concatenate(owners[name])
+        equal = np.stack(equal_rows(np.sort(facets, axis=1)))
+        single = np.ones(len(facets), bool)
+        single[equal] = False
+        pairs.append(owner[equal])
         if single.any():
-            outer[name], behind[name] = np.ascontiguousarray(facets[single]), owner[single]
+            outer[name], behind[name] = facets[single], owner[single]
             outer[name].setflags(write=False)
-    while not (parent[parent] == parent).all():
-        parent = parent[parent]
-    return MappingProxyType(outer), parent, MappingProxyType(behind)
+    ends, n_cells = np.concatenate(pairs, axis=1), sum(map(len, mesh.cells.values()))
+    graph = coo_array((np.ones(ends.shape[1], np.int8), tuple(ends)), shape=(n_cells, n_cells))
+    label = connected_components(graph, directed=False)[1]
+    lowest = np.unique(label, return_index=True)[1].astype(np.int32)
+    return MappingProxyType(outer), lowest[label], MappingProxyType(behind)
+
+
+def equal_rows(rows: Indices | Numbers) -> tuple[Indices, Indices]:
+    """Return the pairs (n_pairs,), (n_pairs,) of equal `rows` (n, k): m equal rows are in m - 1 pairs, which connect them."""
+    order = np.lexsort(rows.T)
+    same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
+    return order[:-1][same], order[1:][same]
 
 
 def same_facets(among: Numbers, facets: Numbers) -> Indices:

@@ -15,7 +15,7 @@ from scipy.sparse import bsr_array, csr_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, lobpcg
 
 from fastcontact.arrays import Array, Indices, Mask
-from fastcontact.elasticity.constrained_system import System, diagonal_of, supports_apart
+from fastcontact.elasticity.constrained_system import System, supports_apart
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.elimination.coupled_pivots import RepeatedError
 from fastcontact.linear.elimination.elimination import eliminate
@@ -167,7 +167,7 @@ class Reduced:
             among = csr_array(diags_array(self.free.astype(float)) + at_pivots @ weights)
             K = csr_array(among.T @ self.K.tocsr() @ among).tobsr((size, size))
             K.sort_indices()
-            self.K, self._T = supports_apart(K, ~self.free, diagonal_of(K))[0], csr_array(self._T @ among)
+            self.K, self._T = supports_apart(K, ~self.free)[0], csr_array(self._T @ among)
         self.M = csr_array(self._T.T @ mass.tocsr() @ self._T).tobsr((size, size))
 
     def displacement(self, v: Array) -> Array:

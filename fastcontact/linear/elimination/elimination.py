@@ -12,7 +12,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from fastcontact.arrays import Array, Indices
-from fastcontact.linear.elimination import elimination_kernels, pivot_order
+from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledPivots, Inverse, SparseInverse
 
 NONE = SparseInverse(csr_array((0, 0)))
@@ -68,7 +68,8 @@ class Elimination:
 
     def complete(self, x: Array, offset: Array | None = None) -> None:
         """Set the pivots of `x` (n,), in place, to the weighted sums of the other unknowns, plus `offset` (m,)."""
-        elimination_kernels.complete(self.pivots, self.weights.indptr, self.weights.indices, self.weights.data, x)
+        W, row = self.weights, np.repeat(np.arange(len(self.pivots)), np.diff(self.weights.indptr))
+        x[self.pivots] = np.bincount(row, W.data * x[W.indices], len(self.pivots))  # sums in double precision
         if self.coupled:
             x[self.pivots] = self.own.solve(x[self.pivots])
         if offset is not None:
@@ -79,7 +80,8 @@ class Elimination:
         W = self.force_weights
         if isinstance(self.inverse, CoupledPivots):
             r[self.pivots] = self.inverse.solve_transposed(r[self.pivots])
-        elimination_kernels.move_forces(self.pivots, W.indptr, W.indices, W.data, r)
+        forces, r[self.pivots] = r[self.pivots], 0.0
+        np.add.at(r, W.indices, W.data * np.repeat(forces, np.diff(W.indptr)))
 
     def full_weights(self) -> csr_array:
         """Return the matrix W (m, n) of ``u[pivots] = W @ u + offset``; if pivots are coupled, it has many entries."""

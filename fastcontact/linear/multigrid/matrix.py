@@ -144,10 +144,10 @@ class BlockMatrix:
 
 def diagonal_blocks(indptr: Numbers, indices: Numbers, data: AnyArray, size: int) -> AnyArray:
     """Return the diagonal blocks (n * size * size,) of a square matrix in canonical format, zero where there is none."""
-    out = np.zeros((len(indptr) - 1) * size * size, data.dtype)
-    pattern = (part.astype(np.int32, copy=False) for part in (indptr, indices))
-    split_matrix_kernels.diagonal_blocks(*pattern, data.reshape(-1), size * size, out)
-    return out
+    row = np.repeat(np.arange(len(indptr) - 1), np.diff(indptr))
+    diagonal, out = np.flatnonzero(row == indices), np.zeros((len(indptr) - 1, size * size), data.dtype)
+    out[row[diagonal]] = data.reshape(-1, size * size)[diagonal]
+    return out.ravel()
 
 
 def block_matrix(K: bsr_array) -> BlockMatrix:
@@ -285,16 +285,20 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     """
     n = len(indptr) - 1
     length = max(SHORTEST, -(-n // PARTS))
-    count = np.empty(n, np.int32)
-    spread(symmetric_storage_kernels.count_stored, n, WORK_OF_ROW, indptr, indices, length, count)
-    if count.min(initial=0) < 0:
+    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(indptr))
+    inside = row // length == indices // length
+    below, above, diagonal = inside & (indices < row), inside & (indices > row), indices == row
+    ascending = (indices[1:] > indices[:-1]) | (row[1:] > row[:-1])
+    transposed = np.sort(indices[below].astype(np.int64) * n + row[below])
+    symmetric = np.array_equal(transposed, row[above].astype(np.int64) * n + indices[above])
+    if not (symmetric and ascending.all() and diagonal.sum() == n):
         return ALL
-    start = pointers(count)
-    upper, columns = np.empty(n, np.int32), np.empty(start[-1], np.int32)
-    spread(symmetric_storage_kernels.arrange, n, WORK_OF_ROW, indptr, indices, start, upper, columns, length)
-    storage = start, upper, columns, length
-    spread(symmetric_storage_kernels.missing, n, WORK_OF_ROW, indptr, indices, storage, count)
-    return ALL if count.any() else storage
+    stored = ~below
+    rows, group = row[stored], (diagonal + np.int32(2) * above)[stored]
+    columns = indices[stored][np.argsort(np.int64(3) * rows + group, kind="stable")]
+    start = pointers(np.bincount(rows, minlength=n))
+    upper = start[1:] - np.bincount(row[above], minlength=n).astype(np.int32)
+    return start, upper, columns, length
 
 
 def pointers(count: Numbers) -> Numbers:

@@ -10,17 +10,6 @@ from fastcontact.linear.multigrid.symmetric_storage_kernels import entry_of, par
 
 
 @kernel
-def diagonal_blocks(indptr, indices, data, square, out):
-    """Copy the diagonal blocks, of `square` numbers, to `out` (n_rows * square,), where a row has one."""
-    for i in range(indptr.shape[0] - 1):
-        for k in range(indptr[i], indptr[i + 1]):
-            if indices[k] == i:
-                for e in range(square):
-                    out[i * square + e] = data[k * square + e]
-                break
-
-
-@kernel
 def forces_at(dofs, indptr, indices, storage, K, factor, size, u, f, out):
     """Fill `out` (m,) with ``(factor K u - f)[dofs]``; the numbers of the block matrix K come as a tuple."""
     for p in range(dofs.shape[0]):

@@ -67,55 +67,6 @@ def entry_of(numbers, slot, a, b, size):
 
 
 @kernel
-def count_stored(low, high, indptr, indices, length, count):
-    """Fill `count` (n_rows,) with the number of stored blocks of each row; -1 if it is not sorted or has no diagonal."""
-    for i in range(low, high):
-        first = i // length * length
-        n_stored, diagonal, ascending = 0, False, True
-        for k in range(indptr[i], indptr[i + 1]):
-            if indices[k] >= i or indices[k] < first:
-                n_stored += 1
-            if indices[k] == i:
-                diagonal = True
-            if k > indptr[i] and indices[k] <= indices[k - 1]:
-                ascending = False
-        count[i] = n_stored if diagonal and ascending else -1
-
-
-@kernel
-def arrange(low, high, indptr, indices, start, upper, columns, length):
-    """Fill `upper` (n_rows,) and `columns` of a storage; see the module."""
-    for i in range(low, high):
-        first = i // length * length
-        at, behind = start[i], 0
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            if j < first or j >= first + length:
-                columns[at] = j
-                at += 1
-            elif j > i:
-                behind += 1
-        columns[at] = i
-        upper[i] = at + 1
-        at += 1
-        for k in range(indptr[i], indptr[i + 1]):
-            if i < indices[k] < first + length:
-                columns[at] = indices[k]
-                at += 1
-
-
-@kernel
-def missing(low, high, indptr, indices, storage, counts):
-    """Fill `counts` (n_rows,) with the number of blocks of each row that are not stored."""
-    for i in range(low, high):
-        part, count = part_of(storage, i), 0
-        for k in range(indptr[i], indptr[i + 1]):
-            if place_of(storage, part, i, indices[k], k)[0] < 0:
-                count += 1
-        counts[i] = count
-
-
-@kernel
 def _store_row(i, indptr, indices, storage, factor, row, square, high, low):
     """Split the stored blocks of a row times `factor` into their high and low parts; `row` are the numbers of all blocks."""
     first, end = part_of(storage, i)

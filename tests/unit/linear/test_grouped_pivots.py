@@ -12,9 +12,9 @@ from fastcontact.analysis.problem import prepare
 from fastcontact.elasticity.stiffness import rigid_modes, stiffness
 from fastcontact.errors import ConvergenceError
 from fastcontact.linear.delassus import TooManyColumnsError
-from fastcontact.linear.elimination import elimination_kernels, pivot_order
+from fastcontact.linear.elimination import pivot_order
 from fastcontact.linear.elimination.coupled_pivots import CoupledError, CoupledPivots, block_inverse, lumped
-from fastcontact.linear.elimination.elimination import eliminate
+from fastcontact.linear.elimination.elimination import Elimination, eliminate
 from fastcontact.linear.elimination.pivot_order import chosen, inverse_of, of_groups, of_most_groups
 from fastcontact.linear.solvers import amg
 
@@ -305,19 +305,19 @@ def check_beside_dual(n, element, friction, most):
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
-def test_kernels_take_weights_of_pivots_themselves(kind):
+def test_an_elimination_takes_weights_of_pivots_themselves(kind):
     rng = np.random.default_rng(7)
     n, pivots = 12, np.array([3, 7, 1, 10])
     W = csr_array(np.where(rng.uniform(size=(4, n)) < 0.6, rng.normal(size=(4, n)), 0.0).astype(kind))
     T = np.eye(n)
     T[pivots] = W.toarray()
     x, r = rng.normal(size=n).astype(kind), rng.normal(size=n).astype(kind)
-    of_W, close = (W.indptr, W.indices, W.data), 1e-5 if kind == np.float32 else 1e-13
+    elimination, close = Elimination(pivots, W, np.zeros(4), W), 1e-5 if kind == np.float32 else 1e-13
     moved = r.copy()
-    elimination_kernels.move_forces(pivots, *of_W, moved)
+    elimination.move_forces(moved)
     assert moved == pytest.approx(T.T @ r, abs=close)
     completed = x.copy()
-    elimination_kernels.complete(pivots, *of_W, completed)
+    elimination.complete(completed)
     assert completed == pytest.approx(T @ x, abs=close)
 
 

@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from models import elastic_model, united
 
 import fastcontact as fc
-from fastcontact import topology
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.errors import MeshError
-from fastcontact.mesh import elements, topology_kernels
+from fastcontact.mesh import elements, topology
 from fastcontact.mesh.generate import block, box
 from fastcontact.mesh.quality import check_cells
 from fastcontact.mesh.topology import bodies, cells_joined_by_facets, rigid_parts
@@ -58,24 +57,18 @@ def test_a_folded_mesh_is_refused_with_the_cells_and_the_place(name):
 
 @pytest.mark.parametrize("n_nodes", [2, 3, 4, 8])
 @given(seed=st.integers(0, 2**32 - 1), n_points=st.integers(1, 9), n=st.integers(1, 40))
-def test_facets_are_alone_whose_nodes_no_other_one_has(n_nodes, seed, n_points, n):
-    # Nodes may come twice, as in cells that are collapsed.
-    rng = np.random.default_rng(seed)
-    facets = rng.integers(n_points, size=(n, n_nodes)).astype(np.int32)
-    owner = rng.integers(5, size=n).astype(np.int32)
-    found, parent = np.empty(n, bool), np.arange(5, dtype=np.int32)
-    topology_kernels.alone(facets, owner, n_points, found, parent)
-    keys = [tuple(sorted(facet)) for facet in facets.tolist()]
-    count = Counter(keys)
-    assert found.tolist() == [count[key] == 1 for key in keys]
-    joined = [{cell} for cell in range(5)]
-    for key in count:
-        cells = set().union(*(joined[cell] for cell, own in zip(owner.tolist(), keys, strict=True) if own == key))
-        for cell in cells:
-            joined[cell] = cells
-    while not (parent[parent] == parent).all():
-        parent = parent[parent]
-    assert parent.tolist() == [min(cells) for cells in joined]
+def test_pairs_of_equal_rows_connect_all_that_are_equal(n_nodes, seed, n_points, n):
+    rows = np.random.default_rng(seed).integers(n_points, size=(n, n_nodes)).astype(np.int32)
+    first, second = topology.equal_rows(rows)
+    assert (rows[first] == rows[second]).all()
+    keys = [tuple(row) for row in rows.tolist()]
+    joined = [{row} for row in range(n)]
+    for one, other in zip(first, second, strict=True):
+        assert joined[one] is not joined[other]  # m rows are in m - 1 pairs
+        joined[one] |= joined[other]
+        for row in joined[other]:
+            joined[row] = joined[one]
+    assert [len(rows_alike) for rows_alike in joined] == [Counter(keys)[key] for key in keys]
 
 
 def test_half_a_million_facets_round_one_node():
@@ -83,10 +76,8 @@ def test_half_a_million_facets_round_one_node():
     n = 500_000
     rim = np.arange(1, n + 1, dtype=np.int32)
     facets = np.column_stack([np.zeros(n, np.int32), np.concatenate([rim[: n // 2], rim[: n // 2]])])
-    found, parent = np.empty(n, bool), np.arange(n, dtype=np.int32)
-    topology_kernels.alone(facets, np.arange(n, dtype=np.int32), n + 1, found, parent)
-    assert not found.any()
-    assert len(np.unique(parent)) == n // 2
+    first, second = topology.equal_rows(facets)
+    assert np.array_equal(np.sort(np.concatenate([first, second])), np.arange(n))
 
 
 PLANE = {"tri3": fc.generate.block, "quad4": fc.generate.block, "tri6": fc.generate.block, "quad8": fc.generate.block}
