@@ -34,8 +34,8 @@ def test_random_models_end_right():
 
 
 def test_once_wrong_models_end_right():
-    """A step in which constraints penetrate from the start; dual functions whose choice depended on the numbering."""
-    check([101568, 102727, 102979])
+    """A soft body on a stiff one by multigrid; constraints that penetrate from the start; dual functions whose choice depended on the numbering."""
+    check([100358, 101568, 102727, 102979])
 
 
 @pytest.mark.slow
