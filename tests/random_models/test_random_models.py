@@ -34,7 +34,7 @@ def test_random_models_end_right():
 
 
 def test_once_wrong_models_end_right():
-    """A soft body on a stiff one by multigrid; constraints that penetrate from the start; dual functions whose choice depended on the numbering."""
+    """A soft body on a stiff one, by multigrid; constraints that penetrate from the start; dual functions of a numbering."""
     check([100358, 101568, 102727, 102979])
 
 
