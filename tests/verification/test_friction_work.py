@@ -1,6 +1,5 @@
 """Work of friction: a block just below and above its limit, and the energy balance on load reversal."""
 
-
 import numpy as np
 import pytest
 from models import elastic_model, supported
