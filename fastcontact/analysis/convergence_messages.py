@@ -14,10 +14,12 @@ from fastcontact.analysis.solution import Solution
 from fastcontact.analysis.state import State
 from fastcontact.analysis.tolerances import WINDOW
 from fastcontact.arrays import Array, Indices
+from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import StackedConstraints
 from fastcontact.elasticity.nonlinear_bodies import PLASTIC_STRAIN
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.model.rigid_motions import grouped, least_held
+from fastcontact.round_off import SINGLE_PRECISION
 
 Nodes = dict[str, list[int]]
 # Fraction of the friction of all pairs that floating bodies use when they are about to slide.
@@ -40,14 +42,26 @@ def geometry_moves(problem: Problem, history: list[dict[str, Any]], change: Arra
     more = "More updates do not help, since they repeat in a cycle: use" if circles else (
         "Allow more (Criteria.max_geometry_updates), use"
     )  # fmt: skip
+    other = _less_bound(problem) + _smoother(problem)
     return (
         f"the contact geometry did not converge in {limit} updates: the displacement still changes by "
         f"{changes[-1]:.1e} of its largest component, most at "
         f"{named_nodes(problem, last['nodes'])}, {last['active']} constraints are active. {more} more load steps, a "
-        f"finer mesh on the primary side, {_smoother(problem)}a fixed number of updates (Criteria.geometry_updates), or "
+        f"finer mesh on the primary side, {other}a fixed number of updates (Criteria.geometry_updates), or "
         f"accept changes of that size (Criteria.geometry, which is {problem.criteria.geometry:g}, above "
         f"{max(changes[-WINDOW:]) if circles else changes[-1]:.0e})"
     )
+
+
+def _less_bound(problem: Problem) -> str:
+    """Return a clause about pairs that close all gaps, which may be far wider than loads move bodies; empty for none."""
+    for name, pair in problem.pairs.items():
+        if pair.options.kind == "bilateral":
+            gap = pair.nodal_gap(Configuration.undeformed(pair.points))[0]
+            widest = float(gap.max(where=np.isfinite(gap), initial=0.0))
+            if widest > SINGLE_PRECISION * np.ptp(pair.points, axis=0).max():
+                return f"kind=\"bilateral_once_closed\" for contact '{name}', whose gaps of up to {widest:.3g} close, "
+    return ""
 
 
 def active_set_cycles(problem: Problem, constraints: StackedConstraints, solution: Solution, nodes: Nodes) -> str:

@@ -41,6 +41,10 @@ ACROSS = 4
 LOOSE = 1e-4
 # Fraction of the largest energy or work that the energy balance may lack.
 IMBALANCE = 0.02
+# A warning is given if more than the first fraction of the frictional work is dissipated at nodes in the step in which they
+# close, and the frictional work exceeds the second fraction of the strain energy. Under a sphere that sticks, with a
+# coefficient of 0.6, the latter is 2e-4 in long steps, and 1e-5 if slip counts from first contact.
+WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
 # Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which a warning is
 # given. On rings of tri3 cells 4.6 times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones
 # 0.16 (0.09 to 0.13), on quadrangles 0.002; under punches of hex8 and tet4, whose pressures are singular at the edges,
@@ -77,7 +81,7 @@ def result_warnings(
         warnings += [*_deep(pair, contact, state.u), *lost, *_held(pair, contact, pair.undetermined(at))]
         warnings += [sagging[name]] if name in sagging else _unresolved(name, pair, contact, state)
         warnings += [*wavering(pair, contact), *_too_fast(name, pair, state)]
-    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state)]
+    return [*warnings, *_unsettled(state), *_loose(problem, last), *_unbalanced(state), *_slipping_before(state)]
 
 
 def _deep(pair: Formulation, contact: ContactResult, displacement: Array) -> Iterator[str]:
@@ -135,6 +139,17 @@ def _unbalanced(state: State) -> Iterator[str]:
             f"{work.external:.4g} is neither strain energy ({work.strain_energy:.4g}), nor frictional work "
             f"({work.friction:.4g}), nor energy of penalties, {abs(work.imbalance) / work.largest:.1%} of the largest of "
             "them: use more load steps if energies matter"
+        )
+
+
+def _slipping_before(state: State) -> Iterator[str]:
+    """Yield a warning where nodes that close and slide in one step do much of the frictional work."""
+    work = state.work
+    if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE_WORK * work.strain_energy):
+        yield (
+            f"{work.touching / work.friction:.0%} of the work of friction is done at nodes in the load step in which they "
+            "close, where slip counts from the beginning of the step instead of first contact: the work is too large and "
+            "the shear inaccurate. Use more load steps, or Criteria(friction_while_touching=0.01)"
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,14 +19,9 @@ from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.integration import lumped_areas
 from fastcontact.contact.obstacles.rigid_side import Pose
 from fastcontact.elasticity.springs import ground_force
-from fastcontact.errors import ContactError, ModelError, unknown, warn
+from fastcontact.errors import ContactError, ModelError, unknown
 from fastcontact.model.model import Model
 from fastcontact.results.step import ContactResult, StepResult
-
-# A warning is given if more than the first fraction of the frictional work is dissipated at nodes in the step in which they
-# close, and the frictional work exceeds the second fraction of the strain energy. Under a sphere that sticks, with a
-# coefficient of 0.6, the latter is 2e-4 in long steps, and 1e-5 if slip counts from first contact.
-WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
 
 
 @typed(ContactError)
@@ -241,8 +236,6 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
     array([10., 20.])
     """
     answers = contact_resultants(model, steps, name)
-    if answers and answers[-1].friction_work > NOTABLE_WORK * steps[-1].work.get("strain_energy", 0.0):
-        _warn_of_long_steps(steps[-1].work)
     axes = "xyz"[: model.mesh.dim]
     turns = "z" if model.mesh.dim == 2 else axes
     rows = [
@@ -256,17 +249,6 @@ def contact_history(model: Model, steps: Sequence[StepResult], name: str) -> NDA
         "dissipation", "friction_work",
     ]  # fmt: skip
     return np.array(rows, [("step", int), *((column, float) for column in names)])
-
-
-def _warn_of_long_steps(work: Mapping[str, float]) -> None:
-    """Warn if much of the frictional work is dissipated at nodes in the step in which they close; see `StepResult.work`."""
-    done, touching = work.get("friction_work", 0.0), work.get("friction_while_touching", 0.0)
-    if touching > WHILE_TOUCHING * done:
-        warn(
-            f"{touching / done:.0%} of the frictional work is dissipated at nodes in the load step in which they close, "
-            "where slip counts from the beginning of the step, not from first contact. The work is too large and the "
-            "shear inaccurate: use more load steps, or Criteria(friction_while_touching=0.01)"
-        )
 
 
 @typed(ContactError)

@@ -18,13 +18,14 @@ from scipy.sparse import csr_array, diags_array
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.analysis.solution import Solution
-from fastcontact.arrays import AnyArray, Array
+from fastcontact.arrays import AnyArray, Array, Mask
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.constraints import Constraints
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.obstacles.rigid_side import RigidSide
 from fastcontact.contact.pairing import Candidates
 from fastcontact.results.step import ContactResult
+from fastcontact.round_off import LENGTH_ROUND_OFF
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +97,7 @@ class Work:
     friction : float
         Frictional work.
     touching : float
-        Part of the frictional work that is done in the step in which a constraint closes.
+        Part of the frictional work that is done in the step in which a gap closes.
     imbalance : float
         External work that the other terms do not account for.
     stored : float
@@ -195,7 +196,10 @@ def contact_work(
     ratio = np.divide(pressure * areas, normal, out=np.zeros(len(constraints)), where=normal != 0.0)
     along, earlier = (-0.5 * np.einsum("md,md->m", own, moved) for own in (force, areas[:, None] * traction))
     work = np.where(normal != 0.0, (1.0 + ratio) * along, np.maximum(earlier, 0.0))
-    touching = float(along[pressure == 0.0].sum())
+    closing = pressure == 0.0
+    if along[closing].any():
+        closing &= _apart(pair, at, constraints.positions)
+    touching = float(along[closing].sum())
     if solution.work is not None:
         work, touching = solution.work[rows], 0.0
     friction, mu = float(work.sum()), constraints.friction
@@ -208,6 +212,13 @@ def contact_work(
     gained -= 0.5 * float((now.pressing + before.pressing) @ wider)
     gained -= 0.5 * float(((now.tangential + before.tangential) * moved).sum())
     return now, (friction, touching, gained - (now.stored - before.stored) - sliding), over_slip
+
+
+def _apart(pair: Formulation, at: Configuration, positions: Array) -> Mask:
+    """Return whether the secondary nodes nearest to reference positions (m, dim) were open at the beginning of the step."""
+    gap = pair.nodal_gap(replace(at, displacement=at.start, pose=at.pose_start))[0]
+    size = float(np.ptp(pair.points, axis=0).max())
+    return np.asarray(gap > LENGTH_ROUND_OFF * size)[nearest(pair.points[pair.secondary.points], positions)[1]]
 
 
 def _forces(

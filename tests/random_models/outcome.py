@@ -103,10 +103,9 @@ def said_again(given: Drawn, last: fc.StepResult, wrong: list[str], wandering: b
     # Forces of round-off, of a pair that hardly touches in a model that others load, differ as they like.
     sums = [np.linalg.norm(one.force_vectors, axis=1).sum() for one in last.contact.values()]
     modulus = max(np.max(material.E) for material, _ in given.model.materials)
-    points = given.model.mesh.points
-    size = np.ptp(points, axis=0).max()
+    size = np.ptp(given.model.mesh.points, axis=0).max()
     least = NOTHING * np.abs(last.displacement).max() + ROUND_OFF / SAME * size
-    stiffness = modulus * size ** (points.shape[1] - 2)
+    stiffness = modulus * (1.0 if given.model.kinematics in ("plane_strain", "plane_stress") else size)
     scale = max(*sums, np.linalg.norm(last.reaction, axis=1).sum(), least * stiffness) or 1.0
     changes = [np.linalg.norm(again.contact[name].force @ other.Q - one.force) for name, one in last.contact.items()]
     found["force said again"] = float(max(changes) / scale)

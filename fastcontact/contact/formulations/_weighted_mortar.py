@@ -188,7 +188,7 @@ class WeightedMortar(Formulation):
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
         of_blocks = zip(self.secondary.blocks, self._test, self._functions(coverage), strict=True)
         for number, (block, T, (psi, _)) in enumerate(of_blocks):
-            inside = self._whole_facets(block) if overlap.points is None else overlap.points[number]
+            inside = self._points_of(block, overlap) if overlap.points is None else overlap.points[number]
             facet, shape, area = (values[acts[block.local].any(axis=1)[inside.facet]] for values in inside)
             columns = first + np.arange(len(facet))[:, None]
             functions.add(block.local[facet], columns, np.einsum("qak,qk,q->qa", psi[facet], shape, area)[:, :, None])
@@ -219,10 +219,22 @@ class WeightedMortar(Formulation):
                 slips = replace(slips, total=slips.total + closing.vector, closing=closing)
         return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
 
-    def _whole_facets(self, block: FacetBlock) -> OverlapPoints:
-        """Return Gauss points of whole facets."""
+    def _points_of(self, block: FacetBlock, overlap: Overlap) -> OverlapPoints:
+        """Return Gauss points of whole facets, and the centres of the segments of those that are partly covered."""
         N, area = areas_of_rule(block, self.points, self.axisymmetric)
-        return OverlapPoints(np.repeat(np.arange(len(area)), len(N)), np.tile(N, (len(area), 1)), area.ravel())
+        whole = np.ones(len(area), bool)
+        centres = [OverlapPoints(np.empty(0, np.intp), np.empty((0, N.shape[1])), np.empty(0))]
+        for coupling in overlap.couplings:
+            if coupling.secondary is block:
+                covered = overlap.mass[self.secondary.blocks.index(block)].sum(axis=(1, 2))
+                whole = covered >= (1.0 - SINGLE_PRECISION) * area.sum(axis=1)
+                facet, shape = coupling.pairs[:, 0], coupling.integrals.sum(axis=2)
+                size = shape.sum(axis=1)
+                cut = ~whole[facet] & (size > 0.0)
+                centres.append(OverlapPoints(facet[cut], shape[cut] / size[cut, None], size[cut]))
+        uncut = np.flatnonzero(whole)
+        of_whole = OverlapPoints(np.repeat(uncut, len(N)), np.tile(N, (len(uncut), 1)), area[uncut].ravel())
+        return OverlapPoints(*map(np.concatenate, zip(of_whole, *centres, strict=True)))
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fastcontact._jit.norms_kernels import largest
 from fastcontact._jit.parallel import spread
 from fastcontact.arrays import AnyArray, Array
 from fastcontact.linear.krylov import krylov_kernels
@@ -51,6 +52,7 @@ class Iteration:
         self.x, self.r, self.z, self.q = (np.zeros(n) for _ in range(4))
         self._sums = np.empty(-(-n // CHUNK))
         self.norm = 0.0
+        self._moved: tuple[float, Array, float] | None = None  # length and direction of the last step, residual before
 
     def dot(self, a: Array, b: Array) -> float:
         """Return the dot product of two vectors (n,)."""
@@ -59,10 +61,16 @@ class Iteration:
 
     def start(self) -> None:
         """Restart from `x` and its residual `r`, both set by the caller."""
-        self.norm = float(np.sqrt(self.dot(self.r, self.r)))
+        self.norm, self._moved = float(np.sqrt(self.dot(self.r, self.r))), None
+
+    def change(self, n: int) -> float:
+        """Return the largest change of the first n unknowns in the last step, over the residual before it; 0 without one."""
+        alpha, p, before = self._moved or (0.0, self.x, 1.0)
+        return abs(alpha) * largest(p[:n]) / before
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
         """Step ``x += alpha p``, ``r -= alpha q``."""
+        self._moved = alpha, p, self.norm
         self.norm = float(np.sqrt(self._stepped(alpha, p, q, self.x, self.r)))
 
     def _stepped(self, alpha: float, p: Array, q: Array, x: Array, r: Array) -> float:

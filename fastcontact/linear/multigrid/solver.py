@@ -14,6 +14,7 @@ from typing import Self
 import numpy as np
 from scipy.sparse import bsr_array
 
+from fastcontact._jit.norms_kernels import largest
 from fastcontact.arrays import Array, Indices
 from fastcontact.errors import ConvergenceError, ModelError
 from fastcontact.linear.delassus import InverseColumns, inverse_entries
@@ -43,6 +44,9 @@ WATCH_EVERY = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
 # known.
 WATCH_CONTRAST_FROM = 6
+# Largest relative change of displacements in the last iteration, over the tolerance of the residual. In one material the
+# change is smaller by itself; forces in a stiff body exceed those in a soft one, whose displacements settle later.
+ERROR = 1e2
 # Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations; about that of a
 # new hierarchy, too.
 CHANGE = 15
@@ -109,6 +113,7 @@ class Multigrid:
     def begin(self) -> None:
         """Reset the statistics of warm starts for a new load step."""
         self._most_warm, self._cut_short = MOST_WARM, np.inf
+        self._yielding = np.inf  # change of displacements in an iteration, over the residual
 
     @property
     def nbytes(self) -> int:
@@ -218,19 +223,22 @@ class Multigrid:
         self.constrain(elimination, springs)
         cg.x[:] = 0.0 if guess is None else guess
         self._begin(cg, f)
-        enough = self._enough(tolerance or 0.0) * scale
+        enough = self._enough(tolerance or 0.0)
         made, raised = 0, 0
         watched_from = WATCH_EVERY if self._contrast <= MILD else WATCH_CONTRAST_FROM
-        while cg.norm > enough:
+        while not self._done(cg, enough, scale):
             if self._renewed and made >= CHANGE:
                 self._build_anew()
                 self._begin(cg, f)
+            above = cg.norm > enough * scale
             if made >= MAX_ITERATIONS or raised > RAISES:
+                if not above:
+                    break
                 raise StallError(
                     f"conjugate gradients stall at a relative residual of {cg.norm / scale:.1e} after {made} iterations, "
                     f"above {self.tolerance:.1e}: use the direct solver, or look for near-incompressible or thin parts"
                 )
-            if monitor is not None and made >= watched_from and made % WATCH_EVERY == 0:
+            if monitor is not None and above and made >= watched_from and made % WATCH_EVERY == 0:
                 u = self._reduced.displacement(cg.x)
                 if monitor(u, self._reduced.multiplier(u, f), self._contrast * cg.norm / scale):
                     break
@@ -277,13 +285,13 @@ class Multigrid:
         iteration = self._residuals
         scale = self._scale(f, elimination)
         self.constrain(elimination, springs)
-        enough = self._enough(tolerance) * scale
+        enough = self._enough(tolerance)
         iteration.x[:] = guess
         self._begin(iteration, f)
         # If some parts are much stiffer than others, the tolerance of the solver leaves errors in the soft parts. Later
         # pairings would reduce them only slowly.
         aim = tolerance / self._contrast * scale
-        self._reduce(iteration, enough, self._reduced.multiply, self.precondition, aim)
+        self._reduce(iteration, enough, scale, self._reduced.multiply, self.precondition, aim)
         return self._reduced.displacement(iteration.x).copy()
 
     def bordered_solution(
@@ -332,37 +340,50 @@ class Multigrid:
                 elimination.move_forces(forces)
 
         multiply = border.multiply(self._reduced.multiply, move_forces)
-        self._reduce(
-            iteration, self._enough(tolerance or 0.0) * scale, multiply, border.precondition(self.precondition)
-        )
+        enough, precondition = self._enough(tolerance or 0.0), border.precondition(self.precondition)
+        self._reduce(iteration, enough, scale, multiply, precondition)
         return x.copy(), iteration.x[n:].copy()
 
     def _reduce(
-        self, iteration: ConjugateResiduals, enough: float, multiply: Multiply, precondition: Precondition,
-        aim: float = np.inf,
+        self, iteration: ConjugateResiduals, tolerance: float, scale: float, multiply: Multiply,
+        precondition: Precondition, aim: float = np.inf,
     ) -> None:  # fmt: skip
-        """Iterate until the norm of the residual is at most `enough` [force].
+        """Iterate until the residual is at most the `tolerance` times `scale` [force].
 
         An initial guess may satisfy this tolerance although the forces of a small contact are still inaccurate. The iteration
         therefore continues for some iterations, see WARM, or until the norm of the residual is `aim`, if that is smaller.
         """
+        enough = tolerance * scale
         made, wanted = 0, max(min(enough, WARM * iteration.norm, aim), WARM_LEAST * enough)
         begun = iteration.norm
         if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
-        while iteration.norm > wanted:
-            done = iteration.norm <= enough
+        while iteration.norm > wanted or not self._done(iteration, tolerance, scale):
+            done = self._done(iteration, tolerance, scale)
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
             if made >= MAX_ITERATIONS or not iteration.step(multiply, precondition):
-                if done:
+                if iteration.norm <= enough:
                     return
                 left = iteration.norm / enough
                 raise StallError(f"conjugate residuals stall at {left:.1e} times the tolerance after {made} iterations")
             made += 1
             self._count()
+
+    def _done(self, iteration: Iteration, tolerance: float, scale: float) -> bool:
+        """Return whether the residual is at most `tolerance` times `scale`, and displacements of final solutions settled.
+
+        A small residual alone is no such sign: it may exceed all forces in a soft body, relative to those in a stiff one.
+        """
+        if iteration.norm > tolerance * scale:
+            return False
+        n = self.K.shape[0]
+        self._yielding = iteration.change(n) or self._yielding
+        if tolerance > self.tolerance or not iteration.norm:
+            return True
+        return self._yielding * iteration.norm <= ERROR * self.tolerance * largest(iteration.x[:n])
 
     def _count(self) -> None:
         """Count one iteration."""
