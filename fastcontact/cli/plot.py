@@ -78,7 +78,7 @@ def _plane(text: str) -> tuple[int, float]:
 
 def _animate(options: argparse.Namespace, results: Any, step: Any, case: dict[str, Any]) -> None:
     from fastcontact.results import plot
-    from fastcontact.results.steps import phases
+    from fastcontact.results.step import phases
 
     shown = list(results) if options.phases is None else phases(step, options.phases)
     plot.animate(

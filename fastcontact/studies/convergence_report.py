@@ -18,8 +18,7 @@ from fastcontact.studies import convergence_tables as tables
 from fastcontact.studies.convergence_tables import sentences
 from fastcontact.studies.fit import CONFIDENCE
 from fastcontact.studies.quantities import title
-from fastcontact.studies.render import Rows, frame, marker, message, panels
-from fastcontact.studies.report import Report
+from fastcontact.studies.report import Report, Rows, frame, marker, message, panels
 from fastcontact.studies.series import Series
 from fastcontact.studies.settings import Named
 

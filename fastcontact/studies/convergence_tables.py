@@ -11,7 +11,7 @@ from fastcontact.cases.summary import finite
 from fastcontact.results.units import labelled
 from fastcontact.studies.fit import CONFIDENCE, Limit
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render import Rows, by_columns, number, percent
+from fastcontact.studies.report import Rows, by_columns, number, percent
 from fastcontact.studies.series import Series, Split
 
 # Quantities of the sentences, in their order.

@@ -32,8 +32,7 @@ from fastcontact.model.fingerprint import digest_of_mesh
 from fastcontact.model.pair_options import SHARED_OPTIONS
 from fastcontact.results.step import StepResult
 from fastcontact.studies import quantities
-from fastcontact.studies.levels import Recipe, make_mesh, recipe
-from fastcontact.studies.settings import Combination, Settings
+from fastcontact.studies.settings import Combination, Recipe, Settings, make_mesh, recipe
 
 # Keys of contact pairs and obstacles that do not depend on the formulation.
 KEYS = {

@@ -20,11 +20,10 @@ from fastcontact.studies.checks import check_runs
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
 from fastcontact.studies.job import Job, fields_of, job_of
-from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.quantities import check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Point, TheoryCurve, Value
-from fastcontact.studies.settings import data_of, one_combination, settings
+from fastcontact.studies.settings import data_of, make_mesh, one_combination, recipe, settings
 from fastcontact.studies.sweep_report import Sweep, label_of
 
 # Default refinement level of the meshes, on which mesh errors are smaller than the trends of interest.

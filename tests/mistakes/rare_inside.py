@@ -34,10 +34,11 @@ from fastcontact.mesh.files import aster_mail, med, meshio_content
 from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
-from fastcontact.studies import execute, levels, render
+from fastcontact.studies import execute
+from fastcontact.studies import report as render
+from fastcontact.studies import settings as levels
 from fastcontact.studies.convergence import convergence_study
-from fastcontact.studies.levels import recipe
-from fastcontact.studies.settings import Combination, settings
+from fastcontact.studies.settings import Combination, recipe, settings
 from fastcontact.studies.sweep import parameter_sweep
 
 REPEATED = re.escape(str(pivot_order.RepeatedError()))

@@ -20,8 +20,7 @@ from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
 from fastcontact.studies.case_parameters import by_law
 from fastcontact.studies.convergence import convergence_study
-from fastcontact.studies.levels import make_mesh
-from fastcontact.studies.settings import combinations, settings
+from fastcontact.studies.settings import combinations, make_mesh, settings
 
 CASES = [
     ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),

@@ -23,7 +23,7 @@ from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
 from fastcontact.studies import checks as affordable
 from fastcontact.studies import execute
-from fastcontact.studies.levels import _default_element
+from fastcontact.studies.settings import _default_element
 
 SQUARE = fc.generate.block()
 GROUP = SQUARE.group_names[0]

@@ -10,7 +10,8 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.errors import CaseError, ContactError
-from fastcontact.studies import convergence, execute, levels
+from fastcontact.studies import convergence, execute
+from fastcontact.studies import settings as levels
 from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.settings import combinations, settings
 

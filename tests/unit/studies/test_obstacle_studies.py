@@ -14,8 +14,7 @@ from fastcontact.studies.convergence import convergence_study
 from fastcontact.studies.convergence_tables import sentences
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.job import job_of
-from fastcontact.studies.levels import RULES, make_mesh, recipe
-from fastcontact.studies.settings import combinations, one_combination, settings
+from fastcontact.studies.settings import RULES, combinations, make_mesh, one_combination, recipe, settings
 
 BALL = """kinematics = "axisymmetric"
 mesh = { file = "block.med" }
