@@ -81,9 +81,9 @@ from fastcontact.results.tables import write_csv as write_csv
 from fastcontact.results.writer import ResultWriter as ResultWriter
 from fastcontact.results.xmgrace import write_agr as write_agr
 from fastcontact.studies.adaptive import adaptive_study as adaptive_study
-from fastcontact.studies.convergence import convergence_study as convergence_study
 from fastcontact.studies.error_norms import ErrorEstimate as ErrorEstimate
 from fastcontact.studies.error_norms import ErrorNorms as ErrorNorms
 from fastcontact.studies.error_norms import error_against as error_against
 from fastcontact.studies.error_norms import estimate_error as estimate_error
-from fastcontact.studies.sweep import parameter_sweep as parameter_sweep
+from fastcontact.studies.runs import convergence_study as convergence_study
+from fastcontact.studies.runs import parameter_sweep as parameter_sweep

@@ -37,9 +37,8 @@ from fastcontact.results import reader
 from fastcontact.studies import execute
 from fastcontact.studies import report as render
 from fastcontact.studies import settings as levels
-from fastcontact.studies.convergence import convergence_study
+from fastcontact.studies.runs import convergence_study, parameter_sweep
 from fastcontact.studies.settings import Combination, recipe, settings
-from fastcontact.studies.sweep import parameter_sweep
 
 REPEATED = re.escape(str(pivot_order.RepeatedError()))
 

@@ -19,7 +19,7 @@ from fastcontact.mesh.generate.refine import Circle, refined
 from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
 from fastcontact.studies.case_parameters import by_law
-from fastcontact.studies.convergence import convergence_study
+from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import combinations, make_mesh, settings
 
 CASES = [

@@ -21,8 +21,8 @@ from fastcontact.cli import main
 from fastcontact.studies import execute, job
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.report import percent
+from fastcontact.studies.runs import parameter_sweep
 from fastcontact.studies.settings import Combination, combinations, recipe, settings
-from fastcontact.studies.sweep import parameter_sweep
 
 
 def test_no_worker_is_left_half_started(monkeypatch):
