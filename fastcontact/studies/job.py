@@ -23,8 +23,7 @@ import numpy as np
 from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
 from fastcontact.analysis.run import solve_steps
-from fastcontact.cases.case import Case, build_case
-from fastcontact.cases.case_files import digest, files_named
+from fastcontact.cases.case import Case, build_case, digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh

@@ -10,7 +10,7 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.mesh.generate import GENERATORS
 from fastcontact.studies import quantities
-from fastcontact.studies.convergence_tables import sentences
+from fastcontact.studies.convergence_report import sentences
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.job import job_of
 from fastcontact.studies.runs import convergence_study
