@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import itertools
+import sys
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ThreadPoolExecutor
 from itertools import pairwise
 from math import prod
+from multiprocessing.reduction import ForkingPickler
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +17,14 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.cases.case import Case, build_case, described, read_case
-from fastcontact.errors import CaseError, FastcontactError, check_known, warn
-from fastcontact.studies import function_runs as functions
+from fastcontact.errors import CaseError, FastcontactError, check_known, unknown, warn
+from fastcontact.results.units import known_units
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.checks import check_levels, check_runs
 from fastcontact.studies.convergence_report import Study
 from fastcontact.studies.execute import Progress, Result, run_study
 from fastcontact.studies.fit import Limit, fit_limit
-from fastcontact.studies.function_runs import Function, FunctionRun, Quantities
-from fastcontact.studies.job import Job, fields_of, job_of
+from fastcontact.studies.job import Function, FunctionRun, Job, Measure, Quantities, fields_of, first_parameter, job_of
 from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, of_theory
 from fastcontact.studies.report import of_case
 from fastcontact.studies.series import Level, Point, Series, TheoryCurve, Value
@@ -121,7 +123,7 @@ def convergence_study(
     options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
     options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
-        functions.refuse({"elements": elements, "formulations": formulations})
+        refuse({"elements": elements, "formulations": formulations})
         return _of_function(case, levels, quantities, options)
     if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping):
         raise CaseError(
@@ -149,8 +151,8 @@ def _of_function(
     descending = sorted(map(float, sizes), reverse=True)
     if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
         raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
-    name, measures = functions.function_name(function), functions.measures_of(wanted)
-    argument = functions.first_parameter(function)
+    name, measures = function_name(function), measures_of(wanted)
+    argument = first_parameter(function)
     runs = [
         FunctionRun(
             label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
@@ -158,7 +160,7 @@ def _of_function(
         )
         for level, size in enumerate(descending)
     ]  # fmt: skip
-    results = functions.run_functions(runs, "no size could be solved", **options)
+    results = run_functions(runs, "no size could be solved", **options)
     solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
     series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
     for coarse, fine in pairwise(series.levels):
@@ -168,7 +170,7 @@ def _of_function(
                 f"{coarse.n_dofs}: sizes must be lengths that shrink as meshes get finer, or limits and orders mean nothing"
             )
             break
-    return Study(**functions.of_function(function, results), series=[series], failed={}, theory=None)
+    return Study(**of_function(function, results), series=[series], failed={}, theory=None)
 
 
 def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
@@ -314,7 +316,7 @@ def parameter_sweep(
     options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
     options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
-        functions.refuse({"element": element, "formulation": formulation, "level": level})
+        refuse({"element": element, "formulation": formulation, "level": level})
         return _sweep_of_function(case, parameters, quantities, options)
     if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
         raise CaseError("values without a name and functions as quantities are for Python models; a case takes names")
@@ -344,8 +346,8 @@ def _sweep_of_function(
 ) -> Sweep:
     """Return the sweep of a function that returns models; `options` are passed to `run_functions`."""
     named = isinstance(parameters, Mapping)
-    by_name = parameters if isinstance(parameters, Mapping) else {functions.first_parameter(function): [*parameters]}
-    choices, name, measures = _choices(by_name), functions.function_name(function), functions.measures_of(wanted)
+    by_name = parameters if isinstance(parameters, Mapping) else {first_parameter(function): [*parameters]}
+    choices, name, measures = _choices(by_name), function_name(function), measures_of(wanted)
     runs = [
         FunctionRun(
             label=label_of(choice), name=name, marks=choice, function=function,
@@ -353,11 +355,9 @@ def _sweep_of_function(
         )
         for choice in choices
     ]  # fmt: skip
-    results = functions.run_functions(runs, "no point of the sweep could be solved", **options)
+    results = run_functions(runs, "no point of the sweep could be solved", **options)
     points = _points(by_name, choices, results)
-    return Sweep(
-        **functions.of_function(function, results), **points, combination=name, asked=tuple(wanted), compared=""
-    )
+    return Sweep(**of_function(function, results), **points, combination=name, asked=tuple(wanted), compared="")
 
 
 def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
@@ -428,3 +428,66 @@ def _job(case: Case, choice: dict[str, Value], element: str | None, formulation:
     size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
     marks = {**choice, "combination": f"{member}, level {finer}"}
     return job_of(case, chosen, member, finer, label=label_of(choice), marks=marks, size=size)
+
+
+def function_name(function: Function) -> str:
+    """Return the name of a function for tables and messages."""
+    return str(getattr(function, "__name__", type(function).__name__))
+
+
+def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a `Report` on a function.
+
+    The text is the source of the function if Python knows it, and the units are those of the models in the `results`.
+    """
+    try:
+        text = inspect.getsource(function)
+    except (OSError, TypeError):
+        text = ""
+    name, units = function_name(function), next((result["units"] for result in results if result.get("units")), None)
+    title = (inspect.getdoc(function) or name).partition("\n")[0]
+    return {"name": name, "title": title, "text": text, "units": known_units(units or {})}
+
+
+def measures_of(wanted: Quantities) -> dict[str, Measure]:
+    """Return the quantities that are given as functions; CaseError for the name of a quantity that is not known."""
+    if isinstance(wanted, Mapping):
+        return dict(wanted)
+    for name in wanted:
+        if name not in LABELS:
+            raise CaseError(
+                unknown("quantity", name, LABELS)
+                + "; others are given as functions of the last step, such as quantities={'top': lambda step: ...}"
+            )
+    return {}
+
+
+def refuse(of_cases: Mapping[str, Any]) -> None:
+    """Raise CaseError if an option that only studies of case files have is given."""
+    for name, value in of_cases.items():
+        if value is not None:
+            raise CaseError(
+                f"'{name}' is for case files: a function makes the mesh and the contact itself, leave it out"
+            )
+
+
+def run_functions(
+    runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
+) -> list[dict[str, Any]]:
+    """Return the results of `run_study`; by default the runs are sequential in this process."""
+    if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
+        _check_sendable(runs[0])
+    return run_study(runs, name, executor=executor, workers=workers or 1, **options)
+
+
+def _check_sendable(run: FunctionRun) -> None:
+    """Raise CaseError if a function cannot be sent to another process or cannot be imported there."""
+    try:
+        if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):
+            inspect.getfile(sys.modules["__main__"])  # TypeError without a file, as in notebooks
+        ForkingPickler.dumps(run)
+    except Exception as error:
+        raise CaseError(
+            f"{run.name} or a quantity cannot be sent to other processes ({error}): define functions with names at the top "
+            "of a module, or use workers=1"
+        ) from error
