@@ -71,7 +71,7 @@ _NAMES = {
     "mesh.topology": ("ordered_line",),
     "model.model": ("Model",),
     "model.ramp": ("Ramp", "linear_ramp"),
-    "results.med": ("write_med_results",),
+    "results.exports": ("write_med_results",),
     "results.reader": ("open_results",),
     "results.step": ("ContactResult", "StepResult"),
     "results.tables": ("contact_table", "line_table", "normal_stress", "write_csv"),
@@ -79,8 +79,7 @@ _NAMES = {
     "results.xmgrace": ("write_agr",),
     "studies.adaptive": ("adaptive_study",),
     "studies.error_norms": ("ErrorEstimate", "ErrorNorms", "error_against", "estimate_error"),
-    "studies.convergence": ("convergence_study",),
-    "studies.sweep": ("parameter_sweep",),
+    "studies.runs": ("convergence_study", "parameter_sweep"),
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
 __all__ = sorted([*_HOME, *_MODULES])

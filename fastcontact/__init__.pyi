@@ -70,7 +70,7 @@ from fastcontact.model.model import Model as Model
 from fastcontact.model.ramp import Ramp as Ramp
 from fastcontact.model.ramp import linear_ramp as linear_ramp
 from fastcontact.results import plot as plot
-from fastcontact.results.med import write_med_results as write_med_results
+from fastcontact.results.exports import write_med_results as write_med_results
 from fastcontact.results.reader import open_results as open_results
 from fastcontact.results.step import ContactResult as ContactResult
 from fastcontact.results.step import StepResult as StepResult
@@ -81,9 +81,9 @@ from fastcontact.results.tables import write_csv as write_csv
 from fastcontact.results.writer import ResultWriter as ResultWriter
 from fastcontact.results.xmgrace import write_agr as write_agr
 from fastcontact.studies.adaptive import adaptive_study as adaptive_study
-from fastcontact.studies.convergence import convergence_study as convergence_study
 from fastcontact.studies.error_norms import ErrorEstimate as ErrorEstimate
 from fastcontact.studies.error_norms import ErrorNorms as ErrorNorms
 from fastcontact.studies.error_norms import error_against as error_against
 from fastcontact.studies.error_norms import estimate_error as estimate_error
-from fastcontact.studies.sweep import parameter_sweep as parameter_sweep
+from fastcontact.studies.runs import convergence_study as convergence_study
+from fastcontact.studies.runs import parameter_sweep as parameter_sweep

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fastcontact.studies.convergence import convergence_study
+from fastcontact.studies.runs import convergence_study
 
 SIZES = (500, 2_000, 8_000)
 CASE = Path(__file__).resolve().parents[2] / "data" / "cases" / "forma04c.toml"

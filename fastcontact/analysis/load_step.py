@@ -33,8 +33,7 @@ from fastcontact.elasticity.nonlinear_bodies import DeformedBodies
 from fastcontact.model.pretension import section_results
 from fastcontact.model.ramp import multiplier
 from fastcontact.model.rigid_motions import generalised
-from fastcontact.results.material_stress import by_largest_von_mises
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import ContactResult, StepResult, by_largest_von_mises
 from fastcontact.results.units import units_of_results
 
 

@@ -21,8 +21,7 @@ from fastcontact.linear.protocol import TOLERANCE
 from fastcontact.model.model import Model
 from fastcontact.model.model_warnings import model_warnings
 from fastcontact.model.ramp import Ramp, RampLike, ramp_of
-from fastcontact.results.step import StepResult
-from fastcontact.results.steps import Steps
+from fastcontact.results.step import StepResult, Steps
 
 
 @typed(ModelError)

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._outputs import say_written
+from fastcontact.cli._files import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 
@@ -21,7 +21,7 @@ ARGUMENTS = {
 
 def run(options: argparse.Namespace) -> int:
     """List the ready-made cases, or print or copy one of them."""
-    from fastcontact.cases.case_files import shipped_case, shipped_cases
+    from fastcontact.cases.case import shipped_case, shipped_cases
 
     if options.copy and options.name:
         raise FastcontactError("give either a name to print or --copy NAME, not both")

@@ -33,7 +33,7 @@ ARGUMENTS = {
 
 def run(options: argparse.Namespace) -> int:
     """Run the study, write the files of the options and print the results; return 2 if a run failed."""
-    from fastcontact.studies.convergence import convergence_study
+    from fastcontact.studies.runs import convergence_study
 
     _study.check_targets(options, options.output)
     if options.adaptive:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from fastcontact.cli._outputs import check_outputs, say_written
+from fastcontact.cli._files import check_outputs, say_written
 from fastcontact.errors import CaseError
 
 HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"
@@ -21,13 +21,13 @@ def run(options: argparse.Namespace) -> int:
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
     check_outputs([options.file], [options.med, options.xdmf])
     if options.med:
-        from fastcontact.results.med import write_med_results
+        from fastcontact.results.exports import write_med_results
         from fastcontact.results.reader import open_results
 
         with open_results(options.file) as results:
             write_med_results(options.med, results.mesh, results)
     if options.xdmf:
-        from fastcontact.results.xdmf import write_xdmf
+        from fastcontact.results.exports import write_xdmf
 
         write_xdmf(options.file, options.xdmf)
     say_written(options, options.med, options.xdmf)

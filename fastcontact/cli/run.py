@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
+from fastcontact.cli._files import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say, somebody_watches, warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
 
@@ -45,8 +45,7 @@ def run(options: argparse.Namespace) -> int:
     """Solve the case, write the files of the options and print the summary."""
     from fastcontact._jit import decorators
     from fastcontact.cases import summary
-    from fastcontact.cases.case import files_of_case, read_case
-    from fastcontact.cases.case_files import case_path
+    from fastcontact.cases.case import case_path, files_of_case, read_case
 
     started = time.perf_counter()
     if options.threads is not None:

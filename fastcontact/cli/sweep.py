@@ -29,7 +29,7 @@ ARGUMENTS = {
 
 def run(options: argparse.Namespace) -> int:
     """Run the sweep, write the files of the options and print the table; return 2 if a run failed."""
-    from fastcontact.studies.sweep import parameter_sweep
+    from fastcontact.studies.runs import parameter_sweep
 
     _study.check_targets(options)
     wanted: dict[str, list[Any]] = {}

@@ -23,9 +23,7 @@ from fastcontact.errors import FileError
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import conversions, journal, layout
 from fastcontact.results.file_lock import is_being_written
-from fastcontact.results.material_stress import MaterialStress
-from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.steps import StepSequence
+from fastcontact.results.step import ContactResult, MaterialStress, StepResult, StepSequence
 from fastcontact.results.units import units_of_results
 
 # Global heap collections, which contain the strings of variable length (HDF5 File Format Specification 3.0, section III.E):

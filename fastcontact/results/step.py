@@ -1,18 +1,92 @@
-"""Results of a load step as plain data."""
+"""Results of load steps as plain data, and sequences of steps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, SupportsIndex, overload
 
 import numpy as np
 
 from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.errors import FastcontactError, unknown
-from fastcontact.results.material_stress import MaterialStress
+from fastcontact.elasticity import recovery
+from fastcontact.elasticity.material_sides import MaterialSides
+from fastcontact.errors import FastcontactError, ModelError, unknown
 from fastcontact.results.units import with_unit
+
+
+@dataclass(frozen=True, eq=False)
+class MaterialStress:
+    """Stress of each material at the nodes where materials meet.
+
+    Attributes
+    ----------
+    cells : ndarray of int (n_solids,)
+        Material number of each solid cell, in the order of ``mesh.solids``. Materials are numbered from 0 in the order
+        in which they were added to the model; equal materials have the number of the first.
+    points : ndarray of int (k,)
+        Node of each row, in ascending order. A node where materials meet has a row for each material.
+    material : ndarray of int (k,)
+        Material number of each row.
+    stress : ndarray (k, 4) or (k, 6)
+        Mean stress of the cells with the material at the node [pressure]. The components are those of
+        `StepResult.stress`.
+    """
+
+    cells: Numbers
+    points: Numbers
+    material: Numbers
+    stress: Array
+
+    def at(self, point: int) -> dict[int, Array]:
+        """Return the stress (4,) or (6,) [pressure] of each material at a node.
+
+        Parameters
+        ----------
+        point : int
+            Number of the node.
+
+        Returns
+        -------
+        dict of int to ndarray
+            Stress by material number; empty if the node has one material only.
+        """
+        return {int(self.material[row]): self.stress[row] for row in np.flatnonzero(self.points == point)}
+
+
+def by_largest_von_mises(
+    sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
+) -> tuple[Array, MaterialStress]:
+    """Return the nodal stress (n_points, n_components) [pressure] and the stress of each material at interfaces.
+
+    At a node on an interface, the nodal stress is that of the material with the largest von Mises stress.
+
+    Parameters
+    ----------
+    sides : MaterialSides
+        Nodes at material interfaces.
+    cells : ndarray of int (n_solids,)
+        Material number of each solid cell.
+    at_places : ndarray (n_places, n_components)
+        Stress at the nodes of the mesh that is cut along interfaces [pressure].
+    n_points : int
+        Number of points of the mesh.
+
+    Returns
+    -------
+    stress : ndarray (n_points, n_components)
+        Nodal stress [pressure].
+    material_stress : MaterialStress
+        Stress of each material at interfaces.
+    """
+    stress, values = at_places[:n_points].copy(), at_places[sides.place]
+    order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
+    stress[sides.points[order]] = values[order]
+    return stress, MaterialStress(cells, sides.points, sides.material, values)
+
 
 # The resultant of a contact is negligible below this fraction of the sum of the normal forces.
 CANCELLED = 1e-3
@@ -465,3 +539,84 @@ class StepResult:
             of_material = self.material_stress.material == number
             stress[self.material_stress.points[of_material]] = self.material_stress.stress[of_material]
         return stress
+
+
+# Largest number of steps in the representation of a list.
+SHOWN = 30
+
+
+class StepSequence(Sequence[StepResult]):
+    """A sequence of steps, each of which is read or computed on access."""
+
+    @abstractmethod
+    def _step(self, position: int) -> StepResult: ...
+
+    @overload
+    def __getitem__(self, number: int) -> StepResult: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[StepResult]: ...
+    def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
+        """Return a step by its index, or a list of steps for a slice."""
+        chosen = self._chosen(number)
+        return self._step(chosen) if isinstance(chosen, int) else [self._step(position) for position in chosen]
+
+    def _chosen(self, number: int | slice) -> int | range:
+        """Return the position of a step, or the positions of a slice."""
+        return range(len(self))[number]
+
+
+class Steps(list[StepResult]):
+    """A list of `StepResult` that notebooks display as a table."""
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> StepResult: ...
+    @overload
+    def __getitem__(self, index: slice) -> Steps: ...
+    def __getitem__(self, index: SupportsIndex | slice) -> StepResult | Steps:
+        """Return a step, or `Steps` for a slice."""
+        if isinstance(index, slice):
+            return Steps(super().__getitem__(index))
+        return super().__getitem__(index)
+
+    def __repr__(self) -> str:
+        lines = (f"  {step!r}" for step in _shown(self))
+        return "\n".join([f"{len(self)} steps", *lines, *(["  ..."] if len(self) > SHOWN else [])])
+
+    def _repr_html_(self) -> str:
+        """Return an HTML table with a row for each contact pair of each step."""
+        rows = [row for step in _shown(self) for row in rows_of(step)]
+        left_out = f", {len(self) - SHOWN} of them not shown" if len(self) > SHOWN else ""
+        return html_table(rows, HEAD, f"{len(self)} steps{left_out}")
+
+
+HEAD = ("step", "load factor", "pairings", "contact", "force", "largest pressure", "closed", "contact radius")
+
+
+def _shown(steps: Steps) -> Iterable[StepResult]:
+    """Return the steps in the representation, which are the last steps of a long list."""
+    return list(steps)[-SHOWN:]
+
+
+def rows_of(step: StepResult) -> list[tuple[str, ...]]:
+    """Return a row of strings with the columns `HEAD` for each contact pair of a step, or one row if there are no pairs."""
+    begin = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
+    pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]
+    return [(*begin, *pair) for pair in pairs] or [(*begin, *[""] * (len(HEAD) - len(begin)))]
+
+
+def phases(shape: StepResult, count: int) -> list[StepResult]:
+    """Return a vibration with a given shape at `count` equidistant phases, as steps.
+
+    The load factor of a step is its phase in periods, in [0, 1). Raises ModelError if `count` is less than two.
+    """
+    if count < 2:
+        raise ModelError(f"count = {count}: a period needs two phases or more")
+    return [_times(shape, k + 1, k / count, math.cos(2.0 * math.pi * k / count)) for k in range(count)]
+
+
+def _times(shape: StepResult, index: int, phase: float, factor: float) -> StepResult:
+    return replace(
+        shape, index=index, load_factor=phase, displacement=factor * shape.displacement, stress=factor * shape.stress,
+        von_mises=abs(factor) * shape.von_mises, von_mises_signed=factor * shape.von_mises_signed, restart=None,
+        iterations={"parameter": "phase"},
+    )  # fmt: skip

@@ -16,8 +16,7 @@ from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
-from fastcontact.results.material_stress import MaterialStress
-from fastcontact.results.step import ContactResult, StepResult
+from fastcontact.results.step import ContactResult, MaterialStress, StepResult
 
 # Chunk sizes: number of rows of a growing table, and of bytes of a growing text.
 ROWS, BYTES = 64, 4096

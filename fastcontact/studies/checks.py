@@ -12,9 +12,8 @@ from fastcontact.cases.case import Case, build_case
 from fastcontact.errors import CaseError, in_file
 from fastcontact.studies.case_parameters import substituted
 from fastcontact.studies.job import job_of
-from fastcontact.studies.levels import make_mesh, recipe
 from fastcontact.studies.quantities import check_names
-from fastcontact.studies.settings import Combination, Settings, settings, shape_of
+from fastcontact.studies.settings import Combination, Settings, make_mesh, recipe, settings, shape_of
 
 log = logging.getLogger("fastcontact")
 MOST_RUNS = 100_000

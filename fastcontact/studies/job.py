@@ -6,13 +6,14 @@ import contextlib
 import copy
 import dataclasses
 import hashlib
+import inspect
 import json
 import math
 import time
 import traceback
 import warnings
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,18 +23,19 @@ import numpy as np
 
 from fastcontact._jit import decorators as _jit
 from fastcontact._version import __version__
-from fastcontact.analysis.run import solve_steps
-from fastcontact.cases.case import Case, build_case
-from fastcontact.cases.case_files import digest, files_named
+from fastcontact.analysis.run import solve, solve_steps
+from fastcontact.cases.case import Case, build_case, digest, files_named
 from fastcontact.contact.formulations import FORMULATIONS
 from fastcontact.errors import CaseError, FastcontactError, FastcontactWarning
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.fingerprint import digest_of_mesh
+from fastcontact.model.model import Model
 from fastcontact.model.pair_options import SHARED_OPTIONS
+from fastcontact.model.ramp import linear_ramp
 from fastcontact.results.step import StepResult
+from fastcontact.results.units import known_units
 from fastcontact.studies import quantities
-from fastcontact.studies.levels import Recipe, make_mesh, recipe
-from fastcontact.studies.settings import Combination, Settings
+from fastcontact.studies.settings import Combination, Recipe, Settings, make_mesh, recipe
 
 # Keys of contact pairs and obstacles that do not depend on the formulation.
 KEYS = {
@@ -119,6 +121,74 @@ class Job(Run):
     def pair_of(self, last: StepResult) -> str | None:
         """See `Run`."""
         return self.pair
+
+
+# A function of the last step, or of the list of all steps if its argument is named `STEPS`.
+Measure = Callable[..., float]
+# Names of quantities, or functions by the name of their quantity.
+Quantities = Sequence[str] | Mapping[str, Measure]
+STEPS = "steps"
+Function = Callable[..., Any]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FunctionRun(Run):
+    """A run that calls a function which returns a model or the steps of its solution."""
+
+    function: Function
+    positional: tuple[Any, ...]  # positional arguments
+    named: Mapping[str, Any]  # keyword arguments
+    measures: Mapping[str, Measure]  # functions of additional quantities, by name
+
+    def solved(self) -> tuple[Case | None, Sequence[StepResult]]:
+        """See `Run`."""
+        made = self._result()
+        if isinstance(made, Model):
+            case = Case(self.name, self.name, "", made.mesh, made, linear_ramp(), units=known_units(made.units))
+            return case, solve(made, case.ramp)
+        if isinstance(made, StepResult):
+            return None, [made]
+        if isinstance(made, Sequence) and len(made) and isinstance(made[-1], StepResult):
+            return None, made
+        raise CaseError(
+            f"the function {self.name} must return a Model, or what fc.solve returns, not {type(made).__name__}: end it with "
+            "'return'"
+        )
+
+    def further(self, steps: Sequence[StepResult]) -> dict[str, float]:
+        """See `Run`."""
+        return {name: _number(name, measure, steps) for name, measure in self.measures.items()}
+
+    def _result(self) -> Any:
+        """Return the result of the function; CaseError with the line of the error if it fails."""
+        try:
+            return self.function(*self.positional, **self.named)
+        except FastcontactError:
+            raise
+        except Exception as error:
+            lines = [entry.lineno for entry in traceback.extract_tb(error.__traceback__)][1:2]
+            where = f" at line {lines[0]}" if lines else ""
+            raise CaseError(f"the function {self.name} failed{where}: {type(error).__name__}: {error}") from error
+
+
+def _number(name: str, measure: Measure, steps: Sequence[StepResult]) -> float:
+    """Return the value of a quantity that a function of the caller evaluates; CaseError if the function fails."""
+    try:
+        return float(measure(steps if first_parameter(measure) == STEPS else steps[-1]))
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise CaseError(
+            f"the quantity '{name}' is a function that failed ({reason}): it must return a number of the last StepResult, "
+            f"or of the list of all if its argument is called '{STEPS}'"
+        ) from error
+
+
+def first_parameter(function: Function) -> str:
+    """Return the name of the first argument of a function, or ``"value"`` if it is unknown."""
+    try:
+        return next(iter(inspect.signature(function).parameters), "value")
+    except (TypeError, ValueError):  # compiled functions have no signature
+        return "value"
 
 
 @contextlib.contextmanager

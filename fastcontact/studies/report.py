@@ -1,7 +1,10 @@
-"""Base class of the reports of studies, with their layout for terminals, HTML pages and notebooks."""
+"""Reports of studies: tables of text, panels of axes, HTML pages, and their base class."""
 
 from __future__ import annotations
 
+import base64
+import html
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -11,11 +14,194 @@ from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
 from fastcontact.results.conversions import data_frame
+from fastcontact.results.plot._axes import new_panels, png
 from fastcontact.results.tables import structured
 from fastcontact.results.units import units_of_results
-from fastcontact.studies import render
 from fastcontact.studies.quantities import unit
-from fastcontact.studies.render import Rows, aligned
+
+Rows = list[list[str]]
+
+
+def number(value: float, digits: int = 6) -> str:
+    """Return a number as text, or a dash for NaN and infinity."""
+    return f"{value:.{digits}g}" if math.isfinite(value) else "-"
+
+
+def percent(value: float | None, uncertainty: float | None = None) -> str:
+    """Return a relative difference as a signed percentage, or a dash for None, NaN and infinity.
+
+    The percentage has three decimals, or four if the relative `uncertainty` is positive and below 1e-5.
+
+    Examples
+    --------
+    >>> percent(0.04005, 0.00003), percent(0.5)
+    ('+4.005 %', '+50.000 %')
+    """
+    if value is None or not math.isfinite(value):
+        return "-"
+    return f"{100 * value:+.{4 if uncertainty is not None and 0 < uncertainty < 1e-5 else 3}f} %"
+
+
+def by_columns(columns: Sequence[tuple[str, Sequence[str]]]) -> Rows:
+    """Return the rows of a table whose columns are given as headers and strings; the first row contains the headers."""
+    return [[name for name, _ in columns], *map(list, zip(*(texts for _, texts in columns), strict=True))]
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return rows of strings as lines with right-aligned columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  " + "  ".join(text.rjust(width) for text, width in zip(row, widths, strict=True)) for row in rows]
+
+
+MARKERS = "osD^v<>ph*"
+
+
+def marker(number: int) -> str:
+    """Return the marker of a curve, counted from 0."""
+    return MARKERS[number % len(MARKERS)]
+
+
+def panels(
+    rows: int,
+    columns: int,
+    size: tuple[float, float],
+    title: str = "",
+    widths: Sequence[float] | None = None,
+    **style: Any,
+) -> Any:
+    """Return the axes (rows, columns) of a new figure of `size` [inch]; `style` are options of its title.
+
+    `widths` are the relative widths of the columns [-]; by default all columns have the same width.
+    """
+    made = new_panels(rows, columns, size, 130, width_ratios=widths)
+    if title:
+        made[0, 0].figure.suptitle(title, **style)
+    return made
+
+
+def message(ax: Any, text: str) -> None:
+    """Replace axes without data by a message."""
+    ax.set_axis_off()
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, wrap=True)
+
+
+def frame(
+    ax: Any,
+    title: str,
+    labels: tuple[str, str],
+    *,
+    scales: tuple[str, str] = ("linear", "linear"),
+    grid: float = 0.4,
+    title_size: float | str = "large",
+    legend_size: float = 8,
+) -> None:
+    """Set the scales, the title, the labels, the grid and, if curves have labels, the legend of axes.
+
+    Parameters
+    ----------
+    ax : matplotlib.axes.Axes
+        Axes with curves.
+    title : str
+        Title of the axes.
+    labels : (str, str)
+        Labels of the x axis and the y axis.
+    scales : (str, str)
+        Scales of the x axis and the y axis: ``"linear"``, ``"log"`` or ``"plain log"``, a logarithmic scale with decimal
+        numbers instead of powers of ten.
+    grid : float
+        Opacity of the grid at major ticks [-]; there is no grid if it is 0.
+    title_size, legend_size : float or str
+        Font sizes, as defined by Matplotlib [point].
+    """
+    for axis, scale, setter in zip((ax.xaxis, ax.yaxis), scales, (ax.set_xscale, ax.set_yscale), strict=True):
+        if scale != "linear":
+            setter("log")
+        if scale == "plain log":
+            _plain(axis)
+    ax.set(xlabel=labels[0], ylabel=labels[1])
+    ax.set_title(title, fontsize=title_size)
+    if scales[1] == "linear":
+        ax.ticklabel_format(axis="y", useOffset=False, scilimits=(-4, 7))
+        low, high = ax.dataLim.intervaly
+        if 0.0 <= high - low < 1e-6 * max(abs(low), abs(high)):  # round-off is not a trend
+            ax.set_ylim(sorted((0.9 * low, 1.1 * low)))
+    if grid:
+        ax.grid(which="major", alpha=grid)
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(fontsize=legend_size)
+
+
+def _plain(axis: Any) -> None:
+    """Label a logarithmic axis with a few decimal numbers instead of powers of ten."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = axis.get_data_interval()
+    many = low > 0 and high > 30.0 * low
+    axis.set_major_locator(LogLocator(subs=(1.0,) if many else (1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.10g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+STYLE = """
+body { font-family: system-ui, sans-serif; line-height: 1.45; color: #1b1b1b; background: #fff;
+  max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; margin: 0.8rem 0; font-variant-numeric: tabular-nums; font-size: 0.9rem; }
+th, td { padding: 0.25rem 0.6rem; text-align: right; border-bottom: 1px solid #ddd; white-space: nowrap; }
+th { background: #f3f3f3; white-space: normal; vertical-align: bottom; }
+th:first-child, td:first-child { text-align: left; white-space: normal; }
+caption { text-align: left; font-weight: 600; padding: 0.4rem 0; }
+.wide { overflow-x: auto; } img { max-width: 100%; height: auto; } p.say { max-width: 50rem; }
+pre { background: #f6f6f6; padding: 0.8rem; overflow-x: auto; font-size: 0.85rem; }
+.failed { color: #a00; } footer { margin-top: 2.5rem; color: #555; font-size: 0.85rem; }
+"""
+
+
+def page(heading: str, blocks: Sequence[str], case_text: str) -> str:
+    """Return an HTML page with a heading, blocks of HTML, the text of the case, and the versions of the software."""
+    blocks = list(blocks)
+    if case_text:
+        blocks += [section("The case"), f"<pre>{html.escape(case_text)}</pre>"]
+    made = ", ".join(f"{name} {version}" for name, version in versions().items())
+    blocks.append(f"<footer>Made with {html.escape(made)}.</footer>")
+    return (
+        "<!DOCTYPE html>\n<html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width, initial-scale=1'>"
+        f"<title>{html.escape(heading)}</title><style>{STYLE}</style></head>\n<body>\n<h1>{html.escape(heading)}</h1>\n"
+        + "\n".join(blocks)
+        + "\n</body></html>\n"
+    )
+
+
+def section(heading: str) -> str:
+    """Return the heading of a section as HTML."""
+    return f"<h2>{html.escape(heading)}</h2>"
+
+
+def paragraph(text: str) -> str:
+    """Return a string as an HTML paragraph."""
+    return f"<p class='say'>{_signs(html.escape(text))}</p>"
+
+
+def failure(text: str) -> str:
+    """Return the reason of a failure as an HTML paragraph."""
+    return f"<p class='failed'>{html.escape(text)}</p>"
+
+
+def table(rows: Sequence[Sequence[str]], caption: str = "") -> str:
+    """Return rows of strings as an HTML table; the first row is the header."""
+    return f"<div class='wide'>{_signs(html_table(rows[1:], rows[0], caption, style=''))}</div>"
+
+
+def image(figure: Any, description: str) -> str:
+    """Return a Matplotlib figure as an HTML image with embedded data."""
+    data = base64.b64encode(png(figure)).decode("ascii")
+    return f"<p><img alt='{html.escape(description, quote=True)}' src='data:image/png;base64,{data}'></p>"
+
+
+def _signs(text: str) -> str:
+    return text.replace("+-", "&plusmn;")
+
 
 if TYPE_CHECKING:
     import pandas
@@ -85,12 +271,12 @@ class Report:
 
     def html(self) -> str:
         """Return the report as a self-contained HTML page."""
-        blocks = [*map(render.paragraph, self.sentences()), render.image(self.figure(), self.picture)]
-        blocks += [render.table(rows, caption) for caption, rows in self.tables()]
-        blocks += map(render.failure, self.remarks())
+        blocks = [*map(paragraph, self.sentences()), image(self.figure(), self.picture)]
+        blocks += [table(rows, caption) for caption, rows in self.tables()]
+        blocks += map(failure, self.remarks())
         if self.explanations:
-            blocks += [render.section("How to read this"), *map(render.paragraph, self.explanations)]
-        return render.page(f"{self.kind}: {self.title}", blocks, self.text)
+            blocks += [section("How to read this"), *map(paragraph, self.explanations)]
+        return page(f"{self.kind}: {self.title}", blocks, self.text)
 
     def table(self) -> AnyArray:
         """Return the numbers as a structured array (n_rows,)."""

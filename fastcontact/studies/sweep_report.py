@@ -12,8 +12,7 @@ import numpy as np
 
 from fastcontact.arrays import AnyArray
 from fastcontact.studies.quantities import column, title
-from fastcontact.studies.render import Rows, by_columns, frame, marker, message, number, panels, percent
-from fastcontact.studies.report import Report
+from fastcontact.studies.report import Report, Rows, by_columns, frame, marker, message, number, panels, percent
 from fastcontact.studies.series import Point, TheoryCurve, Value
 
 # Smallest ratio between the largest and the smallest parameter value for which axes are logarithmic.

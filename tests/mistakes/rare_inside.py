@@ -22,7 +22,7 @@ from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
 from fastcontact.cases.keys import called
 from fastcontact.cli import _study, bench, cases
-from fastcontact.cli._outputs import check_outputs
+from fastcontact.cli._files import check_outputs
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import _cut_faces
 from fastcontact.elasticity.constrained_system import System
@@ -34,11 +34,11 @@ from fastcontact.mesh.files import aster_mail, med, meshio_content
 from fastcontact.mesh.generate import _triangulate
 from fastcontact.mesh.generate.transform import renamed
 from fastcontact.results import reader
-from fastcontact.studies import execute, levels, render
-from fastcontact.studies.convergence import convergence_study
-from fastcontact.studies.levels import recipe
-from fastcontact.studies.settings import Combination, settings
-from fastcontact.studies.sweep import parameter_sweep
+from fastcontact.studies import execute
+from fastcontact.studies import report as render
+from fastcontact.studies import settings as levels
+from fastcontact.studies.runs import convergence_study, parameter_sweep
+from fastcontact.studies.settings import Combination, recipe, settings
 
 REPEATED = re.escape(str(pivot_order.RepeatedError()))
 

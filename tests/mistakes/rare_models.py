@@ -14,7 +14,7 @@ from fastcontact.linear import choice as linear
 from fastcontact.mesh.generate import block, box, half_spheres
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import contact_zones
-from fastcontact.results.plot.axis import stresses_on_axis
+from fastcontact.results.plot.profile import stresses_on_axis
 
 
 def obstacle(**options):
@@ -69,7 +69,7 @@ def picture_without_matplotlib(patch):
 
 
 def view_without_pyvista(patch):
-    from fastcontact.results.plot.view import view
+    from fastcontact.results.plot.shape import view
 
     without(patch, "pyvista")
     view(None, None)

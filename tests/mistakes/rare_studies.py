@@ -12,16 +12,15 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.cases.checks import Check, check_target
 from fastcontact.cli import _study
+from fastcontact.cli._files import write_text
 from fastcontact.cli._main import parser
-from fastcontact.cli._outputs import write_text
 from fastcontact.mesh.generate import block, box, half_spheres, merge_points
 from fastcontact.mesh.generate.refine import Circle, refined
 from fastcontact.studies import execute, fit
 from fastcontact.studies.adaptive import adaptive_study
 from fastcontact.studies.case_parameters import by_law
-from fastcontact.studies.convergence import convergence_study
-from fastcontact.studies.levels import make_mesh
-from fastcontact.studies.settings import combinations, settings
+from fastcontact.studies.runs import convergence_study
+from fastcontact.studies.settings import combinations, make_mesh, settings
 
 CASES = [
     ("mesh is a word", '[mesh]\nfile = "forma04a.med"', 'mesh = "forma04a.med"', r"of 'mesh' must be of type dict|'mesh' must be a table"),

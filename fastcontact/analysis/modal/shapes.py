@@ -21,8 +21,7 @@ from fastcontact.mesh.generate import union
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
 from fastcontact.results.conversions import data_frame
-from fastcontact.results.step import StepResult
-from fastcontact.results.steps import StepSequence, phases
+from fastcontact.results.step import StepResult, StepSequence, phases
 from fastcontact.round_off import ROUND_OFF
 
 if TYPE_CHECKING:

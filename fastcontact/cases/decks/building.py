@@ -11,26 +11,19 @@ from scipy.sparse import csr_array, vstack
 
 from fastcontact._tools.neighbours import nearest
 from fastcontact.arrays import Array
+from fastcontact.cases.decks import interactions
 from fastcontact.cases.decks.assembled import Element, Target
 from fastcontact.cases.decks.blocks import defined, folded, refusing
 from fastcontact.cases.decks.conditions import Acting, Component, Conditions
 from fastcontact.cases.decks.content import Content, Material, Pair, Section
-from fastcontact.cases.decks.cyclic_symmetry import add_sectors
+from fastcontact.cases.decks.fields import add_initial_stresses, add_temperatures
 from fastcontact.cases.decks.gaps import add_gap, check_discrete, gap_groups
 from fastcontact.cases.decks.histories import ByShape, Histories
-from fastcontact.cases.decks.initial_fields import add_initial_stresses, add_temperatures
-from fastcontact.cases.decks.interactions import (
-    cohesion_of,
-    conductance_of,
-    friction_heat_of,
-    friction_of,
-    perfect_conductance,
-)
 from fastcontact.cases.decks.local_axes import axes_by_cell, local_axes, orientation_of
 from fastcontact.cases.decks.materials import law_of, strain_of
 from fastcontact.cases.decks.meshing import begun, group_of_surface, secondary_group
-from fastcontact.cases.decks.pretension import add_sections, cut_sections
 from fastcontact.cases.decks.relating import make_rotations, relations_of
+from fastcontact.cases.decks.sections import add_sections, add_sectors, cut_sections
 from fastcontact.cases.decks.stepping import MOST_PARTS
 from fastcontact.contact.integration import all_nodes_carry
 from fastcontact.elasticity.material_axes import CylindricalAxes
@@ -339,23 +332,25 @@ class Building:
     def _options(self, pair: Pair) -> dict[str, Any]:
         alone = self.content.heat == "alone"
         if pair.tied:
-            heat = self.content.heat and {"conductance": perfect_conductance(self.content, self.model, pair.location)}
-            return {"kind": "gap_only" if alone else "tied", **(heat or {})}
+            kind: dict[str, Any] = {"kind": "gap_only" if alone else "tied"}
+            if self.content.heat:
+                kind["conductance"] = interactions.perfect_conductance(self.content, self.model, pair.location)
+            return kind
         law = self.content.interactions[folded(pair.interaction)]
-        options: dict[str, Any] = conductance_of(self.content, law) if self.content.heat else {}
+        options: dict[str, Any] = interactions.conductance_of(self.content, law) if self.content.heat else {}
         if alone:
             return {**options, "kind": "gap_only", **self._fitted(pair)}
         if law.cohesion:
-            return {**options, **cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
+            return {**options, **interactions.cohesion_of(self.content, law), **self._fitted(pair, glued=True)}
         if law.kind != "unilateral":
             if law.friction or law.changes:
                 raise law.refuse(f"friction with {law.kind} contact is not supported")
             options["kind"] = law.kind
         if law.penalty is not None and law.kind != "tied":
             options["penalty"] = law.penalty
-        options.update(friction_of(law, len(self.content.steps)))
+        options.update(interactions.friction_of(law, len(self.content.steps)))
         if "friction" in options and self.content.heat:
-            options.update(friction_heat_of(self.content, law))
+            options.update(interactions.friction_heat_of(self.content, law))
         return {**options, **self._fitted(pair)}
 
     def _fitted(self, pair: Pair, glued: bool = False) -> dict[str, Any]:

@@ -10,12 +10,11 @@ import numpy as np
 from fastcontact.cases.decks.assembled import Target, targets
 from fastcontact.cases.decks.blocks import Block, Location, Row
 from fastcontact.cases.decks.content import Given
-from fastcontact.cases.decks.heat import OF_HEAT, HeatConditions
+from fastcontact.cases.decks.fields import OF_HEAT, HeatConditions, by_point, initial_temperatures
 from fastcontact.cases.decks.histories import Histories
-from fastcontact.cases.decks.initial_fields import by_point, initial_temperatures
 from fastcontact.cases.decks.local_axes import local_directions
 from fastcontact.cases.decks.meshing import DeckMesh
-from fastcontact.cases.decks.pretension import Locks
+from fastcontact.cases.decks.sections import Locks
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 NAMED = {"XSYMM": (1,), "YSYMM": (2,), "ZSYMM": (3,), "ENCASTRE": (1, 2, 3, 4, 5, 6), "PINNED": (1, 2, 3)}

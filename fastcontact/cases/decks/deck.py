@@ -26,8 +26,7 @@ from fastcontact.elasticity.multipoint_constraints import TemporaryConstraint
 from fastcontact.errors import ContactError, FileError, MeshError, ModelError, warn
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Ramp, table_value
-from fastcontact.results.step import StepResult
-from fastcontact.results.steps import Steps
+from fastcontact.results.step import StepResult, Steps
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,16 +8,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 from fastcontact.cases.decks import (
-    cyclic_symmetry,
+    fields,
     gaps,
     geometry,
-    heat,
-    initial_fields,
     interactions,
     local_axes,
     materials,
-    pretension,
     relating,
+    sections,
     stepping,
 )
 from fastcontact.cases.decks.blocks import Block
@@ -116,13 +114,13 @@ TRANSLATED = {
     "AMPLITUDE": Keyword("model", stepping.amplitude, "NAME; TIME; DEFINITION; VALUE"),
     "CLEARANCE": Keyword("model", relating.clearance, "SLAVE; MASTER; SECONDARY; MAIN; VALUE"),
     "CONTACT PAIR": Keyword("model", relating.contact_pair, "INTERACTION; TYPE; ADJUST; SMALL SLIDING", "CPSET"),
-    "CYCLIC SYMMETRY MODEL": Keyword("model", cyclic_symmetry.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
+    "CYCLIC SYMMETRY MODEL": Keyword("model", sections.cyclic_symmetry_model, "N; TIE", "NGRAPH; CHECK; ELSET"),
     "EQUATION": Keyword("model", relating.equation),
     "GAP": Keyword("model", gaps.gap, "ELSET"),
-    "INITIAL CONDITIONS": Keyword("model", initial_fields.initial_conditions, "TYPE"),
+    "INITIAL CONDITIONS": Keyword("model", fields.initial_conditions, "TYPE"),
     "MPC": Keyword("model", relating.multi_point),
     "PHYSICAL CONSTANTS": Keyword("model", noted("no effect: there is no radiation"), ANYTHING),
-    "PRE-TENSION SECTION": Keyword("model", pretension.pretension_section, "SURFACE; NODE"),
+    "PRE-TENSION SECTION": Keyword("model", sections.pretension_section, "SURFACE; NODE"),
     "RIGID BODY": Keyword("model", relating.rigid_body, "NSET; ELSET; REF NODE; ROT NODE"),
     "SPRING": Keyword("model", gaps.spring, "ELSET"),
     "TIE": Keyword("model", relating.tie, "POSITION TOLERANCE; ADJUST; CYCLIC SYMMETRY; NAME", "TYPE; NO ROTATION"),
@@ -273,5 +271,5 @@ def read_content(blocks: Iterable[Block]) -> Content:
         raise reader.step.refuse("the step has no *END STEP: the deck is cut off, or the line is missing")
     if reader.coupling is not None:
         raise reader.coupling.refuse("*KINEMATIC or *DISTRIBUTING must follow")
-    heat.check_steps(reader.content)
+    fields.check_steps(reader.content)
     return reader.content

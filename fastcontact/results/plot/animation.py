@@ -18,8 +18,7 @@ from fastcontact._tools.paths import checked_target, replacing
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import UNKNOWN, Units, new_axes, settled, size_around
-from fastcontact.results.plot.fields import field_of
+from fastcontact.results.plot._axes import UNKNOWN, Units, field_of, new_axes, settled, size_around
 from fastcontact.results.plot.shape import deformed_shape, scale_of, scaled
 from fastcontact.results.plot.solid import show_box
 from fastcontact.results.step import StepResult

@@ -1,7 +1,9 @@
-"""Plot the deformed mesh, coloured by a field."""
+"""Plot the deformed mesh, and plane sections through 3D bodies, coloured by a field; also in interactive windows."""
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,12 +11,16 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array
+from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
+from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot._axes import (
     UNKNOWN,
     Axes,
+    Field,
     Units,
+    field_of,
     framed,
     mark,
     new_axes,
@@ -24,9 +30,8 @@ from fastcontact.results.plot._axes import (
     size_around,
     units_of,
 )
-from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.patches import fill, outlines
-from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, view_of_extreme
+from fastcontact.results.plot.patches import fill, outlines, shaded
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, view_of_extreme
 from fastcontact.results.step import StepResult
 
 LARGEST = 1e30  # largest coordinate that can be plotted without overflow in products of coordinates
@@ -179,3 +184,237 @@ def _draw(
         for loop in loops:
             ax.add_collection(PolyCollection(list(loop), facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
     return drawn
+
+
+# Distance by which a plane that only touches a body is moved into the body, relative to the size of the body.
+INSIDE = 1e-7
+# Corners of a tetrahedron on one side of the plane, by the number whose binary digits state which corners lie there.
+_FIRST = {k: [i for i in range(4) if k >> i & 1] for k in range(16)}
+_REST = {k: [i for i in range(4) if not k >> i & 1] for k in range(16)}
+
+
+@typed(FastcontactError)
+def section(
+    mesh: Mesh,
+    step: StepResult,
+    point: Sequence[float],
+    normal: Sequence[float],
+    *,
+    field: str = "von_mises",
+    scale: float | None = None,
+    edges: bool | None = None,
+    zoom: float | None = None,
+    title: str = "",
+    units: Units = UNKNOWN,
+    ax: Axes | None = None,
+) -> Axes:
+    """Plot a plane section through a 3D mesh, coloured by a field, with the largest value marked.
+
+    The plane is defined in the reference configuration; the section is drawn in the deformed configuration, projected along
+    the normal.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        A three-dimensional mesh.
+    step : StepResult
+        Results of a step.
+    point : sequence of 3 floats
+        A point of the plane in the reference configuration [length].
+    normal : sequence of 3 floats
+        Vector of any length normal to the plane [-].
+    field, scale, edges, title, units
+        Described for `deformed_shape`; the edges are the lines along which the plane cuts facets of cells.
+    zoom : float, optional
+        Half the width of the plotted region around the largest value [length]; by default the entire section is plotted.
+    ax : matplotlib Axes, optional
+        Axes of the plot; by default those of a new figure.
+
+    Returns
+    -------
+    matplotlib Axes
+
+    Raises
+    ------
+    FastcontactError
+        If the mesh is not three-dimensional, the normal is zero, or the plane does not intersect the mesh.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.box(divisions=(2, 2, 2))
+    >>> model = fc.Model(mesh, kinematics="3d")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("ZMIN", "xyz")
+    >>> model.add_pressure("ZMAX", 1.0)
+    >>> step = fc.solve(model, 1)[-1]
+    >>> ax = fc.plot.section(mesh, step, point=(0.5, 0.5, 0.5), normal=(0.0, 1.0, 0.0))
+    """
+    from matplotlib.collections import LineCollection
+
+    at, direction = _plane(mesh, point, normal)
+    shown, units = field_of(mesh, step, field), units_of(units, step)
+    triangles, lines = _touching(shown, step, at, direction)
+    scale = scale_of(scale, mesh, [step])
+    basis, labels = seen_along(direction, 1.0 - 1e-12)
+    corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])
+    flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
+    best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
+    points = flat.reshape(-1, 2)
+    points = points if zoom is None else np.array(part_shown(flat[best], zoom, points))
+    axes = new_axes(ax, size_around(points))
+    limits = shown.range if shown.signed else (float(values.min()), float(values.max()))
+    corner_rows = np.arange(values.size).reshape(-1, 3)
+    drawn = shaded(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
+    strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
+    if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
+        axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
+    before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
+    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    label = f"{shown.described(values[best], units, ' on the section')}\nundeformed at {placed(before, size)}"
+    mark(axes, flat[best], label)
+    if zoom is not None:
+        axes.set(xlim=points[:, 0], ylim=points[:, 1])
+    plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
+    state = f"{step.instant}, displacements x {scale:g}"
+    labels = labels or ("along the section", "across it")
+    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
+
+
+def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
+    """Return the point (3,) [length] and the unit normal (3,) [-] of a plane; FastcontactError if they are invalid."""
+    if mesh.dim != 3:
+        raise FastcontactError("sections are for meshes in three dimensions: draw the deformed shape of this one")
+    at, direction = np.array(point, float), np.array(normal, float)
+    both = at.shape == direction.shape == (3,) and bool(np.isfinite([at, direction]).all())
+    if not both or not np.linalg.norm(direction) > 0.0:
+        raise FastcontactError(
+            f"a section takes a point and a normal of 3 numbers, not {list(point)} and {list(normal)}"
+        )
+    return at, direction / np.linalg.norm(direction)
+
+
+def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tuple[Array, Array]:
+    """Return the section as triangles (n, 3, 7) and lines (m, 2, 7), with position, displacement and value at each corner.
+
+    A plane that coincides with a surface is moved slightly into the body. FastcontactError if the plane does not intersect
+    the mesh.
+    """
+    size = float(np.ptp(shown.mesh.points, axis=0).max())
+    data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
+    for move in (INSIDE, -INSIDE):
+        triangles, lines = _cut_cells(shown.mesh, data, data[:, :3] @ direction - at @ direction - move * size)
+        if len(triangles):
+            return triangles, lines
+    low, high = shown.mesh.points.min(axis=0), shown.mesh.points.max(axis=0)
+    raise FastcontactError(
+        f"the plane through {placed(at, size)} with normal {placed(direction, 1.0)} does not meet the mesh, which lies "
+        f"between {placed(low, size)} and {placed(high, size)}"
+    )
+
+
+def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
+    """Return the intersection of the cells with the plane, where the heights (n_points,) of the points are zero.
+
+    Each cell is divided into tetrahedra between its centre and triangles of its facets.
+    """
+    pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
+    for name, block in mesh.solids.items():
+        kind = elements.get(name)
+        kept = block[(height[block].min(axis=1) < 0.0) & (height[block].max(axis=1) >= 0.0)]
+        if not len(kept):
+            continue
+        middle = kind.shape(kind.nodes[: kind.n_corners].mean(axis=0)[None])[0]
+        centre, centre_height = np.einsum("n,end->ed", middle, data[kept]), height[kept] @ middle
+        for facet in kind.facets:
+            for triangle in np.array(facet)[flat_triangles(len(facet))]:
+                corners = kept[:, triangle]
+                corner_data = np.concatenate([data[corners], centre[:, None]], axis=1)
+                heights = np.column_stack([height[corners], centre_height])
+                cut, stroke = _cut_tetrahedra(corner_data, heights)
+                pieces.append(cut)
+                strokes.append(stroke)
+    return np.concatenate(pieces), np.concatenate(strokes)
+
+
+def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
+    """Return the intersection of tetrahedra (m, 4, k) with a plane as triangles (n, 3, k) and lines (n, 2, k).
+
+    The lines are the intersections with the first face of each tetrahedron, the face of the first three corners. `height`
+    (m, 4) contains the heights of the corners above the plane.
+    """
+    above = height >= 0.0
+    pattern = above @ np.array([1, 2, 4, 8])
+    pieces, strokes = [np.empty((0, 3, data.shape[2]))], [np.empty((0, 2, data.shape[2]))]
+    for kind in range(1, 15):
+        here = pattern == kind
+        if not here.any():
+            continue
+        up, down = _FIRST[kind], _REST[kind]
+        pairs = [(i, j) for i in up for j in down]
+        if len(pairs) == 4:  # the intersection is a quadrangle
+            pairs = [pairs[0], pairs[1], pairs[3], pairs[2]]
+        points = np.stack([_between(data[here], height[here], i, j) for i, j in pairs], axis=1)
+        pieces.append(points[:, :3])
+        if len(pairs) == 4:
+            pieces.append(points[:, [0, 2, 3]])
+        on_face = [k for k, (i, j) in enumerate(pairs) if i < 3 and j < 3]
+        if len(on_face) == 2:
+            strokes.append(points[:, on_face])
+    return np.concatenate(pieces), np.concatenate(strokes)
+
+
+def _between(data: Array, height: Array, i: int, j: int) -> Array:
+    """Return the data (n, k) interpolated linearly between two corners to the point of zero height."""
+    t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
+    return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
+
+
+def view(
+    results: Any, step: StepResult, *, scale: float | None = None, title: str = "", screenshot: str | None = None
+) -> None:
+    """Show the deformed mesh, coloured by the von Mises stress, in an interactive window.
+
+    Parameters
+    ----------
+    results : Results
+        An open result file.
+    step : StepResult
+        The step to show.
+    scale : float, optional
+        Factor by which displacements are multiplied, see `deformed_shape` [-].
+    title : str
+        Title of the plot.
+    screenshot : str, optional
+        Path of an image file that is written instead of opening a window.
+
+    Raises
+    ------
+    FastcontactError
+        If PyVista is not installed, or there is no display for a window.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> results = fc.open_results("press-fit.vtkhdf")  # doctest: +SKIP
+    >>> fc.plot.view(results, results[-1])  # doctest: +SKIP
+    """
+    try:
+        import pyvista
+    except ImportError as error:
+        raise FastcontactError("the interactive view needs PyVista: pip install 'fastcontact[view]'") from error
+    displayed = sys.platform in ("win32", "darwin") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    if screenshot is None and not displayed:
+        raise FastcontactError("there is no display to open a window on: write a picture instead, with --png FILE")
+    grid = results.to_pyvista(step)
+    grid.points = scaled(grid.points, scale_of(scale, results.mesh, [step]), grid.point_data["displacement"])
+    plotter: Any = pyvista.Plotter(off_screen=screenshot is not None)
+    plotter.add_mesh(
+        grid, scalars="von_mises", show_edges=grid.n_cells <= 5000, line_width=0.3, cmap="viridis",
+        scalar_bar_args={"vertical": True, "title": "von Mises stress"},
+    )  # fmt: skip
+    plotter.add_text(title or step.instant, font_size=10)
+    if results.mesh.dim == 2:
+        plotter.view_xy()
+    plotter.add_axes()
+    plotter.show(screenshot=screenshot or False)

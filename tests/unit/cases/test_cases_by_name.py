@@ -9,8 +9,7 @@ import pytest
 from pairwise import first_of
 
 import fastcontact as fc
-from fastcontact.cases.case import read_case
-from fastcontact.cases.case_files import case_path, shipped_case, shipped_cases
+from fastcontact.cases.case import case_path, read_case, shipped_case, shipped_cases
 from fastcontact.cli import main
 
 NAMES = list(shipped_cases())

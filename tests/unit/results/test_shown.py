@@ -26,8 +26,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.analysis.progress import Progress, StatusLine
 from fastcontact.errors import CaseError, FileError, MeshError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.steps import HEAD, SHOWN, Steps
+from fastcontact.results.step import HEAD, SHOWN, ContactResult, StepResult, Steps
 from fastcontact.results.tables import (
     contact_table,
     line_table,

@@ -10,8 +10,10 @@ import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.errors import CaseError, ContactError
-from fastcontact.studies import convergence, execute, levels
-from fastcontact.studies.convergence import convergence_study
+from fastcontact.studies import execute
+from fastcontact.studies import runs as convergence
+from fastcontact.studies import settings as levels
+from fastcontact.studies.runs import convergence_study
 from fastcontact.studies.settings import combinations, settings
 
 FORCE, PRESSURE = 600_000.0, 2900.0  # of theory

@@ -20,10 +20,9 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.studies import execute, job
 from fastcontact.studies.fit import fit_limit
-from fastcontact.studies.levels import recipe
-from fastcontact.studies.render import percent
-from fastcontact.studies.settings import Combination, combinations, settings
-from fastcontact.studies.sweep import parameter_sweep
+from fastcontact.studies.report import percent
+from fastcontact.studies.runs import parameter_sweep
+from fastcontact.studies.settings import Combination, combinations, recipe, settings
 
 
 def test_no_worker_is_left_half_started(monkeypatch):

@@ -10,12 +10,11 @@ from fastcontact.cases.case import read_case
 from fastcontact.cli import main
 from fastcontact.mesh.generate import GENERATORS
 from fastcontact.studies import quantities
-from fastcontact.studies.convergence import convergence_study
-from fastcontact.studies.convergence_tables import sentences
+from fastcontact.studies.convergence_report import sentences
 from fastcontact.studies.fit import fit_limit
 from fastcontact.studies.job import job_of
-from fastcontact.studies.levels import RULES, make_mesh, recipe
-from fastcontact.studies.settings import combinations, one_combination, settings
+from fastcontact.studies.runs import convergence_study
+from fastcontact.studies.settings import RULES, combinations, make_mesh, one_combination, recipe, settings
 
 BALL = """kinematics = "axisymmetric"
 mesh = { file = "block.med" }

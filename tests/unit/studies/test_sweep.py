@@ -9,8 +9,7 @@ import pytest
 import fastcontact as fc
 from fastcontact.cli import main
 from fastcontact.errors import CaseError
-from fastcontact.studies.convergence import convergence_study
-from fastcontact.studies.sweep import parameter_sweep
+from fastcontact.studies.runs import convergence_study, parameter_sweep
 from fastcontact.studies.sweep_report import parameter_label
 
 

@@ -20,12 +20,12 @@ from test_result_files import MESH, step_result, write
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.cli._results import case_data
+from fastcontact.cli._files import case_data
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
 from fastcontact.mesh.files.med import add_field, write_med_mesh
 from fastcontact.mesh.files.meshio_content import Block, build_mesh
-from fastcontact.results.med import write_med_results
+from fastcontact.results.exports import write_med_results
 
 HEAP = b"GCOL\x01\0\0\0"
 

@@ -1,0 +1,493 @@
+"""Studies of many runs: mesh convergence, with limits and theories, and sweeps over the values of parameters."""
+
+from __future__ import annotations
+
+import inspect
+import itertools
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from itertools import pairwise
+from math import prod
+from multiprocessing.reduction import ForkingPickler
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fastcontact._tools.argument_types import typed
+from fastcontact.cases.case import Case, build_case, described, read_case
+from fastcontact.errors import CaseError, FastcontactError, check_known, unknown, warn
+from fastcontact.results.units import known_units
+from fastcontact.studies.case_parameters import substituted
+from fastcontact.studies.checks import check_levels, check_runs
+from fastcontact.studies.convergence_report import Study
+from fastcontact.studies.execute import Progress, Result, run_study
+from fastcontact.studies.fit import Limit, fit_limit
+from fastcontact.studies.job import Function, FunctionRun, Job, Measure, Quantities, fields_of, first_parameter, job_of
+from fastcontact.studies.quantities import EXACT_THEORIES, LABELS, check_names, of_theory
+from fastcontact.studies.report import of_case
+from fastcontact.studies.series import Level, Point, Series, TheoryCurve, Value
+from fastcontact.studies.settings import (
+    Combination,
+    Named,
+    Settings,
+    combinations,
+    data_of,
+    make_mesh,
+    one_combination,
+    recipe,
+    settings,
+)
+from fastcontact.studies.sweep_report import Sweep, label_of
+
+
+@typed(CaseError)
+def convergence_study(
+    case: Case | str | Path | Function,
+    levels: int | Sequence[float] = 5,
+    elements: Sequence[str] | None = None,
+    formulations: Sequence[str] | None = None,
+    *,
+    quantities: Quantities = (),
+    executor: Executor | None = None,
+    workers: int | None = None,
+    store: str | Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    progress: bool = False,
+) -> Study:
+    """Solve a case or a Python model on successively finer meshes, and fit limits and orders of convergence.
+
+    From the limits follow the mesh error of every quantity and, if a theory is known, the model error. The meshes of a
+    case come from its mesh generator, with sizes that are halved from level to level, or from uniform refinement of its
+    mesh file, with new nodes on circular arcs placed on these arcs. The table ``[study]`` of a case file contains the
+    settings. The meshes of a function are those that it generates.
+
+    Parameters
+    ----------
+    case : Case, path-like or callable
+        A case, the path of a case file, or a function. The function receives the mesh size and returns a `Model`, which is
+        solved in 20 equal steps, or the result of `solve`.
+    levels : int or sequence of float
+        For a case the number of meshes. At least three are required for a limit, and five for a reliable error bar. For a
+        function the mesh sizes, which may be any length that tends to zero as the mesh is refined [length].
+    elements, formulations : sequence of str, optional
+        Element types and contact formulations of a case, which are compared in all combinations; ``["all"]`` stands for all
+        of them. By default those of ``[study]`` or, without this table, those of the case.
+    quantities : sequence of str, or dict of str to callable
+        Further quantities, in addition to the standard ones. For a case, their names, such as ``"C1.stress.yy"``,
+        ``"C1.displacement.y"`` and ``"C1.pressure"`` at the point group C1. For a function, names of standard quantities,
+        or functions by name. Such a function receives the last `StepResult`, or the list of all steps if its argument is
+        called ``steps``, and returns a number.
+    executor : concurrent.futures.Executor, optional
+        Executor of the runs, for example ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py; it is not
+        shut down. By default the runs are executed in processes on this machine.
+    workers : int, optional
+        Number of processes; by default one for each processor, and 1 for a function. With 1 all runs are executed in the
+        calling process. Several processes import the calling script, which must therefore call this function under
+        ``if __name__ == "__main__":``.
+    store : path-like, optional
+        Folder with the results of finished runs of a case. They are reused, and new results are added.
+    on_progress : callable, optional
+        Function that is called with a `Progress` after every run.
+    progress : bool
+        Whether to show the progress on standard error, in terminals and notebooks.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    CaseError, FastcontactError
+        If the case, a name or a number is invalid, or no mesh of any combination could be solved.
+
+    Warns
+    -----
+    FastcontactWarning
+        If the meshes of a function do not become finer with decreasing mesh size.
+
+    Examples
+    --------
+    >>> def squeezed(size):
+    ...     n = round(1 / size)
+    ...     model = fc.Model(fc.generate.block(divisions=(n, n)), kinematics="plane_strain")
+    ...     model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    ...     model.fix("BOTTOM", "xy")
+    ...     model.prescribe("TOP", y=-0.01)
+    ...     return fc.solve(model, 1)
+    >>> bulge = {"bulge": lambda step: step.displacement[:, 0].max()}
+    >>> study = fc.convergence_study(squeezed, [0.5, 0.25, 0.125], quantities=bulge)  # doctest: +SKIP
+    >>> study.best.limits["bulge"].value, study.best.limits["bulge"].uncertainty  # doctest: +SKIP
+    """
+    options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
+    options |= {"on_progress": on_progress, "progress": progress}
+    if callable(case):
+        refuse({"elements": elements, "formulations": formulations})
+        return _of_function(case, levels, quantities, options)
+    if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping):
+        raise CaseError(
+            "mesh sizes and functions as quantities are for Python models: give a case its number of levels"
+        )
+    case = case if isinstance(case, Case) else read_case(case)
+    if levels < 1:
+        raise CaseError(f"levels = {levels} must be at least 1; an extrapolated limit needs 3")
+    chosen = settings(case)
+    check_names(case, [*chosen.quantities, *quantities])
+    members = combinations(chosen, elements, formulations)
+    check_runs(levels * len(members))
+    check_levels(case, chosen, members, levels)
+    jobs = [level_job(case, chosen, member, level) for level in range(levels) for member in members]
+    results = run_study(jobs, "no level could be solved", **options)
+    return gathered(case, jobs, results, [*chosen.quantities, *quantities])
+
+
+def _of_function(
+    function: Function, sizes: int | Sequence[float], wanted: Quantities, options: dict[str, Any]
+) -> Study:
+    """Return the study of a function that returns models; `options` are passed to `run_functions`."""
+    if isinstance(sizes, int | np.integer):
+        raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
+    descending = sorted(map(float, sizes), reverse=True)
+    if not descending or len({*descending}) < len(descending) or not (descending[-1] > 0 and descending[0] < np.inf):
+        raise CaseError(f"the mesh sizes must be positive and all different, not {[*sizes]}")
+    name, measures = function_name(function), measures_of(wanted)
+    argument = first_parameter(function)
+    runs = [
+        FunctionRun(
+            label=f"{argument} = {size:g}", name=name, marks={"level": level}, size=level,
+            function=function, positional=(size,), named={}, measures=measures,
+        )
+        for level, size in enumerate(descending)
+    ]  # fmt: skip
+    results = run_functions(runs, "no size could be solved", **options)
+    solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
+    series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
+    for coarse, fine in pairwise(series.levels):
+        if fine.n_dofs <= coarse.n_dofs:
+            warn(
+                f"the mesh of size {fine.h:g} has {fine.n_dofs} degrees of freedom, that of size {coarse.h:g} has "
+                f"{coarse.n_dofs}: sizes must be lengths that shrink as meshes get finer, or limits and orders mean nothing"
+            )
+            break
+    return Study(**of_function(function, results), series=[series], failed={}, theory=None)
+
+
+def level_job(case: Case, chosen: Settings, member: Combination, level: int) -> Job:
+    """Return the job that solves a case with one element type and formulation on the mesh of one level."""
+    marks = {"level": level, "element": member.element, "formulation": member.formulation}
+    return job_of(case, chosen, member, level, label=f"{member} level {level}", marks=marks, size=level)
+
+
+def gathered(case: Case, jobs: Sequence[Job], results: Sequence[Result], wanted: Sequence[str]) -> Study:
+    """Return the study of finished runs.
+
+    The quantities in `wanted` are fitted in addition to the standard quantities and to those of the checks of the case.
+    """
+    by_combination: dict[Combination, list[tuple[int, Result]]] = {}
+    for job, result in zip(jobs, results, strict=True):
+        member = Combination(job.marks["element"], job.marks["formulation"])
+        by_combination.setdefault(member, []).append((job.marks["level"], result))
+    checked = [check.quantity for check in case.checks]
+    theories = case.theories.get(settings(case).pair or "", {})
+    theory, share = theories.get("theory"), theories.get("share", 1.0)
+    compared = "at equal approach" if settings(case).pair in case.approach else "under the given load"
+    series, failed = [], {}
+    for member, runs in by_combination.items():
+        if all("error" in result for _, result in runs):
+            failed[str(member)] = str(runs[0][1]["error"])
+        else:
+            series.append(_series(member, runs, [*wanted], checked, (theory, share, compared)))
+    return Study(**of_case(case), series=series, failed=failed, theory=theory)
+
+
+def _series(
+    member: Combination,
+    results: list[tuple[int, Result]],
+    wanted: Sequence[str],
+    checked: Sequence[str],
+    theory: tuple[Any, float, str],
+    asked: tuple[str, ...] = (),
+) -> Series:
+    """Return the series of one element type and formulation with its limits.
+
+    Quantities in `checked` are fitted if the results contain them. `theory` consists of the theory of the contact pair, the
+    fraction of the contact that the model represents, and the condition of the comparison (see `Series.compared`).
+    """
+    solved = [(number, result) for number, result in results if "error" not in result]
+    levels = [Level(number=number, **fields_of(Level, result)) for number, result in solved]
+    known = levels[-1].values
+    for name in wanted:
+        check_known("quantity", name, known, CaseError)
+    names = tuple(dict.fromkeys(name for name in (*LABELS, *checked, *wanted) if name in known))
+    limits = {name: limit for name in names if (limit := _limit(levels, name)) is not None}
+    failed = {number: str(result["error"]) for number, result in results if "error" in result}
+    at_force, spread = _at_force(*theory[:2], limits.get("force"))
+    last = {key: solved[-1][1][key] for key in ("theory", "reference")}
+    return Series(
+        member, levels, failed, **last, equal_force=at_force, equal_force_spread=spread, quantities=names, limits=limits,
+        exact_theory=isinstance(theory[0], EXACT_THEORIES), share=theory[1], compared=theory[2], asked=asked,
+    )  # fmt: skip
+
+
+def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the values of the theory at the limit of the force, and their variation within the error bar of the force."""
+    if force is None or not force.value > force.uncertainty or not hasattr(theory, "at_force"):
+        return {}, {}
+    middle, upper = (of_theory(theory.at_force((force.value + off) / share), share) for off in (0.0, force.uncertainty))
+    return middle, {name: abs(upper[name] - value) for name, value in middle.items()}
+
+
+def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
+    known = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
+    if len({h for h, _ in known}) < max(3, len(known)):
+        return None
+    return fit_limit(*zip(*known, strict=True))
+
+
+# Default refinement level of the meshes, on which mesh errors are smaller than the trends of interest.
+LEVEL = 2
+# Number of points of the curve of a theory.
+CURVE = 60
+
+
+@typed(CaseError)
+def parameter_sweep(
+    case: Case | str | Path | Function,
+    parameters: Mapping[str, Sequence[Value]] | Sequence[Value],
+    *,
+    quantities: Quantities = (),
+    element: str | None = None,
+    formulation: str | None = None,
+    level: int | None = None,
+    executor: Executor | None = None,
+    workers: int | None = None,
+    store: str | Path | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+    progress: bool = False,
+) -> Sweep:
+    """Solve a case or a Python model for all combinations of parameter values.
+
+    Parameters
+    ----------
+    case : Case, path-like or callable
+        A case, the path of a case file, or a function. The function receives the parameters and returns a `Model`, which is
+        solved in 20 equal steps, or the result of `solve`.
+    parameters : mapping of str to sequence, or sequence
+        Values of each parameter, by name. The parameters of a function are its arguments; a sequence alone contains values
+        of the first argument. A parameter of a case is the path of a number in the case file, such as
+        ``"contact.hertz.friction"``, ``"material[0].E"`` or ``"mesh.size"``, where tables in a list are numbered from 0. It
+        can also be a name in ``[study.parameters]``, which sets several linked values.
+    quantities : sequence of str, or dict of str to callable
+        Further quantities, described for `convergence_study`.
+    element, formulation : str, optional
+        Element type and contact formulation; by default the last of ``study.combinations`` or, without these, those of the
+        case.
+    level : int, optional
+        Number of refinements of the mesh. By default 2 if ``[study]`` defines the meshes of level 0; otherwise the mesh of
+        the case is used.
+    executor, workers, store, on_progress, progress
+        Described for `convergence_study`.
+
+    Returns
+    -------
+    Sweep
+
+    Raises
+    ------
+    CaseError, FastcontactError
+        If the case, a parameter or a value is invalid, or the model could not be solved for any combination.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> def block(nu):
+    ...     model = fc.Model(fc.generate.block(), kinematics="plane_strain")
+    ...     model.add_material(fc.LinearElastic(E=1000.0, nu=nu))
+    ...     model.fix("LEFT", "x")
+    ...     obstacle = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    ...     model.add_obstacle("floor", secondary="BOTTOM", obstacle=obstacle)
+    ...     model.prescribe("TOP", y=-0.001)
+    ...     return fc.solve(model, 1)
+    >>> sweep = fc.parameter_sweep(block, [0.0, 0.3])
+    >>> [round(point.values["force"], 6) for point in sweep.points]
+    [1.0, 1.098901]
+    """
+    options: dict[str, Any] = {"executor": executor, "workers": workers, "store": store}
+    options |= {"on_progress": on_progress, "progress": progress}
+    if callable(case):
+        refuse({"element": element, "formulation": formulation, "level": level})
+        return _sweep_of_function(case, parameters, quantities, options)
+    if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
+        raise CaseError("values without a name and functions as quantities are for Python models; a case takes names")
+    case = case if isinstance(case, Case) else read_case(case)
+    choices = _choices(parameters)
+    names = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
+    check_names(case, names)
+    jobs = [_job(case, choice, element, formulation, level) for choice in choices]
+    # Building one case in advance finds unknown keys, with which every run would fail.
+    build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
+    results = run_study(jobs, "no point of the sweep could be solved", **options)
+    return Sweep(
+        **of_case(case),
+        **_points(parameters, choices, results),
+        combination=str(jobs[0].marks["combination"]),
+        theories=_theory_curves(case, parameters, jobs[0].pair),
+        asked=names,
+        compared="at equal approach" if jobs[0].pair in case.approach else "",
+    )
+
+
+def _sweep_of_function(
+    function: Function,
+    parameters: Mapping[str, Sequence[Value]] | Sequence[Value],
+    wanted: Quantities,
+    options: dict[str, Any],
+) -> Sweep:
+    """Return the sweep of a function that returns models; `options` are passed to `run_functions`."""
+    named = isinstance(parameters, Mapping)
+    by_name = parameters if isinstance(parameters, Mapping) else {first_parameter(function): [*parameters]}
+    choices, name, measures = _choices(by_name), function_name(function), measures_of(wanted)
+    runs = [
+        FunctionRun(
+            label=label_of(choice), name=name, marks=choice, function=function,
+            positional=() if named else tuple(choice.values()), named=choice if named else {}, measures=measures,
+        )
+        for choice in choices
+    ]  # fmt: skip
+    results = run_functions(runs, "no point of the sweep could be solved", **options)
+    points = _points(by_name, choices, results)
+    return Sweep(**of_function(function, results), **points, combination=name, asked=tuple(wanted), compared="")
+
+
+def _choices(parameters: Mapping[str, Sequence[Value]]) -> list[dict[str, Value]]:
+    """Return all combinations of the values, in which the last parameter varies fastest.
+
+    CaseError if there are no combinations, or too many.
+    """
+    if not parameters or not all(len(values) for values in parameters.values()):
+        raise CaseError("a sweep needs at least one parameter with at least one value")
+    check_runs(prod(len(values) for values in parameters.values()))
+    return [dict(zip(parameters, values, strict=True)) for values in itertools.product(*parameters.values())]
+
+
+def _points(
+    parameters: Mapping[str, Sequence[Value]], choices: Sequence[dict[str, Value]], results: Sequence[Result]
+) -> dict[str, Any]:
+    """Return the fields of a `Sweep` that describe its parameters and points."""
+    runs = list(zip(choices, results, strict=True))
+    return {
+        "parameters": {name: tuple(values) for name, values in parameters.items()},
+        "points": [Point(parameters=choice, **fields_of(Point, r)) for choice, r in runs if "error" not in r],
+        "failed": [(choice, str(result["error"])) for choice, result in runs if "error" in result],
+    }
+
+
+def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
+    """Return the theory of a contact pair as a function of the first parameter, for each choice of the other parameters."""
+    (first, values), *others = parameters.items()
+    numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
+    if len(numbers) < len(values) or min(numbers) == max(numbers):
+        return ()
+    low, high = min(numbers), max(numbers)
+    x = np.geomspace(low, high, CURVE) if low > 0 else np.linspace(low, high, CURVE)
+    data = data_of(case)
+    linked = data.get("study", {}).get("parameters", {})
+    curves = []
+    for choice in itertools.product(*(values_of_other for _, values_of_other in others)):
+        rest = dict(zip((name for name, _ in others), choice, strict=True))
+        rows = [_theory_at(data, {first: float(value), **rest}, linked, pair) for value in x]
+        known = [name for name in rows[0] if all(name in row for row in rows)]
+        columns = {name: np.array([row[name] for row in rows]) for name in known}
+        curves.append(TheoryCurve(label_of(rest), x, columns))
+    return tuple(curves)
+
+
+def _theory_at(
+    data: dict[str, Any], choice: Mapping[str, Value], linked: Mapping[str, Any], pair: str | None
+) -> dict[str, float]:
+    """Return the quantities of the theory of a contact pair for a choice of parameters; empty if it is undefined there."""
+    for parameter, value in choice.items():
+        data = substituted(data, parameter, value, linked)
+    try:
+        theories = described(data)["theories"].get(pair or "", {})
+    except FastcontactError:  # for example because Poisson's ratio is outside the range of the theory
+        return {}
+    return of_theory(theories.get("theory"), theories.get("share", 1.0))
+
+
+def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
+    data = data_of(case)
+    linked = data.get("study", {}).get("parameters", {})
+    for parameter, value in choice.items():
+        data = substituted(data, parameter, value, linked)
+    chosen = settings(case, data)
+    member = one_combination(chosen, element, formulation)
+    finer = (LEVEL if chosen.by_shape else 0) if level is None else level
+    # The runs with the largest meshes start first. With a generator, the size of a run is the number of points on level 0.
+    size = make_mesh(recipe(chosen, member.element, 0), None).n_points if chosen.generator is not None else 0
+    marks = {**choice, "combination": f"{member}, level {finer}"}
+    return job_of(case, chosen, member, finer, label=label_of(choice), marks=marks, size=size)
+
+
+def function_name(function: Function) -> str:
+    """Return the name of a function for tables and messages."""
+    return str(getattr(function, "__name__", type(function).__name__))
+
+
+def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a `Report` on a function.
+
+    The text is the source of the function if Python knows it, and the units are those of the models in the `results`.
+    """
+    try:
+        text = inspect.getsource(function)
+    except (OSError, TypeError):
+        text = ""
+    name, units = function_name(function), next((result["units"] for result in results if result.get("units")), None)
+    title = (inspect.getdoc(function) or name).partition("\n")[0]
+    return {"name": name, "title": title, "text": text, "units": known_units(units or {})}
+
+
+def measures_of(wanted: Quantities) -> dict[str, Measure]:
+    """Return the quantities that are given as functions; CaseError for the name of a quantity that is not known."""
+    if isinstance(wanted, Mapping):
+        return dict(wanted)
+    for name in wanted:
+        if name not in LABELS:
+            raise CaseError(
+                unknown("quantity", name, LABELS)
+                + "; others are given as functions of the last step, such as quantities={'top': lambda step: ...}"
+            )
+    return {}
+
+
+def refuse(of_cases: Mapping[str, Any]) -> None:
+    """Raise CaseError if an option that only studies of case files have is given."""
+    for name, value in of_cases.items():
+        if value is not None:
+            raise CaseError(
+                f"'{name}' is for case files: a function makes the mesh and the contact itself, leave it out"
+            )
+
+
+def run_functions(
+    runs: Sequence[FunctionRun], name: str, *, executor: Executor | None, workers: int | None, **options: Any
+) -> list[dict[str, Any]]:
+    """Return the results of `run_study`; by default the runs are sequential in this process."""
+    if (executor is not None or (workers or 1) > 1) and not isinstance(executor, ThreadPoolExecutor):
+        _check_sendable(runs[0])
+    return run_study(runs, name, executor=executor, workers=workers or 1, **options)
+
+
+def _check_sendable(run: FunctionRun) -> None:
+    """Raise CaseError if a function cannot be sent to another process or cannot be imported there."""
+    try:
+        if any(function.__module__ == "__main__" for function in (run.function, *run.measures.values())):
+            inspect.getfile(sys.modules["__main__"])  # TypeError without a file, as in notebooks
+        ForkingPickler.dumps(run)
+    except Exception as error:
+        raise CaseError(
+            f"{run.name} or a quantity cannot be sent to other processes ({error}): define functions with names at the top "
+            "of a module, or use workers=1"
+        ) from error
