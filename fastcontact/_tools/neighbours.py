@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import chain
+
 import numpy as np
 
 from fastcontact.arrays import Array, Indices
@@ -35,3 +37,27 @@ def close_pairs(points: Array, within: float) -> Indices:
     from scipy.spatial import cKDTree
 
     return np.asarray(cKDTree(points).query_pairs(within, output_type="ndarray"), np.intp).reshape(-1, 2)
+
+
+def pairs_within(points: Array, centres: Array, radii: Array) -> tuple[Indices, Indices]:
+    """Return the rows (k,) of `points` (n, dim) and of `centres` (m, dim) that are at most `radii` (m,) apart [length].
+
+    They are in the order of the centres.
+    """
+    direction = NO_AXIS[: points.shape[1]]
+    along, at = points @ direction, centres @ direction
+    order = np.argsort(along)
+    first, end = np.searchsorted(along[order], at - radii), np.searchsorted(along[order], at + radii, "right")
+    if (end - first).sum() <= 8 * FEW:  # most pairs are excluded by one coordinate
+        centre = np.repeat(np.arange(len(at)), end - first)
+        point = order[np.arange(len(centre)) + np.repeat(end - np.cumsum(end - first), end - first)]
+        for x, middle in zip(points.T, centres.T, strict=True):
+            near = np.abs(x[point] - middle[centre]) <= radii[centre]
+            point, centre = point[near], centre[near]
+        near = ((points[point] - centres[centre]) ** 2).sum(axis=1) <= radii[centre] ** 2
+        return point[near], centre[near]
+    from scipy.spatial import cKDTree
+
+    members = cKDTree(points).query_ball_point(centres, radii)
+    centre = np.repeat(np.arange(len(members)), list(map(len, members)))
+    return np.fromiter(chain.from_iterable(members), np.intp, len(centre)), centre
