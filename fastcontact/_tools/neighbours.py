@@ -10,7 +10,8 @@ from fastcontact.arrays import Array, Indices
 
 # Pairs of points up to which all distances are computed.
 FEW = 250_000
-# A direction of length at most 1 that is parallel to no axis or diagonal of a structured mesh.
+# A direction of length at most 1 that is parallel to no axis or diagonal of a structured mesh. Points that are close have
+# neighbouring projections on it.
 NO_AXIS = np.array([0.46, 0.5718, 0.6789])
 
 
@@ -28,15 +29,15 @@ def nearest(places: Array, positions: Array) -> tuple[Array, Indices]:
 
 def close_pairs(points: Array, within: float) -> Indices:
     """Return the pairs of rows (k, 2) of `points` (n, dim) whose distance is at most `within` [length]."""
-    if len(points) ** 2 <= FEW:
-        squared = ((points[:, None] - points) ** 2).sum(axis=2)
-        return np.argwhere(np.triu(squared <= within**2, 1))
-    along = np.sort(points @ NO_AXIS[: points.shape[1]])
-    if not (np.diff(along) <= within).any():  # points that are close have neighbouring projections on a direction
+    along = points @ NO_AXIS[: points.shape[1]]
+    order = np.argsort(along)
+    near = np.diff(along[order]) <= within
+    if not near.any():
         return np.empty((0, 2), np.intp)
-    from scipy.spatial import cKDTree
-
-    return np.asarray(cKDTree(points).query_pairs(within, output_type="ndarray"), np.intp).reshape(-1, 2)
+    rows = np.sort(order[np.append(near, False) | np.insert(near, 0, False)])
+    other, one = pairs_within(points[rows], points[rows], np.full(len(rows), within))
+    pairs = rows[np.column_stack([one, other])[one < other]]
+    return pairs[np.lexsort(pairs.T[::-1])]
 
 
 def pairs_within(points: Array, centres: Array, radii: Array) -> tuple[Indices, Indices]:
