@@ -50,8 +50,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def prepare_workers(whole: bool) -> None:
     """Give each worker one processor; where all tests run on an empty cache, compile the usual kernels once for them."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    folder = cache.folder_of("")
-    if whole and decorators.compiled() and not any(folder.glob("*.nbc")):
+    folder = cache.folder_of()
+    if whole and folder and decorators.compiled() and not any(folder.glob("*.nbc")):
         for process in ahead.start((), decorators.threads()):
             process.wait()
 

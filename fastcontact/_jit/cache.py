@@ -11,18 +11,22 @@ import contextlib
 import hashlib
 import logging
 import os
+import pickle
 import secrets
 import stat
 import sys
 from collections.abc import Callable, Iterator
-from functools import cache, cached_property, lru_cache, partial
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
 import llvmlite
 import numba
 import numpy as np
+from numba.core.caching import _Cache
+from numba.core.compiler import CompileResult
 from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 
 from fastcontact._jit import compiling
 from fastcontact._version import __version__
@@ -35,8 +39,8 @@ DIGEST = 64
 CONSTANTS = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type(None))
 
 
-class KernelFiles:
-    """Files of the compiled versions of a kernel, with the interface of Numba's dispatcher.
+class KernelFiles(_Cache):  # type: ignore[misc]
+    """Files of the compiled versions of a kernel, in place of Numba's cache, which searches a folder for each kernel.
 
     Problems with a file are logged once, in one line; the kernel is then compiled.
 
@@ -50,18 +54,36 @@ class KernelFiles:
         The kernel in Python.
     options : str
         Options of the compilation.
-    numbas : object
-        Numba's cache implementation of the kernel, which serialises its objects.
     """
 
-    def __init__(self, folder: Path, name: str, function: Callable[..., Any], options: str, numbas: Any) -> None:
-        self.folder, self._name, self._function, self._options, self._numbas = folder, name, function, options, numbas
+    def __init__(self, folder: Path, name: str, function: Callable[..., Any], options: str) -> None:
+        self.folder, self._name, self._function, self._options = folder, name, function, options
+
+    @property
+    def cache_path(self) -> str:
+        """Folder of the files."""
+        return str(self.folder)
 
     def exist(self) -> bool:
         """Return whether the current kernel is stored for any signature."""
         with contextlib.suppress(OSError):
             return self.version in _versions(self.folder, os.stat(self.folder).st_mtime_ns)
         return False
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Return the compiled kernel of a signature, or None."""
+        rtsys.initialize(target)  # without the compiler that Numba's own method imports first (58 modules)
+        data = self.load(self._key(signature, target.codegen()))
+        return None if data is None else CompileResult._rebuild(target, *data)
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Store the compiled kernel of a signature, unless it contains addresses of this process."""
+        if not compiled.library.has_dynamic_globals:
+            self.save(self._key(signature, compiled.codegen), compiled._reduce())
+
+    def _key(self, signature: Any, codegen: Any) -> Any:
+        digests = tuple(hashlib.sha256(part).hexdigest() for part in (self._function.__code__.co_code, b""))
+        return signature, codegen.magic_tuple(), digests
 
     def load(self, key: Any) -> Any:
         """Return the stored kernel of a signature, after waiting for a helper that compiles it; None if there is none."""
@@ -75,7 +97,7 @@ class KernelFiles:
                     return None
                 content = file.read()
             if _digest(content[:-DIGEST]).encode() == content[-DIGEST:]:
-                return self._numbas._load_data(str(path))
+                return pickle.loads(content)  # the digest makes the file one of this package
             _log_once(f"the compiled kernel '{path}' is damaged")
         except FileNotFoundError:
             pass
@@ -85,7 +107,7 @@ class KernelFiles:
 
     def save(self, key: Any, data: Any) -> None:
         """Store the compiled kernel of a signature; the file is written completely or not at all."""
-        path, content = self._path(key), self._numbas._dump(data)
+        path, content = self._path(key), dumps(data)
         temporary = path.with_name(f"{path.name}.{secrets.token_hex(8)}")
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -98,6 +120,8 @@ class KernelFiles:
 
     def flush(self) -> None:
         """Do nothing: outdated files have other names."""
+
+    enable = disable = flush
 
     def _path(self, key: Any) -> Path:
         return self.folder / f"{self.version}.{_digest(repr(key).encode())[:24]}.nbc"
@@ -117,23 +141,16 @@ files: dict[Any, KernelFiles] = {}
 
 def keep(kernel: Any, function: Callable[..., Any], options: str) -> str:
     """Cache a kernel, compiled from a function with `options`, in `KernelFiles`; return the reason if this is impossible."""
-    numbas: Any = getattr(kernel, "_cache", None)
-    if numbas is None:
+    if not hasattr(kernel, "_cache"):
         return ""  # kernels are not compiled
-    folder = folder_of(numbas.cache_path)
+    folder = folder_of()
+    if folder is None:
+        return "no writable folder for compiled kernels"
     if not is_trusted(folder):
         return f"others may write to the folder of compiled kernels, {folder}"
     name = f"{function.__module__.rpartition('.')[2]}.{function.__qualname__}"
-    files[function] = numbas._cache_file = KernelFiles(folder, name, function, options, numbas._cache_file)
-    if hasattr(numbas, "_load_overload"):  # not a public name of Numba
-        numbas.load_overload = partial(_loaded, numbas)
+    files[function] = kernel._cache = KernelFiles(folder, name, function, options)
     return ""
-
-
-def _loaded(numbas: Any, signature: Any, target: Any) -> Any:
-    """Return a cached kernel, or None, without the compiler that Numba's own method imports first (58 modules)."""
-    rtsys.initialize(target)
-    return numbas._load_overload(signature, target)
 
 
 @lru_cache(maxsize=1)
@@ -143,8 +160,8 @@ def _versions(folder: Path, changed: int) -> set[str]:
 
 
 @cache
-def folder_of(fallback: str) -> Path:
-    """Return the folder of compiled kernels: in NUMBA_CACHE_DIR, otherwise in the user's cache, otherwise `fallback`."""
+def folder_of() -> Path | None:
+    """Return the folder of compiled kernels: in NUMBA_CACHE_DIR, otherwise in the user's cache, otherwise in the package."""
     chosen = str(getattr(numba.config, "CACHE_DIR", ""))
     if chosen:
         base = chosen
@@ -154,15 +171,15 @@ def folder_of(fallback: str) -> Path:
         base = os.path.expanduser("~/Library/Caches")
     else:
         base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    folder = Path(base, "fastcontact")
-    try:
-        if folder.is_absolute() or chosen:
-            folder.mkdir(parents=True, exist_ok=True)
-            if os.access(folder, os.W_OK):
-                return folder
-    except OSError:
-        log.debug("no compiled kernels in '%s'", folder)
-    return Path(fallback)
+    for folder in (Path(base, "fastcontact"), Path(__file__).parent / "__pycache__"):
+        try:
+            if folder.is_absolute() or chosen:
+                folder.mkdir(parents=True, exist_ok=True)
+                if os.access(folder, os.W_OK):
+                    return folder
+        except OSError:
+            log.debug("no compiled kernels in '%s'", folder)
+    return None
 
 
 @cache

@@ -102,20 +102,13 @@ def _compile(function: Callable[..., Any], fastmath: set[str] = AS_WRITTEN, **in
     options: dict[str, Any] = {"fastmath": fastmath, "nogil": True, "error_model": "numpy"}
     options["no_cfunc_wrapper"] = True  # an unused second entry point for C
     options |= inlining
-    try:
-        cached = numba.njit(cache=True, **options)(function)
-        reason = cache.keep(cached, function, repr(options | {"fastmath": sorted(fastmath)}))  # sets are unordered
-        if not reason:
-            return cached
-    except RuntimeError as error:  # numba: "cannot cache function ...: no locator available for file ..."
-        if "cannot cache" not in str(error):
-            raise
-        reason = "no writable folder for compiled kernels"
+    dispatcher = numba.njit(**options)(function)
+    reason = cache.keep(dispatcher, function, repr(options | {"fastmath": sorted(fastmath)}))  # sets are unordered
     global _cache_reported
-    if not _cache_reported:
+    if reason and not _cache_reported:
         _cache_reported = True
         log.info("%s (set NUMBA_CACHE_DIR to one of your own): compiling in every process", reason)
-    return numba.njit(cache=False, **options)(function)
+    return dispatcher
 
 
 if hasattr(os, "register_at_fork"):

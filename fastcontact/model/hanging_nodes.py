@@ -6,12 +6,12 @@ Where a coarse and a fine mesh meet, only common nodes are connected. The other 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.sparse import csr_array
 
+from fastcontact._tools.neighbours import pairs_within
 from fastcontact.arrays import Array, Indices, Mask, Numbers
 from fastcontact.mesh import elements
 from fastcontact.mesh.area_vectors import flat_area_vectors
@@ -77,8 +77,6 @@ def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: N
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     """Return nodes (m,) that lie on facets (m,) of their own body without belonging to them, and all outer facets."""
-    from scipy.spatial import cKDTree
-
     outer = _outer(mesh)
     if not len(outer.size):
         return np.empty(0, np.intp), np.empty(0, np.intp), outer
@@ -91,9 +89,8 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     reach = ON_ARC * outer.size + outer.rise
     nodes = np.flatnonzero(length > 0.0)
     spokes = np.linalg.norm(mesh.points[outer.corners] - outer.centre[:, None], axis=2).max(axis=1)
-    near = cKDTree(mesh.points[nodes]).query_ball_point(outer.centre, spokes + 2.0 * reach)
-    facet = np.repeat(np.arange(len(near)), [len(members) for members in near])
-    node = nodes[np.fromiter(chain.from_iterable(near), np.intp, len(facet))]
+    near, facet = pairs_within(mesh.points[nodes], outer.centre, spokes + 2.0 * reach)
+    node = nodes[near]
     height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
     facing = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5
     facing &= (np.abs(height) <= reach[facet]) & (outer.nodes[facet] != node[:, None]).all(axis=1)

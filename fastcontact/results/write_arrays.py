@@ -240,7 +240,7 @@ def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> Non
     table = file[f"fastcontact/{layout.restart_table(number)}"]
     if len(table) < len(state):
         table.resize(len(state), axis=0)
-    table[: len(state)] = state
+    _write(table, state, 0)
 
 
 def header_size(mesh: Mesh) -> int:
@@ -316,11 +316,20 @@ def _append_rows(table: Any, source: ContactResult | MaterialStress, prefix: str
 
 def _extend(table: Any, values: AnyArray, first: int | None = None) -> None:
     """Write values from row `first`, by default after the last row."""
-    first = len(table) if first is None else first
-    table.resize(first + len(values), axis=0)
-    table[first:] = values
+    first = table.id.shape[0] if first is None else first
+    table.id.set_extent((first + len(values), *values.shape[1:]))
+    _write(table, values, first)
 
 
 def _set_row(table: Any, number: int, value: Any) -> None:
-    table.resize(number + 1, axis=0)
-    table[number] = value
+    _extend(table, np.full((1, *table.id.shape[1:]), value, table.id.dtype), number)
+
+
+def _write(table: Any, values: AnyArray, first: int) -> None:
+    """Write values over the rows from `first`, without h5py's indexing, which takes longer than small tables do."""
+    from h5py import h5s
+
+    if values.size:
+        rows = table.id.get_space()
+        rows.select_hyperslab((first, *[0] * (values.ndim - 1)), values.shape)
+        table.id.write(h5s.create_simple(values.shape), rows, np.ascontiguousarray(values))

@@ -11,7 +11,7 @@ import numpy as np
 
 from fastcontact._tools.argument_types import typed
 from fastcontact._tools.hdf5 import check_size, opened, values
-from fastcontact._tools.neighbours import nearest
+from fastcontact._tools.neighbours import nearest, pairs_within
 from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import AnyArray, Array, Indices, Numbers
 from fastcontact.errors import FastcontactError, FileError, MeshError, ModelError, check_known, unknown
@@ -179,11 +179,9 @@ def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str)
 
 def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> None:
     """Raise MeshError if coincident points of the file have different values."""
-    from scipy.spatial import cKDTree
-
     assert field.places is not None
-    near = cKDTree(_in_space(field.places)).query_ball_point(_in_space(wanted), reach)
-    for point, members in zip(wanted, near, strict=True):
+    near, at = pairs_within(_in_space(field.places), _in_space(wanted), np.full(len(wanted), reach))
+    for point, members in zip(wanted, np.split(near, np.searchsorted(at, np.arange(1, len(wanted)))), strict=True):
         if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
             raise MeshError(
                 f"{name} has {len(members)} different values at {_in_space(point[None])[0]}, where bodies touch: write it on "

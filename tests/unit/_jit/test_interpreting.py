@@ -174,14 +174,8 @@ def test_the_time_of_earlier_runs_counts(tmp_path):
     assert ask() == "0"
 
 
-class Bytes:
-    """Numba's file of a kernel, as far as it turns objects into bytes."""
-
-    _dump = bytes
-
-
 def test_only_files_of_the_kernel_as_it_is_now_count(tmp_path):
-    files, others = (cache.KernelFiles(tmp_path, "kernel", same, options, Bytes) for options in ("one", "another"))
+    files, others = (cache.KernelFiles(tmp_path, "kernel", same, options) for options in ("one", "another"))
     assert not files.exist()
     others.save("float64", b"machine code")
     assert others.exist()
