@@ -10,7 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import Axes, new_axes, settled, size_around
+from fastcontact.results.plot._axes import LETTER, Axes, new_axes, settled, size_around
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 
@@ -42,7 +42,9 @@ def contacts(
     >>> ax = fc.plot.contacts(fc.find_contacts(fc.generate.block_on_block()))
     """
     mesh = found_contacts.mesh
-    axes = new_axes(ax, size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2), "3d" if mesh.dim == 3 else None)
+    width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
+    beside = LETTER * max(len(f"{pair.name}, secondary") for pair in found_contacts) if len(found_contacts) else 0.0
+    axes = new_axes(ax, (width + beside * (mesh.dim == 2), height), "3d" if mesh.dim == 3 else None)
     draw = _draw_2d if mesh.dim == 2 else _draw_3d
     draw(axes, found_contacts)
     if mesh.dim == 2:
