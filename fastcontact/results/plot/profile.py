@@ -101,7 +101,8 @@ def pressure_profile(
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
     ax.set(xlabel=labelled(f"{along} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
-    ax.set(ylabel=labelled("contact pressure", units, "pressure"), title=title or ax.get_title() or f"Contact '{contact.name}'")
+    ax.set(ylabel=labelled("contact pressure", units, "pressure"))
+    ax.set(title=title or ax.get_title() or f"Contact '{contact.name}'")
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
     ax.title.set_fontsize("medium")
