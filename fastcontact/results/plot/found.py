@@ -43,8 +43,10 @@ def contacts(
     """
     mesh = found_contacts.mesh
     width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
-    beside = LETTER * max(len(f"{pair.name}, secondary") for pair in found_contacts) if len(found_contacts) else 0.0
-    axes = new_axes(ax, (width + beside * (mesh.dim == 2), height), "3d" if mesh.dim == 3 else None)
+    if mesh.dim == 2:  # the legend is beside the axes
+        legend = LETTER * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
+        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.4 + legend)
+    axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     draw = _draw_2d if mesh.dim == 2 else _draw_3d
     draw(axes, found_contacts)
     if mesh.dim == 2:

@@ -156,7 +156,7 @@ def test_profiles_on_the_same_axes_differ_in_colour_and_are_whole():
 
 
 def test_the_legend_of_contacts_is_whole():
-    parts = [block((1.0, 4.0), (2, 8), origin=(x, 0.0), name=f"A RATHER LONG NAME {x:g}") for x in (0.0, 1.0)]
+    parts = [block((15.0, 56.0), (2, 8), origin=(x, 0.0), name=f"BODY {x:g}") for x in (0.0, 15.0)]
     ax = fc.plot.contacts(fc.find_contacts(fc.generate.union(*parts)))
     ax.figure.canvas.draw()
     for drawn in (ax.get_legend(), ax.yaxis):
