@@ -45,12 +45,12 @@ def contacts(
     width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
     if mesh.dim == 2:  # the legend is beside the axes
         legend = LETTER * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
-        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.4 + legend)
+        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + legend)
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     draw = _draw_2d if mesh.dim == 2 else _draw_3d
     draw(axes, found_contacts)
     if mesh.dim == 2:
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", anchor="W")
         axes.autoscale_view()
     else:
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
