@@ -39,7 +39,8 @@ class FoundContact:
     name : str
         Name of the pair: both bodies, and a number if they have several pairs.
     bodies : (str, str)
-        Names of the secondary and the primary body: the cell group of the body, or ``"body 1"`` and so on.
+        Names of the secondary and the primary body: the cell group of the body, ``"A+B"`` if the groups A and B form it, or
+        ``"body 1"`` and so on.
     secondary, primary : str
         Groups of facets in `FoundContacts.mesh`.
     facets : (int, int)
@@ -242,13 +243,20 @@ def _whole_bodies(mesh: Mesh) -> Numbers:
 
 
 def _names(mesh: Mesh, body: Indices) -> list[str]:
-    """Return the names of bodies: a cell group that is all of a body, else its number from 1."""
-    names, count = [f"body {k + 1}" for k in range(body.max() + 1)], np.bincount(body[body >= 0])
-    for group in reversed(list(mesh.cell_groups)):
-        members = body[mesh.cell_groups[group]]
-        members = members[members >= 0]
-        if len(members) and (members == members[0]).all() and len(members) == count[members[0]]:
-            names[members[0]] = group
+    """Return the names of bodies: a cell group that is a body, or up to four groups that form it, or its number from 1."""
+    count = np.bincount(body[body >= 0])
+    inside: list[dict[str, Indices]] = [{} for _ in count]
+    for group, cells in mesh.cell_groups.items():
+        solids = cells[body[cells] >= 0]
+        if len(solids) and np.ptp(body[solids]) == 0:
+            inside[body[solids[0]]][group] = solids
+    names = []
+    for number, (groups, size) in enumerate(zip(inside, count), start=1):
+        whole = [group for group, solids in groups.items() if len(solids) == size]
+        if not whole and 1 < len(groups) <= 4:
+            solids = np.concatenate([*groups.values()])
+            whole = ["+".join(groups)] if len(solids) == len(np.unique(solids)) == size else []
+        names.append(whole[0] if whole else f"body {number}")
     return names
 
 

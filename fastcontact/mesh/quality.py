@@ -20,7 +20,8 @@ EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
 # Remedies for bad cells, as parts of messages.
 REMEDIES = {
     "degenerate": "remove it or merge its points differently",
-    "inverted": "reorient it with mesh, count = fastcontact.topology.oriented(mesh), or refine if it is curved",
+    "inverted": "reorient it with mesh, count = fastcontact.topology.oriented(mesh), refine if it is curved, or move "
+    "mid-side nodes towards the middles of their edges",
 }
 
 

@@ -83,6 +83,13 @@ def test_a_body_in_a_corner_has_a_pair_for_each_wall():
     ]
 
 
+def test_a_body_is_called_by_the_groups_that_form_it():
+    legs = [block((1.0, 1.0), (2, 2), origin=(x, 0.0), name=name) for x, name in ((0.0, "A"), (1.0, "B"))]
+    seat = fc.generate.merge_points(union(*legs), 1e-9)
+    found = fc.find_contacts(union(seat, block((1.0, 1.0), (3, 3), origin=(0.5, 1.0), name="TOP BLOCK")))
+    assert [pair.name for pair in found] == ["TOP BLOCK on A+B"]
+
+
 def test_a_bolt_that_is_cut_is_one_body_and_touches_both_plates():
     """Head, joint and nut are found, not the cut; the clamping force goes through all three."""
     shank, head = block((4.0, 20.0), (4, 10)), block((8.0, 4.0), (8, 2), origin=(0.0, 20.0))

@@ -10,7 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import Axes, new_axes, settled, size_around
+from fastcontact.results.plot._axes import LETTER, Axes, new_axes, settled, size_around
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 
@@ -42,11 +42,15 @@ def contacts(
     >>> ax = fc.plot.contacts(fc.find_contacts(fc.generate.block_on_block()))
     """
     mesh = found_contacts.mesh
-    axes = new_axes(ax, size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2), "3d" if mesh.dim == 3 else None)
+    width, height = size_around(mesh.points) if mesh.dim == 2 else (6.4, 6.2)
+    if mesh.dim == 2:  # the legend is beside the axes
+        legend = LETTER * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
+        width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + legend)
+    axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
     draw = _draw_2d if mesh.dim == 2 else _draw_3d
     draw(axes, found_contacts)
     if mesh.dim == 2:
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", anchor="W")
         axes.autoscale_view()
     else:
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)

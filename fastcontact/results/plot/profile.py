@@ -78,10 +78,13 @@ def pressure_profile(
             f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: one of each node"
         )
     ax, units = new_axes(ax, (6.4, 5.0)), units_of(units, contact)
+    earlier = sum(line.get_marker() == "o" for line in ax.lines)
+    colour = ("tab:blue", "tab:orange", "tab:green", "tab:purple", "tab:brown", "tab:pink")[earlier % 6]
     order = np.argsort(contact.place, kind="stable")
     position, flat = contact.place[order], contact.coordinates.shape[1] == 2
     curves = _curves(theory, other_theories or {})
     low, high = _shown_range(contact, curves)
+    limits = (low, high, *(ax.get_xlim() if earlier else ()))
     shown = (position >= low) & (position <= high)
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
@@ -92,15 +95,16 @@ def pressure_profile(
     peak = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
     label = f"{contact.formulation.replace('_', '-')}: {peak}"
     pressure = contact.pressure[order][shown]
-    ax.plot(position[shown], pressure, "o-" if flat else "o", color="tab:blue", ms=4, lw=0.8, label=label)
+    ax.plot(position[shown], pressure, "o-" if flat else "o", color=colour, ms=4, lw=0.8, label=label)
     if stress is not None:
         label = r"$-n \cdot \sigma \cdot n$ at the nodes"
         ax.plot(position[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
-    _mark_edges(ax, contact, position, units)
+    _mark_edges(ax, contact, position, units, colour)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
     along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
-    ax.set(xlabel=labelled(f"{along} from the {start}", units, "length"), xlim=(low, high))
-    ax.set(ylabel=labelled("contact pressure", units, "pressure"), title=title or f"Contact '{contact.name}'")
+    ax.set(xlabel=labelled(f"{along} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
+    ax.set(ylabel=labelled("contact pressure", units, "pressure"))
+    ax.set(title=title or ax.get_title() or f"Contact '{contact.name}'")
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
     ax.grid(alpha=0.3)
     ax.title.set_fontsize("medium")
@@ -136,7 +140,7 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
-def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mapping[str, str]) -> None:
+def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mapping[str, str], colour: str) -> None:
     """Shade the range of the contact radius, in 2D as arc lengths, on both sides of the contact."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
@@ -147,14 +151,16 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
     label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
     if abs(centre) <= 0.01 * outside:
-        # Constraints may lie between nodes, so that the bounds of the radius are closer to each other than nodes are.
-        across, order = np.abs(contact.across), np.argsort(np.abs(contact.across))
-        inside, outside = np.interp(contact.radius, across[order], np.abs(contact.place)[order])
+        # Constraints may lie between nodes, so that the bounds of the radius are closer to each other than nodes are. Nodes
+        # beyond the contact are left out: on a curved surface, they may be as near to the middle along the tangent.
+        place = np.abs(contact.place)
+        near = np.flatnonzero(place <= outside)[np.argsort(place[place <= outside])]
+        inside, outside = np.interp(contact.radius, np.abs(contact.across)[near], place[near])
         label = f"edge: {inside:.4g} to {valued(outside, units, 'length')}"
     label += "" if contact.tangent is None else " (arc length)"
     for side in (-1.0, 1.0) if position.min(initial=0.0) < 0 else (1.0,):
         ends = centre + side * inside, centre + side * outside
-        ax.axvspan(min(ends), max(ends), color="tab:blue", alpha=0.15, lw=0, label=label if side > 0.0 else None)
+        ax.axvspan(min(ends), max(ends), color=colour, alpha=0.15, lw=0, label=label if side > 0.0 else None)
 
 
 # Depth of the plotted region, in contact radii.

@@ -122,3 +122,43 @@ def test_the_edge_in_a_profile_is_the_contact_radius(formulation):
     (edge,) = (text for text in told if text.startswith("edge"))
     ends = [float(word) for word in edge.split(": ")[1].split(" to ")]
     assert np.allclose(ends, contact.radius, rtol=1e-3)
+
+
+def conforming(closed_to):
+    """Return a contact along a half circle of radius 10 that is closed up to an angle [radian] from its middle."""
+    angle = np.linspace(0.0, np.pi, 51)
+    place, closed = 10.0 * angle, angle <= closed_to
+    normal = np.column_stack([np.sin(angle), np.cos(angle)])
+    across = 10.0 * np.sin(angle)
+    ends = float(across[closed].max()), float(across[closed.sum()])
+    zero = np.zeros(51)
+    return fc.ContactResult(
+        "pin", "mortar", np.arange(51), 10.0 * normal, place, zero, 1.0 * closed, zero, zero[:, None] * normal, normal,
+        closed, np.zeros(2), ends, middle=np.array([0.0, 10.0]), place=place, tangent=np.array([1.0, 0.0]),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("closed_to", [0.3, 0.9])
+def test_the_edge_on_a_circle_lies_between_the_last_closed_node_and_the_first_open_one(closed_to):
+    """Nodes on the far side of the circle, as near to the middle along the tangent, do not count."""
+    pin = conforming(closed_to)
+    (label,) = [line for line in fc.plot.pressure_profile(pin).get_legend_handles_labels()[1] if "edge" in line]
+    nodes = pin.place[pin.active.sum() - 1 :][:2]
+    assert label == f"edge: {nodes[0]:.4g} to {nodes[1]:.4g} (arc length)"
+
+
+def test_profiles_on_the_same_axes_differ_in_colour_and_are_whole():
+    ax = fc.plot.pressure_profile(conforming(0.9), title="both")
+    wide = ax.get_xlim()
+    fc.plot.pressure_profile(conforming(0.3), ax=ax)
+    assert len({line.get_color() for line in ax.lines}) == 2
+    assert (ax.get_xlim(), ax.get_title()) == (wide, "both")
+
+
+def test_the_legend_of_contacts_is_whole():
+    parts = [block((15.0, 56.0), (2, 8), origin=(x, 0.0), name=f"BODY {x:g}") for x in (0.0, 15.0)]
+    ax = fc.plot.contacts(fc.find_contacts(fc.generate.union(*parts)))
+    ax.figure.canvas.draw()
+    for drawn in (ax.get_legend(), ax.yaxis):
+        assert ax.figure.bbox.fully_containsx(drawn.get_tightbbox(ax.figure.canvas.get_renderer()).x0)
+        assert ax.figure.bbox.fully_containsx(drawn.get_tightbbox(ax.figure.canvas.get_renderer()).x1)
