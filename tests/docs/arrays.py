@@ -150,7 +150,7 @@ def is_array(annotation: Any, module: Any) -> bool:
     known = {
         word
         for word in words
-        if "ndarray" in repr(vars(module).get(word)) and not inspect.isfunction(vars(module)[word])
+        if "ndarray" in repr(vars(module).get(word)).lower() and not inspect.isfunction(vars(module)[word])
     }
     return bool(words & {"ArrayLike", "NDArray", "ndarray", "csr_array", "bsr_array"} or known)
 
