@@ -229,10 +229,8 @@ class WeightedMortar(Formulation):
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            moved = np.tile(at.obstacle_motion, (len(closing), 1))
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            turning = self.primary.turning(now, before, at.pose, at.pose_start)
-            moved = moved if turning is None else moved + turning
+            moved = self.primary.carried(now, before, at.pose, at.pose_start)
         return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
     def _nodal(self, weight: Array) -> WeightedPressures:
