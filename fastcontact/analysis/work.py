@@ -281,8 +281,7 @@ def _relative(pair: Formulation, at: Configuration) -> Array:
     moved = at.displacement - at.start
     if isinstance(pair.primary, RigidSide):
         points = pair.secondary.points
-        turning = pair.turning(Candidates(points[:, None], np.ones((len(points), 1))), at)
-        moved[points] -= at.obstacle_motion + (0.0 if turning is None else turning)
+        moved[points] -= pair.carried(Candidates(points[:, None], np.ones((len(points), 1))), at)
     return moved
 
 

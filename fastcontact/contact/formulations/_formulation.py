@@ -401,14 +401,12 @@ class Formulation(ABC):
         moved, turning = at.displacement - at.start, None
         total = mean @ moved
         if isinstance(self.primary, RigidSide):
-            total -= at.obstacle_motion
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            turned = self.primary.turning(now, before, at.pose, at.pose_start)
-            if turned is not None:  # The motion by rotation is an affine function of the positions.
+            total -= self.primary.carried(now, before, at.pose, at.pose_start)
+            if at.pose.angle != at.pose_start.angle:  # The motion is an affine function of the positions.
                 ends = np.vstack([np.zeros(now.shape[1]), np.eye(now.shape[1])])
-                varied = self.primary.turning(ends, ends[:1], at.pose, at.pose_start)
-                assert varied is not None
-                total, turning = total - turned, varied[1:] - varied[0]
+                varied = self.primary.carried(ends, ends[:1], at.pose, at.pose_start)
+                turning = varied[1:] - varied[0]
         return Slips(directions, tangential, total, moved, self.points + at.start, turning=turning)
 
     def slips(
@@ -435,10 +433,8 @@ class Formulation(ABC):
         along = tuple(rows_along(t, candidates, pairing, self.primary, self.points.size) for t in directions)
         slip0 = np.zeros((len(along), len(pairing.paired)))
         if isinstance(self.primary, RigidSide):
-            slip0 = -np.stack([t @ at.obstacle_motion for t in directions])
-            turning = self.turning(candidates, at)
-            if turning is not None:
-                slip0 -= np.stack([np.einsum("nd,nd->n", t, turning) for t in directions])
+            moved = self.carried(candidates, at)
+            slip0 = -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
         elif self.slip == "symmetric":
             slip0 = self._closing_slip(candidates, pairing, directions, at)
         return along, slip0
@@ -469,14 +465,11 @@ class Formulation(ABC):
         closer[rows] = self.smoothing.overlap(on_secondary, on_primary, axes)
         return closer
 
-    def turning(self, candidates: Candidates, at: Configuration) -> Array | None:
-        """Return the displacements (n, dim) of the points opposite to candidates by the rotation of an obstacle [length].
-
-        The rotation is that of the load step. None if the obstacle does not rotate.
-        """
+    def carried(self, candidates: Candidates, at: Configuration) -> Array:
+        """Return the displacements (n, dim) in the step of the points of an obstacle opposite to candidates [length]."""
         assert isinstance(self.primary, RigidSide)
         now, before = (candidates.positions(self.points + u) for u in (at.displacement, at.start))
-        return self.primary.turning(now, before, at.pose, at.pose_start)
+        return self.primary.carried(now, before, at.pose, at.pose_start)
 
     @cached_property
     def _held_nodes(self) -> Indices:
@@ -548,9 +541,7 @@ class Formulation(ABC):
         points = self.secondary.points[nodes]
         both, moved = self.held.at(points), (at.displacement - at.start)[points]
         if isinstance(self.primary, RigidSide):
-            moved = moved - at.obstacle_motion
-            turning = self.turning(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
-            moved = moved if turning is None else moved - turning
+            moved = moved - self.carried(Candidates(points[:, None], np.ones((len(nodes), 1))), at)
         else:
             rows = np.flatnonzero(pairing.paired)
             facing = places(self.primary, pairing.facet[rows], pairing.xi[rows])

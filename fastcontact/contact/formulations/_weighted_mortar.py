@@ -60,11 +60,14 @@ class Coverage(NamedTuple):
         Integrals over the overlap of the k test functions of the facets of each block [area].
     kept : ndarray of bool (m,)
         Whether a secondary node has a gap.
+    functions : list of (ndarray (n_facets, k, k), ndarray (n_facets, k, k))
+        For each block, the coefficients of psi in its shape functions [-], and the integrals of psi with these [area].
     """
 
     overlap: Overlap
     weights: list[Array]
     kept: Mask
+    functions: list[tuple[Array, Array]]
 
 
 @dataclass(eq=False)
@@ -131,7 +134,7 @@ class WeightedMortar(Formulation):
         deformed = self.points + at.displacement
         overlap = self._overlap(deformed, at.pose)
         weights = [mass.sum(axis=2) @ T.T for T, mass in zip(self._test, overlap.mass, strict=True)]
-        coverage = Coverage(overlap, weights, self._taking_part(weights))
+        coverage = self._coverage(overlap, weights, self._taking_part(weights))
         rows, across, closer = self._weighted(coverage)
         # An excluded node only loses its gap: the functions of its neighbours are not extended over its area.
         sums = np.where(self.options.excluded_nodes(self.secondary), 0.0, np.asarray(rows.sum(axis=1)).ravel())
@@ -186,7 +189,7 @@ class WeightedMortar(Formulation):
         at, acts, overlap = replace(at, displacement=displacement), multiplier != 0.0, coverage.overlap
         deformed = self.points + displacement
         nodes, shapes, functions, tests, first = [], [], Entries(), Entries(), 0
-        of_blocks = zip(self.secondary.blocks, self._test, self._functions(coverage), strict=True)
+        of_blocks = zip(self.secondary.blocks, self._test, coverage.functions, strict=True)
         for number, (block, T, (psi, _)) in enumerate(of_blocks):
             inside = self._points_of(block, overlap) if overlap.points is None else overlap.points[number]
             facet, shape, area = (values[acts[block.local].any(axis=1)[inside.facet]] for values in inside)
@@ -241,10 +244,8 @@ class WeightedMortar(Formulation):
         if not isinstance(self.primary, RigidSide):
             moved = -closing if self.slip == "symmetric" else np.zeros_like(closing)
         else:
-            moved = np.tile(at.obstacle_motion, (len(closing), 1))
             now, before = (mean @ (self.points + u) for u in (at.displacement, at.start))
-            turning = self.primary.turning(now, before, at.pose, at.pose_start)
-            moved = moved if turning is None else moved + turning
+            moved = self.primary.carried(now, before, at.pose, at.pose_start)
         return -np.stack([np.einsum("nd,nd->n", t, moved) for t in directions])
 
     def _nodal(self, weight: Array) -> WeightedPressures:
@@ -301,7 +302,7 @@ class WeightedMortar(Formulation):
         for along, nodes in without_slip:
             if not (nodes & coverage.kept).any():
                 continue
-            on_secondary, across, _ = self._weighted(coverage._replace(kept=coverage.kept & ~nodes))
+            on_secondary, across, _ = self._weighted(self._coverage(*coverage[:2], coverage.kept & ~nodes))
             other = csr_array(scaled(csr_array(on_secondary - across), 1.0 / weight) - mean)
             other.eliminate_zeros()
             for k, direction in enumerate(directions):
@@ -324,7 +325,7 @@ class WeightedMortar(Formulation):
         size = (len(self.secondary.points), len(self.points))
         rows, across, functions = Entries(), Entries(), {}
         closer = np.zeros((size[0], self.points.shape[1]))
-        of_blocks = zip(self.secondary.blocks, self._functions(coverage), overlap.closer, strict=True)
+        of_blocks = zip(self.secondary.blocks, coverage.functions, overlap.closer, strict=True)
         for block, (psi, products), depth in of_blocks:
             rows.add(block.local, block.facets, products)
             functions[block.element] = psi
@@ -335,19 +336,19 @@ class WeightedMortar(Formulation):
             across.add(coupling.secondary.local[secondary_facet], coupling.primary.facets[primary_facet], values)
         return rows.matrix(size), across.matrix(size), closer
 
-    def _functions(self, coverage: Coverage) -> list[tuple[Array, Array]]:
-        """Return the coefficients of psi in shape functions of each block, and the integrals with these, (n_facets, k, k)."""
-        functions, given = [], zip(self._test, coverage.overlap.mass, coverage.weights, self._whole, strict=True)
-        for block, (T, mass, weights, whole) in zip(self.secondary.blocks, given, strict=True):
-            kept = coverage.kept[block.local]
+    def _coverage(self, overlap: Overlap, weights: list[Array], kept: Mask) -> Coverage:
+        """Return the coverage with the functions psi of the nodes `kept` (m,)."""
+        functions, given = [], zip(self._test, overlap.mass, weights, self._whole, strict=True)
+        for block, (T, mass, covered, whole) in zip(self.secondary.blocks, given, strict=True):
+            of_facets = kept[block.local]
             if self.multipliers == "standard":
-                psi = np.where(kept[:, :, None], T, 0.0)
+                psi = np.where(of_facets[:, :, None], T, 0.0)
                 functions.append((psi, psi @ mass))
             else:  # by the fraction of the weights of a block's functions that faces the other side
-                fraction = np.divide(weights, whole, out=np.zeros_like(weights), where=whole > 0.0)
-                psi, D = dual_functions(T @ mass @ T.T, kept, fraction)
+                fraction = np.divide(covered, whole, out=np.zeros_like(covered), where=whole > 0.0)
+                psi, D = dual_functions(T @ mass @ T.T, of_facets, fraction)
                 functions.append((psi @ T, D @ np.linalg.inv(T).T))
-        return functions
+        return Coverage(overlap, weights, kept, functions)
 
     def _taking_part(self, covered: list[Array]) -> Mask:
         """Return which nodes (m,) have gaps, given the weights (n_facets, k) of all functions."""

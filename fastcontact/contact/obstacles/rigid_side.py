@@ -68,21 +68,20 @@ class RigidSide:
             raise ContactError("the distance from a rigid obstacle must be real numbers, not complex ones")
         return distance_and_normal
 
-    def turning(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array | None:
-        """Return the displacement of points of the obstacle's surface by rotation alone (n, dim) [length]; None without any.
+    def carried(self, positions: Array, before: Array, now: Pose, then: Pose) -> Array:
+        """Return the displacement of points of the obstacle's surface by its motion (n, dim) [length].
 
-        The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus the
-        displacement of the obstacle and minus this result. It equals the change of the position relative to the obstacle, in
-        the frame rotated by half the angle and scaled from the chord to the arc. It vanishes where a point sticks, and lies
-        along the circle where a point is at rest in 3D.
+        The slip of a point that moves from `before` to `positions` (n, dim) [length] is its displacement minus this result.
+        It equals the change of the position relative to the obstacle, in the frame rotated by half the angle and scaled from
+        the chord to the arc. It vanishes where a point sticks, and lies along the circle where a point is at rest in 3D.
         """
-        angle = now.angle - then.angle
+        angle, moved = now.angle - then.angle, np.tile(now.displacement - then.displacement, (len(positions), 1))
         if self.rotation is None or angle == 0.0:
-            return None
+            return moved
         half, centre = self.rotation.matrix(0.5 * angle), np.array(self.rotation.centre)
         end, start = positions - centre - now.displacement, before - centre - then.displacement
         slip = (end @ half - start @ half.T) * (0.5 * angle / math.sin(0.5 * angle))
-        return np.asarray((end - start) - slip)
+        return np.asarray(moved + ((end - start) - slip))
 
     def torque(self, positions: Array, forces: Array, at: Pose) -> float | None:
         """Return the moment about the axis of the obstacle of `forces` (n, dim) [force] at `positions` [length]."""
