@@ -19,7 +19,9 @@ from fastcontact.analysis.wear import too_fast
 from fastcontact.arrays import Array, Mask
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.surface import Surface
-from fastcontact.elasticity import element_kernels, recovery
+from fastcontact.elasticity import recovery
+from fastcontact.elasticity.energy import gradients_at
+from fastcontact.elasticity.mass import portions
 from fastcontact.elasticity.materials import LinearElastic
 from fastcontact.elasticity.nonlinear_materials import LARGEST_PLASTIC_STRAIN
 from fastcontact.mesh import elements
@@ -283,15 +285,15 @@ def largest_rotation(mesh: Mesh, displacement: Array) -> tuple[float, Array]:
 
     In linear kinematics it is half the curl of the displacement (n_points, dim).
     """
-    square, point, displacement = 0.0, np.zeros(mesh.dim), np.ascontiguousarray(displacement)
-    for name, block in mesh.solids.items():
-        element = elements.get(name)
+    square, point = 0.0, np.zeros(mesh.dim)
+    for name, rows in portions(mesh):
+        element, nodes = elements.get(name), mesh.cells[name][rows]
         centre = element.nodes[: element.n_corners].mean(axis=0)[None]
-        most, row = element_kernels.loops(mesh.dim).largest_rotation(
-            mesh.points, block, element.shape(centre), element.gradient(centre), displacement
-        )
-        if most > square:
-            square, point = most, mesh.points[block[row]].mean(axis=0)
+        gradient, _ = gradients_at(mesh.points[nodes], element.gradient(centre))
+        slopes = gradient[:, 0].transpose(0, 2, 1) @ displacement[nodes]
+        squares = ((slopes - slopes.transpose(0, 2, 1)) ** 2).sum(axis=(1, 2)) / 8.0
+        if squares.max() > square:
+            square, point = squares.max(), mesh.points[nodes[squares.argmax()]].mean(axis=0)
     return float(square**0.5), point
 
 

@@ -138,27 +138,6 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
 
 
 @interpretable_kernel
-def largest_rotation(points, cells, N, dN, displacement):
-    """Return the square of the largest rotation [radian^2] at the first point of the tables N, dN, and the cell's number.
-
-    The rotation is half the curl of the displacement (n_points, 2); the number is -1 if no cell rotates.
-    """
-    n_cells, n_nodes = cells.shape
-    gradient = np.empty((n_nodes, 2))
-    largest, number, first = 0.0, -1, np.int64(0)  # with an int literal, `_map` would be compiled a second time
-    for c in range(n_cells):
-        _map(points, cells[c], N, dN, first, gradient)
-        curl = 0.0
-        for a in range(n_nodes):
-            p = cells[c, a]
-            curl += gradient[a, 0] * displacement[p, 1] - gradient[a, 1] * displacement[p, 0]
-        square = 0.25 * curl * curl
-        if square > largest:
-            largest, number = square, c
-    return largest, number
-
-
-@interpretable_kernel
 def add_nodal(cells, extrapolation, at_points, low, high, total, count):
     """Extrapolate quadrature values to the nodes `low` to ``high - 1`` of each cell and sum them per node, in place.
 

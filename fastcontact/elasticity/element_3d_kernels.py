@@ -233,31 +233,6 @@ def stress(points, cells, N, dN, moduli, material, axisymmetric, displacement, o
                 out[c, q, i] = normal + D[i, 3] * gxy + D[i, 4] * gyz + D[i, 5] * gxz
 
 
-@interpretable_kernel
-def largest_rotation(points, cells, N, dN, displacement):
-    """Return the square of the largest rotation [radian^2] at the first point of the table dN, and the cell's number.
-
-    The rotation is half the curl of the displacement (n_points, 3); the number is -1 if no cell rotates.
-    """
-    n_cells, n_nodes = cells.shape
-    slopes, x, gradient = transposed(dN), np.empty((3, n_nodes)), np.empty((3, n_nodes))
-    largest, number, first = 0.0, -1, np.int64(0)  # with an int literal, `_map` would be compiled a second time
-    for c in range(n_cells):
-        _gather(points, cells, c, x)
-        map_3d(x, slopes, first, gradient)
-        around_x = around_y = around_z = 0.0
-        for a in range(n_nodes):
-            p = cells[c, a]
-            u, v, w = displacement[p, 0], displacement[p, 1], displacement[p, 2]
-            around_x += gradient[1, a] * w - gradient[2, a] * v
-            around_y += gradient[2, a] * u - gradient[0, a] * w
-            around_z += gradient[0, a] * v - gradient[1, a] * u
-        square = 0.25 * (around_x * around_x + around_y * around_y + around_z * around_z)
-        if square > largest:
-            largest, number = square, c
-    return largest, number
-
-
 @kernel
 def add_internal_force(points, cells, N, dN, weights, axisymmetric, stresses, force):
     """Add the nodal forces of `stresses` (n_cells, n_q, 6) to `force` (n_points, 3), in place."""

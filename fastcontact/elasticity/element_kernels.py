@@ -7,7 +7,7 @@ from types import ModuleType
 
 @cache
 def loops(dim: int) -> ModuleType:
-    """Return the module with `add_stiffness`, `stress`, `largest_rotation` and `add_internal_force` for `dim` coordinates."""
+    """Return the module with `add_stiffness`, `stress` and `add_internal_force` for `dim` coordinates."""
     if dim == 2:
         from fastcontact.elasticity import element_2d_kernels
 
