@@ -104,6 +104,17 @@ def beyond(triangle, s, t):
 
 
 @innermost_kernel
+def _off(triangle, s, t):
+    """Return the sum of the overhangs beyond all edges, which beside an edge is smaller than that of the next facets.
+
+    Beyond the end of the surface, the largest overhangs of a facet and of the next one along this end are equal.
+    """
+    if triangle:
+        return max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
+    return 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
+
+
+@innermost_kernel
 def inside(triangle, s, t):
     """Return reference coordinates moved into a facet, whichever its first corner is."""
     if triangle:
@@ -115,14 +126,14 @@ def inside(triangle, s, t):
 
 @innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height):
-    """Return the facet next to `f` with the smallest overhang of the projection, (s, t), and the overhang or infinity."""
+    """Return the facet next to `f` with the smallest `_off` of the projection, (s, t), and this value or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
-        out = beyond(triangular[g], s, t) if converged else np.inf
+        out = _off(triangular[g], s, t) if converged else np.inf
         # Of several equivalent facets, the first one is taken.
         if converged and max(out, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, out
@@ -157,9 +168,9 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
         if good and out <= BEYOND:
             s, t, over = a, b, out
             if out > LENGTH_ROUND_OFF:
-                other, a, b, out = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
-                if out < over:
-                    f, s, t, over = other, a, b, out
+                other, a, b, off = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
+                if off < _off(triangular[f], s, t):
+                    f, s, t, over = other, a, b, beyond(triangular[other], a, b)
         s, t = inside(triangular[f], s, t)
         facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0
         normal[i, 0], normal[i, 1], normal[i, 2] = unit(_place(directions, f, s, t)[0])
