@@ -342,7 +342,8 @@ def _flow(carried, axes, old, new):
             for j in range(i + 1):
                 new[voigt(i, j)] = factor[i, j] - (1.0 if i == j else 0.0)
     else:
-        new[:6] = old[:6]
+        for k in range(6):  # assigning a slice would compile its error message as well, which takes seconds
+            new[k] = old[k]
 
 
 @kernel

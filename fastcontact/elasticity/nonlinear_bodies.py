@@ -11,7 +11,7 @@ from scipy.sparse import bsr_array
 
 from fastcontact._jit import parallel
 from fastcontact.arrays import Array, Numbers
-from fastcontact.elasticity import body_kernels, dilatation
+from fastcontact.elasticity import dilatation
 from fastcontact.elasticity.constitutive_kernels import LINEAR, LOGARITHMIC, PLASTIC, SAINT_VENANT
 from fastcontact.elasticity.dilatation import REMAINDER
 from fastcontact.elasticity.energy import gradients_at
@@ -164,6 +164,8 @@ class NonlinearBodies:
         elastic: bool,
     ) -> DeformedBodies:  # fmt: skip
         """Return the result of `at`; `data` (n_blocks, dim, dim) receive the tangent, see `body_kernels.linearise`."""
+        from fastcontact.elasticity import body_kernels  # most models are linear
+
         mesh, dim, pattern = self.mesh, self.mesh.dim, self._pattern
         history, stress, force, energy = {}, {}, np.zeros((mesh.n_points, dim)), np.zeros(2)
         finite, degrees = (self.finite, geometric), np.zeros(0) if rise is None else rise
@@ -204,6 +206,8 @@ class NonlinearBodies:
         return DeformedBodies(whole, force, history, stress, float(energy[0]), float(energy[1]))
 
     def _failure(self, status: int, name: str, cell: int, displacement: Array) -> str:
+        from fastcontact.elasticity import body_kernels
+
         where = self.mesh.points[self.mesh.cells[name][cell]].mean(axis=0)
         measure = self._measures(name, cell, displacement).min()
         failure = f"is inverted (J = {measure:.3g})"
@@ -239,6 +243,8 @@ class NonlinearBodies:
 
     def _strains(self, name: str, bodies: DeformedBodies, displacement: Array) -> tuple[Array, Array, Array]:
         """Return J (n_cells, n_q), and the volume ratios and largest logarithmic strains (n_cells,) of cells."""
+        from fastcontact.elasticity import body_kernels
+
         N, dN, weights = elements.get(name).tables
         cells, across = self.mesh.cells[name], np.zeros(self._cells[name].shape)
         if self.kinematics == "plane_stress":

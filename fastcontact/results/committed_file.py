@@ -34,6 +34,7 @@ from fastcontact.results import journal
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
 # Longest write that is compared with the file [bytes]. In longer writes, which are data, all bytes change.
 COMPARED = 1 << 16
+SIGNALS = tuple(map(int, signal.valid_signals()))
 
 
 class CommittedFile(DriverFile):
@@ -213,7 +214,7 @@ def uninterrupted() -> Iterator[None]:
         yield
         return
     arrived: list[tuple[int, FrameType | None]] = []
-    handlers = {int(number): signal.getsignal(number) for number in signal.valid_signals()}
+    handlers = {number: signal.getsignal(number) for number in SIGNALS}
     try:
         with contextlib.ExitStack() as restored:  # restores all handlers even after an error
             for number, handler in handlers.items():

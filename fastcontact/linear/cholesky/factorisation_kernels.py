@@ -150,18 +150,25 @@ def factorise(
                 return low + bad
             _store(F, low, high - low, begins, L, d, waiting[used : used + m * m].reshape(m, m))
         else:
-            L[begins[low] : begins[high]] = last[0][begins[low] : begins[high]]
-            d[low:high] = last[1][low:high]
+            _copy(last[0], begins[low], L, begins[low], begins[high] - begins[low])
+            _copy(last[1], low, d, low, high - low)
             if source[s] == BELOW:
                 continue
-            waiting[used : used + m * m] = last[2][source[s] : source[s] + m * m]
+            _copy(last[2], source[s], waiting, used, m * m)
         if target[s] >= 0:
-            updates[target[s] : target[s] + m * m] = waiting[used : used + m * m]
+            _copy(waiting, used, updates, target[s], m * m)
         if m:
             left[top] = s
             top += 1
             used += m * m
     return -1
+
+
+@kernel
+def _copy(source: Array, at: int, target: Array, to: int, count: int) -> None:
+    """Copy entries; assigning a slice would compile its error message as well, which takes seconds."""
+    for k in range(count):
+        target[to + k] = source[at + k]
 
 
 @kernel
