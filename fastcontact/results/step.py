@@ -10,7 +10,8 @@ import numpy as np
 
 from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
-from fastcontact.errors import FastcontactError, unknown
+from fastcontact.elasticity.recovery import principal_stress, tresca
+from fastcontact.errors import FastcontactError, Suggesting, unknown
 from fastcontact.results.material_stress import MaterialStress
 from fastcontact.results.units import with_unit
 
@@ -41,7 +42,7 @@ def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactResult:
+class ContactResult(Suggesting):
     """State of one contact pair at the end of a load step.
 
     Arrays of length m belong to the m nodes of the secondary side, which are ordered along the surface.
@@ -281,7 +282,7 @@ class ContactsByName(dict[str, ContactResult]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepResult:
+class StepResult(Suggesting):
     """State at the end of one load step.
 
     Attributes
@@ -401,6 +402,16 @@ class StepResult:
         warnings = [("warning", text) for text in self.warnings]
         table = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
         return table + "".join(contact._repr_html_() for contact in self.contact.values())
+
+    @property
+    def principal_stress(self) -> Array:
+        """Principal stresses (n_points, 3) of `stress`, in ascending order [pressure]."""
+        return principal_stress(self.stress)
+
+    @property
+    def tresca(self) -> Array:
+        """Tresca stress (n_points,) of `stress`, the largest minus the smallest principal stress [pressure]."""
+        return tresca(self.stress)
 
     @property
     def pretension(self) -> dict[str, dict[str, float]]:
