@@ -91,9 +91,9 @@ def __getattr__(name: str) -> Any:
     elif name in _MODULES:
         value = importlib.import_module(f"{__name__}.{_MODULES[name]}")
     else:
-        from fastcontact.errors import no_attribute
+        from fastcontact.errors import names_of
 
-        raise no_attribute(__name__, name, __all__)
+        return names_of(__name__, __all__)[0](name)
     globals()[name] = value
     return value
 

@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 LONGEST = 1500  # largest number of characters of a message
 
@@ -100,26 +100,61 @@ LONGEST_NAME = 120
 SHOWN = 20  # largest number of known names in the message about an unknown one
 # Words of this package for words of its methods and of other programs.
 OTHER_WORDS = {
-    "slave": "secondary", "master": "primary", "mu": "friction", "h": "coefficient", "plane": "half_space",
+    "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
+    "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
     "fix": "support", "prescribe": "support", "relate": "relation", "relate_groups": "group_relation",
+    "alpha": "expansion", "rho": "density", "sigma_y": "yield_stress", "nlgeom": "strain", "large": "finite",
+    "2d": "plane_strain", "steps": "ramp", "n_steps": "ramp", "hertz": "hertz_point", "hertz_sphere": "hertz_point",
+    "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders", "material": "linear_elastic", "rectangle": "block",
+    "cylinder": "rings", "rotate": "transformed", "rotated": "transformed", "scale": "transformed", "scaled": "transformed",
+    "u": "displacement", "time": "load_factor", "forces": "reaction", "traction": "shear", "nodes": "points",
+    "elements": "cells", "groups": "group_names", "status": "active", "add_load": "add_force", "add_bolt": "add_pretension",
+    "plastic_strain": "cell_fields", "work": "dissipation", "save": "result_writer", "to_vtk": "result_writer",
+    "steel": "linear_elastic", "archard": "wear", "add_preload": "add_pretension", "add_displacement": "prescribe",
+    "add_symmetry": "fix", "add_friction": "add_contact",
 }  # fmt: skip
 
 
-def no_attribute(module: str, name: str, known: Iterable[str]) -> AttributeError:
-    """Return the AttributeError for a name that a module lacks, with the nearest known names."""
-    text = f"module '{module}' has no attribute '{name}'"
-    if name.startswith("_"):  # tools look up such names
-        return AttributeError(text)
-    near = difflib.get_close_matches(name.casefold(), known, n=3, cutoff=0.5)
-    remedy = ": did you mean " + " or ".join(map(repr, near)) + "?" if near else ""
-    return AttributeError(text + remedy, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
+def nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> list[str]:
+    """Return the known names that may be meant by a name: the one of `OTHER_WORDS`, or up to three with similar spelling."""
+    names = {candidate.casefold(): candidate for candidate in known}
+    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").replace("_", "")
+    near = [text for key, text in names.items() if meant and key.rpartition(".")[2].replace("_", "") == meant][-1:]
+    near = near or difflib.get_close_matches(name, names.values(), n=3, cutoff=cutoff)
+    return near or [names[key] for key in difflib.get_close_matches(name.casefold(), names, n=3, cutoff=cutoff)]
+
+
+def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
+    """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with the nearest known names."""
+    text = f"{owner} has no attribute '{name}'"
+    near = (
+        nearest(name, known, 0.6)
+        or [each for each in known if len(name) > 2 and name.casefold() in each.casefold()][:3]
+    )
+    if near:
+        text += ": did you mean " + " or ".join(map(repr, near)) + "?"
+    elif name in getattr(sys.modules["fastcontact"], "__all__", ()):
+        text += f": it is the function fastcontact.{name}"
+    return AttributeError(text, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
+
+
+class Suggesting:
+    """Base of classes whose objects suggest their nearest attributes in the AttributeError for one that they lack."""
+
+    if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
+
+        def __getattr__(self, name: str) -> object:
+            if name.startswith("_"):  # tools look up such names
+                raise AttributeError(name)
+            known = [each for each in dir(self) if not each.startswith("_")]
+            raise no_attribute(f"'{type(self).__name__}' object", name, known)
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """Return ``__getattr__`` and ``__dir__`` for a module with the public names `known`."""
 
     def missing(name: str) -> object:
-        raise no_attribute(module, name, known)
+        raise AttributeError(name) if name.startswith("_") else no_attribute(f"module '{module}'", name, known)
 
     return missing, lambda: known
 
@@ -138,13 +173,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold())
-    near = [candidate for candidate in names if candidate.rpartition(".")[2] == meant]
-    near = near or difflib.get_close_matches(name, names, n=3, cutoff=0.5)
-    if not near:
-        folded = {candidate.casefold(): candidate for candidate in names}
-        near = [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
-    if near:
+    if near := nearest(name, names):
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
     return f"unknown {kind} '{name}': known are {shown}"

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing
 
 from fastcontact.arrays import REFUSAL, is_masked
-from fastcontact.errors import FastcontactError
+from fastcontact.errors import FastcontactError, nearest
 
 F = TypeVar("F", bound=Callable[..., Any])
 _ARRAY_LIKE = {*typing.get_args(np.typing.ArrayLike)}
@@ -83,7 +83,10 @@ def _checked(call: Callable[..., Any], name: str, error: type[FastcontactError])
 def _refusal(
     call: Callable[..., Any], signature: inspect.Signature, called: str, args: tuple[Any, ...], kwargs: dict[str, Any]
 ) -> TypeError:
-    """Return Python's error for missing, unknown and misplaced arguments, with the public name of the call."""
+    """Return Python's error for missing, unknown and misplaced arguments, with the public name of the call.
+
+    For an unknown argument it suggests the nearest ones.
+    """
     parameters = signature.parameters.values()
     by_place = [p for p in parameters if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
     by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
@@ -95,7 +98,12 @@ def _refusal(
     try:
         call(*args, **kwargs)
     except TypeError as failure:
-        return TypeError(str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1))
+        text = str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1)
+        if wrong := text.partition("unexpected keyword argument '")[2].rstrip("'"):
+            known = [key for key in signature.parameters if key != "self"]
+            near = nearest(wrong, known, 0.6)
+            text += f": did you mean {' or '.join(map(repr, near))}?" if near else f": known are {', '.join(known)}"
+        return TypeError(text)
     raise AssertionError(called)
 
 

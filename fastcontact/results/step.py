@@ -14,7 +14,7 @@ from fastcontact._tools.html_table import html_table
 from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
-from fastcontact.errors import FastcontactError, ModelError, unknown
+from fastcontact.errors import FastcontactError, ModelError, Suggesting, unknown
 from fastcontact.results.units import with_unit
 
 
@@ -115,7 +115,7 @@ def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactResult:
+class ContactResult(Suggesting):
     """State of one contact pair at the end of a load step.
 
     Arrays of length m belong to the m nodes of the secondary side, which are ordered along the surface.
@@ -355,7 +355,7 @@ class ContactsByName(dict[str, ContactResult]):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StepResult:
+class StepResult(Suggesting):
     """State at the end of one load step.
 
     Attributes
@@ -475,6 +475,16 @@ class StepResult:
         warnings = [("warning", text) for text in self.warnings]
         table = html_table([*self.shown.items(), *warnings], caption=f"Step {self.index}")
         return table + "".join(contact._repr_html_() for contact in self.contact.values())
+
+    @property
+    def principal_stress(self) -> Array:
+        """Principal stresses (n_points, 3) of `stress`, in ascending order [pressure]."""
+        return recovery.principal_stress(self.stress)
+
+    @property
+    def tresca(self) -> Array:
+        """Tresca stress (n_points,) of `stress`, the largest minus the smallest principal stress [pressure]."""
+        return recovery.tresca(self.stress)
 
     @property
     def pretension(self) -> dict[str, dict[str, float]]:

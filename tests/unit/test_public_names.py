@@ -1,7 +1,9 @@
 """Public names: loaded on first use, known to type checkers, included in the package."""
 
 import ast
+import copy
 import importlib
+import pickle
 from pathlib import Path
 
 import pytest
@@ -37,3 +39,45 @@ def test_the_package_declares_its_types():
 def test_an_unknown_name_is_no_attribute():
     with pytest.raises(AttributeError, match="no attribute 'solver'"):
         fc.solver  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    ("owner", "name", "told"),
+    [
+        (fc.generate.block(), "nodes", "did you mean 'points'?"),
+        (fc.generate.block(), "group_nams", "did you mean 'group_names'?"),
+        (fc.Model(fc.generate.block(), "plane_strain"), "add_bolt", "did you mean 'add_pretension'?"),
+        (fc.Model(fc.generate.block(), "plane_strain"), "solve", "it is the function fastcontact.solve"),
+        (fc.obstacles, "Plane", "did you mean 'HalfSpace'?"),
+        (fc.generate, "rotated", "did you mean 'transformed'?"),
+        (fc.analytic, "hertz_sphere", "did you mean 'hertz_point'?"),
+        (fc, "sweep", "did you mean 'parameter_sweep'?"),
+        (fc, "qqq", "no attribute 'qqq'"),
+    ],
+    ids=str,
+)
+def test_an_unknown_name_suggests_the_nearest_one(owner, name, told):
+    with pytest.raises(AttributeError) as caught:
+        getattr(owner, name)
+    assert str(caught.value).endswith(told)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: fc.LinearElastic(E=1.0, nu=0.3, alpha=1e-5), "'alpha': did you mean 'expansion'?"),
+        (lambda: fc.solve(None, steps=4), "'steps': did you mean 'ramp'?"),
+        (lambda: fc.linear_ramp(4, q=1), "'q': known are steps, end"),
+    ],
+)
+def test_an_unknown_argument_suggests_the_nearest_one(call, told):
+    with pytest.raises(TypeError) as caught:
+        call()
+    assert str(caught.value).endswith(told)
+
+
+def test_objects_are_copied_and_pickled_with_their_suggestions():
+    mesh = fc.generate.block()
+    for again in (copy.deepcopy(mesh), pickle.loads(pickle.dumps(mesh))):
+        assert again.group_names == mesh.group_names
+        assert not hasattr(again, "_nothing")

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Protocol
 from fastcontact.arrays import Array
 from fastcontact.contact.obstacles.meshed import MeshedSurface
 from fastcontact.contact.obstacles.shapes import Cylinder, FlatPunch, HalfSpace, Height, Sphere, cone, paraboloid
-from fastcontact.errors import no_attribute
+from fastcontact.errors import names_of
 
 
 class Obstacle(Protocol):
@@ -55,10 +55,4 @@ __all__ = [
 
 
 if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
-
-    def __getattr__(name: str) -> object:
-        raise no_attribute("fastcontact.obstacles", name, __all__)
-
-
-def __dir__() -> list[str]:
-    return __all__
+    __getattr__, __dir__ = names_of("fastcontact.obstacles", __all__)

@@ -25,7 +25,7 @@ from fastcontact.elasticity.springs import Springs, stacked
 from fastcontact.elasticity.stiffness import stiffness
 from fastcontact.elasticity.temperature import Temperature
 from fastcontact.elasticity.varying_constants import Cells
-from fastcontact.errors import ModelError, check_known
+from fastcontact.errors import ModelError, Suggesting, check_known
 from fastcontact.heat.loads import Film, FixedTemperature, Heating
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.quality import check_cells
@@ -98,7 +98,7 @@ def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
 
 
 @typed(ModelError)
-class ModelBase:
+class ModelBase(Suggesting):
     """A model with a mesh, kinematics and materials, and with lists of the items that its subclasses add."""
 
     def __init__(

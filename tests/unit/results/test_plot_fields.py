@@ -55,6 +55,8 @@ def test_every_field_is_what_its_name_says():
     }
     for name, values in expected.items():
         np.testing.assert_allclose(field_of(mesh, step, name).values, values, atol=1e-12)
+    np.testing.assert_allclose(step.tresca, expected["tresca"], atol=1e-12)
+    np.testing.assert_allclose(step.principal_stress, principal, atol=1e-12)
     assert {*expected, "von_mises", "von_mises_signed", "contact_slip", "contact_slip_total"} == set(names(mesh))
     deviator = tensor - np.trace(tensor, axis1=1, axis2=2)[:, None, None] / 3 * np.eye(3)
     equivalent = np.sqrt(1.5 * (deviator**2).sum(axis=(1, 2)))
