@@ -97,11 +97,15 @@ def warn(text: str) -> None:
 
 # Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
+NEAR = 0.52  # smallest similarity of a name that messages suggest
 SHOWN = 20  # largest number of known names in the message about an unknown one
 # Words of this package for words of its methods and of other programs.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "h": "coefficient", "plane": "half_space",
     "fix": "support", "prescribe": "support", "relate": "relation", "relate_groups": "group_relation",
+    "boundary": "support", "load": "pressure force traction", "loads": "pressure force traction", "young": "E",
+    "poisson": "nu", "rho": "density", "alpha": "expansion", "2d": "plane_strain plane_stress axisymmetric",
+    "solve": "run", "study": "converge sweep", "convert": "export", "show": "info plot", "view": "plot",
 }  # fmt: skip
 
 
@@ -138,12 +142,11 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold())
-    near = [candidate for candidate in names if candidate.rpartition(".")[2] == meant]
-    near = near or difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").split()
+    near = [candidate for candidate in names if candidate.rpartition(".")[2] in meant]
     if not near:
-        folded = {candidate.casefold(): candidate for candidate in names}
-        near = [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=0.5)]
+        plain = {candidate.casefold().lstrip("-"): candidate for candidate in reversed(names)}
+        near = [plain[key] for key in difflib.get_close_matches(name.casefold().lstrip("-"), plain, n=3, cutoff=NEAR)]
     if near:
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")

@@ -11,6 +11,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.arrays import Array, Numbers
 from fastcontact.elasticity import dilatation, element_2d_kernels, element_kernels
 from fastcontact.elasticity.cell_stress import CellStress
+from fastcontact.elasticity.incompatible_modes import PAIRS
 from fastcontact.elasticity.initial_states import StressOffset
 from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.errors import ModelError
@@ -175,6 +176,14 @@ def von_mises(stress: Array) -> Array:
     xx, yy, zz = stress[..., 0], stress[..., 1], stress[..., 2]
     shear = (stress[..., 3:] ** 2).sum(axis=-1)
     return np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * shear)
+
+
+def principal_stress(stress: Array) -> Array:
+    """Return the principal stresses (..., 3) [pressure] of `stress` (..., n_components) [pressure], in ascending order."""
+    stress = _with_components(stress)
+    full = np.zeros((*stress.shape[:-1], 6))
+    full[..., : stress.shape[-1]] = stress
+    return np.asarray(np.linalg.eigvalsh(full[..., PAIRS[3]]))
 
 
 def _with_components(stress: Array) -> Array:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from fastcontact.arrays import Array, Numbers
-from fastcontact.elasticity.incompatible_modes import PAIRS
-from fastcontact.elasticity.recovery import von_mises, von_mises_signed
+from fastcontact.elasticity.recovery import principal_stress, von_mises, von_mises_signed
 from fastcontact.errors import FastcontactError, check_known
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.layout import cells_by_element, contact_slip, separated
@@ -116,24 +114,17 @@ def _of_cells(mesh: Mesh, values: Array) -> Array:
     return total / np.maximum(count, 1.0)
 
 
-def principal_stress(stress: Array, number: int) -> Array:
-    """Return principal stress `number` (n,) [pressure], 0 for the smallest, of stresses (n, 4) or (n, 6) [pressure]."""
-    full = np.zeros((len(stress), 6))
-    full[:, : stress.shape[1]] = stress
-    return np.asarray(np.linalg.eigvalsh(full[:, PAIRS[3]])[:, number])
-
-
 # Captions of fields, and functions from stresses (n, 4) or (n, 6) to values (n,) [pressure].
 OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
     "von_mises": ("von Mises stress", von_mises),
     "von_mises_signed": ("von Mises stress with the sign of the trace", von_mises_signed),
     "tresca": (
         "Tresca stress (largest minus smallest principal stress)",
-        lambda stress: principal_stress(stress, 2) - principal_stress(stress, 0),
+        lambda stress: np.ptp(principal_stress(stress), axis=1),
     ),
-    "stress.principal_max": ("largest principal stress", partial(principal_stress, number=2)),
-    "stress.principal_mid": ("middle principal stress", partial(principal_stress, number=1)),
-    "stress.principal_min": ("smallest principal stress", partial(principal_stress, number=0)),
+    "stress.principal_max": ("largest principal stress", lambda stress: principal_stress(stress)[:, 2]),
+    "stress.principal_mid": ("middle principal stress", lambda stress: principal_stress(stress)[:, 1]),
+    "stress.principal_min": ("smallest principal stress", lambda stress: principal_stress(stress)[:, 0]),
     **{
         f"stress.{name}": (f"stress {name}", operator.itemgetter((slice(None), k)))
         for k, name in enumerate(STRESS_COMPONENTS)
