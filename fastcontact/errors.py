@@ -97,6 +97,7 @@ def warn(text: str) -> None:
 
 # Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
+NEAR = 0.52  # smallest similarity of a name that messages suggest
 SHOWN = 20  # largest number of known names in the message about an unknown one
 # Words of this package for words of its methods and of other programs.
 OTHER_WORDS = {
@@ -104,24 +105,27 @@ OTHER_WORDS = {
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
     "fix": "support", "prescribe": "support", "relate": "relation", "relate_groups": "group_relation",
     "alpha": "expansion", "rho": "density", "sigma_y": "yield_stress", "nlgeom": "strain", "large": "finite",
-    "2d": "plane_strain", "steps": "ramp", "n_steps": "ramp", "hertz": "hertz_point", "hertz_sphere": "hertz_point",
-    "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders", "material": "linear_elastic", "rectangle": "block",
+    "2d": "plane_strain plane_stress axisymmetric", "steps": "ramp", "n_steps": "ramp", "hertz": "hertz_point",
+    "hertz_sphere": "hertz_point", "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders",
+    "material": "linear_elastic", "steel": "linear_elastic", "young": "E", "poisson": "nu", "rectangle": "block",
     "cylinder": "rings", "rotate": "transformed", "rotated": "transformed", "scale": "transformed", "scaled": "transformed",
     "u": "displacement", "time": "load_factor", "forces": "reaction", "traction": "shear", "nodes": "points",
     "elements": "cells", "groups": "group_names", "status": "active", "add_load": "add_force", "add_bolt": "add_pretension",
     "plastic_strain": "cell_fields", "work": "dissipation", "save": "result_writer", "to_vtk": "result_writer",
-    "steel": "linear_elastic", "archard": "wear", "add_preload": "add_pretension", "add_displacement": "prescribe",
-    "add_symmetry": "fix", "add_friction": "add_contact",
+    "archard": "wear", "add_preload": "add_pretension", "add_displacement": "prescribe", "add_symmetry": "fix",
+    "add_friction": "add_contact", "boundary": "support", "load": "pressure force traction", "loads": "pressure force traction",
+    "solve": "run", "study": "converge sweep", "convert": "export", "show": "info plot", "view": "plot",
 }  # fmt: skip
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> list[str]:
-    """Return the known names that may be meant by a name: the one of `OTHER_WORDS`, or up to three with similar spelling."""
-    names = {candidate.casefold(): candidate for candidate in known}
-    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").replace("_", "")
-    near = [text for key, text in names.items() if meant and key.rpartition(".")[2].replace("_", "") == meant][-1:]
+    """Return the known names that may be meant by a name: those of `OTHER_WORDS`, or up to three with similar spelling."""
+    names = {candidate.casefold().lstrip("-"): candidate for candidate in reversed([*known])}
+    meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
+    near = [text for key, text in names.items() if key.rpartition(".")[2].replace("_", "") in meant]
     near = near or difflib.get_close_matches(name, names.values(), n=3, cutoff=cutoff)
-    return near or [names[key] for key in difflib.get_close_matches(name.casefold(), names, n=3, cutoff=cutoff)]
+    plain = name.casefold().lstrip("-")
+    return near or [names[key] for key in difflib.get_close_matches(plain, names, n=3, cutoff=cutoff)]
 
 
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
@@ -173,7 +177,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    if near := nearest(name, names):
+    if near := nearest(name, names, NEAR):
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
     return f"unknown {kind} '{name}': known are {shown}"

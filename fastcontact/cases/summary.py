@@ -13,7 +13,7 @@ from fastcontact.cases.case import Case, Label
 from fastcontact.cases.checks import at_point, evaluated
 from fastcontact.errors import ModelError
 from fastcontact.model.rigid_motions import grouped
-from fastcontact.results.step import CANCELLED, ContactResult, StepResult
+from fastcontact.results.step import ContactResult, StepResult, force_text
 from fastcontact.results.units import units_of_results, valued, with_unit
 
 if TYPE_CHECKING:
@@ -124,6 +124,7 @@ def _contact(contact: ContactResult, penalty: float | None) -> dict[str, Any]:
         "formulation": contact.formulation,
         "force": float(np.linalg.norm(contact.force)),
         "force_vector": contact.force.tolist(),
+        "force_parts": contact.force_parts,
         "radius": _plain(contact.radius),
         "extent": contact.extent,
         "pressure_max": contact.pressure_max,
@@ -264,9 +265,7 @@ def count(number: int, noun: str) -> str:
 
 def _contact_lines(name: str, contact: Mapping[str, Any], unit: Mapping[str, str]) -> Iterator[str]:
     inside, outside = contact["radius"]
-    force = valued(contact["force"], unit, "force", 6)
-    if contact["force"] < CANCELLED * contact["normal_force"]:
-        force += f", normal {valued(contact['normal_force'], unit, 'force', 6)} all round"
+    force = force_text(contact["force_parts"], contact["normal_force"], unit)
     yield (
         f"  contact '{name}' ({contact['formulation'].replace('_', '-')}): force {force}, largest pressure "
         f"{valued(contact['pressure_max'], unit, 'pressure', 6)}, {_edge(contact['extent'], inside, outside, unit)}"

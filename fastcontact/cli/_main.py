@@ -79,6 +79,8 @@ class Parser(argparse.ArgumentParser):
         wrong = _CHOICE.search(message)
         if wrong:
             message = unknown(wrong["kind"].lower(), wrong["given"], _NAME.findall(wrong["known"]))
+            if wrong["kind"] == "COMMAND" and wrong["given"].endswith((".toml", ".inp")):
+                message += f"; to solve a file, write '{self.prog} run {wrong['given']}'"
         message = _SEVERAL.sub(r"\g<0>, separated by blanks", message)
         raise FastcontactError(f"{message}; see '{self.prog} --help'")
 
@@ -90,11 +92,14 @@ class Parser(argparse.ArgumentParser):
             super().print_help(file)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Raise an error with the nearest option for an unknown flag, which argparse would leave to the parent parser."""
+        """Raise an error for an unknown flag or argument, which argparse would leave to the parent parser."""
         options, rest = super().parse_known_args(args, namespace)
+        known = [*_FLAG.findall(self.format_usage()), "--help"] if rest else []
         for flag in (text.partition("=")[0] for text in rest if _FLAG.match(text)):
-            known = [*_FLAG.findall(self.format_usage()), "--help"]
             self.error(unknown("option", flag, known))
+        for text in rest:
+            option = f"--{os.path.splitext(text)[1][1:].replace('rmed', 'med')}"
+            self.error(f"unexpected argument '{text}'" + f": write {option} {text}" * (option in known))
         return options, rest
 
 

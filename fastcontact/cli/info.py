@@ -12,7 +12,7 @@ from fastcontact.cli._terminal import say
 
 HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"
 ARGUMENTS = {
-    "file": "mesh file, case file (.toml), deck (.inp) or result file (.vtkhdf)",
+    "file": "mesh file, case file (.toml), ready-made case, deck (.inp) or result file (.vtkhdf)",
     "--contacts": "show the surfaces of bodies that face each other instead",
     "--distance LENGTH": (float, "largest gap for --contacts (default: the size of facets)"),
     "--angle DEGREES": (45.0, "largest deviation of normals from opposite directions (45)"),
@@ -23,6 +23,8 @@ ARGUMENTS = {
 def run(options: argparse.Namespace) -> int:
     """Print the content of the file."""
     file, suffix = Path(options.file), Path(options.file).suffix.lower()
+    from fastcontact.cases.case_files import shipped_cases
+
     if options.contacts or options.png:
         return _contacts(options)
     if suffix == ".vtkhdf":
@@ -37,7 +39,7 @@ def run(options: argparse.Namespace) -> int:
         factors = ", ".join(f"{t:g}" for t in deck.ramp.instants)
         rows = [f"{deck.path}: {deck.title}", repr(deck.model), f"load factors: {factors}"]
         rows += [*(f"  note: {text}" for text in deck.notes), *_mesh_lines(deck.model.mesh)]
-    elif suffix == ".toml":
+    elif suffix == ".toml" or (not file.exists() and options.file in shipped_cases()):
         from fastcontact.cases.case import read_case
 
         case = read_case(options.file)

@@ -15,7 +15,7 @@ from fastcontact.arrays import Array, Mask, Numbers
 from fastcontact.elasticity import recovery
 from fastcontact.elasticity.material_sides import MaterialSides
 from fastcontact.errors import FastcontactError, ModelError, Suggesting, unknown
-from fastcontact.results.units import with_unit
+from fastcontact.results.units import valued, with_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +90,14 @@ def by_largest_von_mises(
 
 # The resultant of a contact is negligible below this fraction of the sum of the normal forces.
 CANCELLED = 1e-3
+
+
+def force_text(parts: Sequence[float], around: float, units: Mapping[str, str]) -> str:
+    """Return a contact force with its `ContactResult.force_parts` if there is friction, or with normal forces that cancel."""
+    total, pressed, dragged, normal = (valued(part, units, "force", 6) for part in (*parts, around))
+    if parts[0] < CANCELLED * around:
+        return f"{total}, normal {normal} all round"
+    return total + f" (normal {pressed}, tangential {dragged})" * (parts[2] > 0.0)
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
@@ -277,12 +285,8 @@ class ContactResult(Suggesting):
         low, high = self.radius
         inside, outside = (with_unit(f"{end:.4g}", self.units, "length") for end in (low, high))
         radius = f"{low:.4g} to {outside}" if np.isfinite(high) else f"{inside}, to its end"
-        force = with_unit(f"{float(np.linalg.norm(self.force)):.6g}", self.units, "force")
-        around = (
-            with_unit(f", normal {self.normal_force:.6g}", self.units, "force") + " all round" if self.cancels else ""
-        )
         return {
-            "force": force + around,
+            "force": force_text(self.force_parts, self.normal_force, self.units),
             "largest pressure": with_unit(f"{self.pressure_max:.6g}", self.units, "pressure"),
             "closed": f"{int(self.active.sum())} of {len(self.points)} nodes",
             "contact radius": radius if np.isfinite(low) else "none",
@@ -335,6 +339,15 @@ class ContactResult(Suggesting):
         """Sum of the normal components of the nodal forces, positive in compression [force]."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
         return float(np.einsum("nd,nd->", self.force_vectors, normal))
+
+    @property
+    def force_parts(self) -> tuple[float, float, float]:
+        """Magnitude of `force` and of its normal and tangential part; the latter is zero without friction [force]."""
+        normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
+        along = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
+        along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
+        total, pressed, dragged = np.linalg.norm([self.force, along, self.force - along], axis=1)
+        return float(total), float(pressed), float(dragged)
 
     @property
     def cancels(self) -> bool:

@@ -40,6 +40,22 @@ SHORT = 10.0
 MARGIN = 1 << 19
 # Size in the file of the indices that HDF5 caches in memory [bytes].
 INDICES = 1 << 18
+# Suffixes of formats in which results are not written.
+OTHER_FORMATS = {
+    ".vtu",
+    ".vtk",
+    ".pvd",
+    ".med",
+    ".rmed",
+    ".xdmf",
+    ".msh",
+    ".inp",
+    ".frd",
+    ".toml",
+    ".json",
+    ".csv",
+    ".png",
+}
 
 
 @typed(FileError)
@@ -125,6 +141,11 @@ class ResultWriter:
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
         self.path = checked_target(path)
+        if self.path.suffix.lower() in OTHER_FORMATS:
+            raise FileError(
+                f"'{path}': results are written in the format VTKHDF: name it {self.path.stem}.vtkhdf (ParaView opens it), "
+                "and convert it with 'fastcontact export'"
+            )
         self.n_steps = 0
         self.done: Sequence[StepResult] = []
         self._synchronise, self._started = synchronise, time.monotonic()

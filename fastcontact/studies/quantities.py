@@ -73,7 +73,7 @@ def of_contacts(last: StepResult) -> dict[str, float]:
 
 def _of_pressure(contact: ContactResult) -> dict[str, float]:
     quantities = {
-        "force": float(np.linalg.norm(contact.force)),
+        "force": contact.normal_force if contact.cancels else float(np.linalg.norm(contact.force)),
         "pressure_max": contact.pressure_max,
         "contact_radius": contact_radius(contact),
     }

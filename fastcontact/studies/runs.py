@@ -50,6 +50,7 @@ def convergence_study(
     formulations: Sequence[str] | None = None,
     *,
     quantities: Quantities = (),
+    theory: Mapping[str, float] | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
     store: str | Path | None = None,
@@ -79,6 +80,8 @@ def convergence_study(
         ``"C1.displacement.y"`` and ``"C1.pressure"`` at the point group C1. For a function, names of standard quantities,
         or functions by name. Such a function receives the last `StepResult`, or the list of all steps if its argument is
         called ``steps``, and returns a number.
+    theory : dict of str to float, optional
+        Theoretical values of quantities of a function, by their names. A case has its theory in the table ``[theory.PAIR]``.
     executor : concurrent.futures.Executor, optional
         Executor of the runs, for example ``Client.get_executor()`` of Dask or an ``MPIPoolExecutor`` of mpi4py; it is not
         shut down. By default the runs are executed in processes on this machine.
@@ -124,10 +127,11 @@ def convergence_study(
     options |= {"on_progress": on_progress, "progress": progress}
     if callable(case):
         refuse({"elements": elements, "formulations": formulations})
-        return _of_function(case, levels, quantities, options)
-    if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping):
+        return _of_function(case, levels, quantities, theory or {}, options)
+    if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping) or theory is not None:
         raise CaseError(
-            "mesh sizes and functions as quantities are for Python models: give a case its number of levels"
+            "mesh sizes, functions as quantities and theory are for Python models: give a case its number of levels, and its "
+            "theory in the table [theory.PAIR]"
         )
     case = case if isinstance(case, Case) else read_case(case)
     if levels < 1:
@@ -143,9 +147,11 @@ def convergence_study(
 
 
 def _of_function(
-    function: Function, sizes: int | Sequence[float], wanted: Quantities, options: dict[str, Any]
+    function: Function, sizes: int | Sequence[float], wanted: Quantities, theory: Mapping[str, float], options: Any
 ) -> Study:
     """Return the study of a function that returns models; `options` are passed to `run_functions`."""
+    for quantity in theory:
+        check_known("quantity", quantity, [*LABELS, *wanted], CaseError, "theory: ")
     if isinstance(sizes, int | np.integer):
         raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
     descending = sorted(map(float, sizes), reverse=True)
@@ -161,8 +167,10 @@ def _of_function(
         for level, size in enumerate(descending)
     ]  # fmt: skip
     results = run_functions(runs, "no size could be solved", **options)
-    solved = [(level, {**result, "h": descending[level]}) for level, result in enumerate(results)]
-    series = _series(Named(None, None, name), solved, [*wanted], (), (None, 1.0, ""), asked=tuple(wanted))
+    solved = [(level, {**result, "h": descending[level], "theory": {**theory}}) for level, result in enumerate(results)]
+    series = _series(
+        Named(None, None, name), solved, [*wanted], (), (None, 1.0, "under the given load"), asked=tuple(wanted)
+    )
     for coarse, fine in pairwise(series.levels):
         if fine.n_dofs <= coarse.n_dofs:
             warn(

@@ -55,10 +55,10 @@ def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | N
     """Return the number of a material in the model, the material, and the requested component."""
     matches = [
         (i, material) for i, (material, groups) in enumerate(model.materials)
-        if parameter[1] == i or (groups is not None and parameter[1] in groups)
+        if parameter[1] == i or parameter[1] in (model.mesh.cell_groups if groups is None else groups)
     ]  # fmt: skip
     if not matches:
-        names = [name for _, groups in model.materials for name in groups or ()]
+        names = [name for _, groups in model.materials for name in groups or model.mesh.cell_groups]
         raise ModelError(unknown("material", str(parameter[1]), [*names, *map(str, range(len(model.materials)))]))
     (number, material), name = matches[0], str(parameter[0])
     value = getattr(material, name, None)

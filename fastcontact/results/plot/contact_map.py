@@ -21,6 +21,8 @@ from fastcontact.results.units import labelled, valued
 
 # Margin of the plotted region around the closed part of the surface, relative to the half-width of the closed part.
 MARGIN = 0.15
+# Smallest relative height of a figure; the colour bars of flatter maps lie below the maps.
+FLAT = 0.55
 # Smallest magnitude of the mean unit normal for which a surface can be projected along this normal.
 LEAST_MEAN = 0.3
 # Captions, and quantities that determine the units, of the fields that can be plotted next to the pressure.
@@ -103,7 +105,8 @@ def contact_map(
         ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
         drawn = fill(ax, blocks, flat, values, "viridis", ends)
         high = _limit(ax, flat, _carrying(contact, blocks) & ~np.array(everything))
-        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, quantity), shrink=0.75 * high)
+        bar = {"location": "bottom", "shrink": 0.6} if high == FLAT else {"shrink": 0.75 * high}
+        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, quantity), **bar)
         _nodes(ax, flat, contact, both)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
@@ -183,7 +186,7 @@ def _carrying(contact: ContactResult, blocks: dict[str, Indices]) -> Mask:
 def _limit(ax: Any, flat: Array, closed: Mask) -> float:
     """Set the limits of the axes to the closed part with a margin, or to the entire surface if no node is closed.
 
-    Return the height of the figure relative to that of a square map, from 0.55 to 1 [-].
+    Return the height of the figure relative to that of a square map, from FLAT to 1 [-].
     """
     kept = flat[closed] if closed.any() else flat
     low, high = kept.min(axis=0), kept.max(axis=0)
@@ -193,4 +196,4 @@ def _limit(ax: Any, flat: Array, closed: Mask) -> float:
     ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     ax.set_facecolor("0.9")
     width, height = high - low
-    return float(np.clip(1.1 * height / max(width, 1e-300), 0.55, 1.0))
+    return float(np.clip(1.1 * height / max(width, 1e-300), FLAT, 1.0))

@@ -343,6 +343,14 @@ def test_what_has_no_sensitivity_is_named():
             asked(two_blocks(**options)())
 
 
+def test_a_material_of_all_cells_is_named_by_a_group():
+    model = elastic_model(fc.generate.block(), "plane_strain", E=1000.0, BOTTOM="xy", TOP={"y": -0.01})
+    step = fc.solve(model, 1)[-1]
+    quantity, by = ("reaction", "TOP", "y"), [("E", "BLOCK"), ("E", 0)]
+    named, numbered = fc.sensitivities(model, step, quantity, by, ramp=1).derivatives.values()
+    assert named == numbered == pytest.approx(step.reaction[model.mesh.points_of("TOP"), 1].sum() / 1000.0)
+
+
 def test_other_refusals():
     with pytest.raises(fc.ModelError, match="is tied: it keeps its gaps"):
         asked(two_blocks(kind="tied")(), ("contact_force", "c", "y"), [("clearance", "c")])

@@ -419,6 +419,11 @@ def test_a_failure_without_history_shows_none():
         (["mesh", "half-sphere", "-o", "a.med"], "unknown generator 'half-sphere': did you mean 'half-spheres'"),
         (["mesh", "box", "-o", "a.med", "--elment", "hex8"], "unknown option '--elment': did you mean '--element'"),
         (["plot", "a.vtkhdf", "--histroy"], "unknown option '--histroy': did you mean '--history'"),
+        (["study", "forma04a"], "unknown command 'study': did you mean 'converge' or 'sweep'?"),
+        (["forma04a.toml"], "to solve a file, write 'fastcontact run forma04a.toml'"),
+        (["run", "case.toml", "--html", "a"], "unknown option '--html': known are --estimate-error, --help"),
+        (["export", "a.vtkhdf", "a.rmed"], "unexpected argument 'a.rmed': write --med a.rmed; see"),
+        (["run", "a.toml", "b.toml"], "unexpected argument 'b.toml'; see 'fastcontact run --help'"),
     ],
 )
 def test_commands_and_flags_that_are_misspelt(given, told, capsys):
@@ -427,6 +432,19 @@ def test_commands_and_flags_that_are_misspelt(given, told, capsys):
     assert told in error
     assert len(error.splitlines()) == 1
     assert "--help'" in error
+
+
+def test_info_of_a_ready_made_case(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["info", "forma04a"]) == 0
+    assert "3168 tri3" in capsys.readouterr().out
+
+
+def test_results_are_not_written_under_the_name_of_another_format(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "forma04-no-contact", "-o", "a.vtu"]) == 1
+    assert "name it a.vtkhdf" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("place", [["-q", "box"], ["box", "-q"], ["box", "--quiet"]])

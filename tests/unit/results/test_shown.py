@@ -99,6 +99,27 @@ def test_one_step_and_one_contact(steps):
     assert len(html) < SCREEN
 
 
+def test_a_force_with_friction_shows_its_parts():
+    model = elastic_model(fc.generate.block(), "plane_strain", E=1000.0, TOP={"x": 0.1, "y": -0.01})
+    floor = fc.obstacles.HalfSpace((0.0, 0.0), (0.0, 1.0))
+    model.add_obstacle("floor", secondary="BOTTOM", obstacle=floor, friction=0.25)
+    step = fc.solve(model, 1)[-1]
+    contact = step.contact["floor"]
+    total, normal, tangential = contact.force_parts
+    assert [total, normal, tangential] == pytest.approx(np.abs([np.linalg.norm(contact.force), *contact.force[::-1]]))
+    assert tangential == pytest.approx(0.25 * normal)
+    assert f"force {total:.6g} (normal {normal:.6g}, tangential {tangential:.6g})" in repr(contact)
+
+
+def test_principal_stresses(steps):
+    step = steps[-1]
+    low, middle, high = step.principal_stress.T
+    assert np.allclose(low + middle + high, step.stress[:, :3].sum(axis=1))
+    equivalent = np.sqrt(0.5 * ((low - middle) ** 2 + (middle - high) ** 2 + (high - low) ** 2))
+    assert np.allclose(equivalent, step.von_mises)
+    assert np.array_equal(step.tresca, high - low)
+
+
 def test_the_table_of_steps_has_a_row_a_pair(steps):
     html = steps._repr_html_()
     assert html.count("<tr>") == 1 + len(steps)

@@ -58,6 +58,32 @@ def test_lame_is_the_limit_and_the_order_is_that_of_the_element(element, order):
     json.dumps(study.as_dict())
 
 
+def test_a_theory_of_a_function_separates_its_error_from_that_of_the_mesh():
+    study = fc.convergence_study(tube, SIZES[::-1], quantities={"bore": bore}, theory={"bore": 0.8 * BORE})
+    split = study.best.split("bore")
+    assert split.theory == 0.8 * BORE
+    assert split.model == pytest.approx(0.25, abs=study.best.limits["bore"].uncertainty / (0.8 * BORE))
+    assert split.model + split.mesh == pytest.approx(study.best.values("bore")[-1] / (0.8 * BORE) - 1.0)
+    assert "under the given load the bore differs from theory by" in str(study)
+
+
+def test_the_force_of_a_press_fit_is_that_all_round():
+    def fit(size):
+        n = round(1 / size)
+        rings = [
+            fc.generate.block((1.0, 1.0), (n, n), "quad8", (r, 0.0), name=name) for r, name in ((1, "IN"), (2, "OUT"))
+        ]
+        named = [fc.generate.renamed(m, lambda g, n=m.group_names[0]: g if g == n else f"{n} {g}") for m in rings]
+        model = elastic_model(fc.generate.union(*named), "axisymmetric", E=E, nu=NU)
+        supported(model, **{"IN BOTTOM": "y", "OUT BOTTOM": "y"})
+        model.add_contact("fit", secondary="IN RIGHT", primary="OUT LEFT", clearance=-1e-4)
+        return fc.solve(model, 1)
+
+    study = fc.convergence_study(fit, [0.5, 0.25], quantities={"around": lambda step: step.contact["fit"].normal_force})
+    assert study.best.values("force") == study.best.values("around")
+    assert min(study.best.values("force")) > 0.0
+
+
 def test_standard_quantities_of_a_model_and_of_its_steps():
     models = fc.convergence_study(lambda size: tube(size, solved=False), SIZES, quantities=["von_mises_max"])
     bored = math.sqrt(0.5 * ((5 / 3 + 1) ** 2 + (5 / 3 - 0.2) ** 2 + (0.2 + 1) ** 2))  # at the bore: -1, 5/3, 0.2
@@ -92,13 +118,15 @@ def test_a_sweep_calls_the_function_with_all_choices():
         ((tube, [1.0, -1.0]), "must be positive and all different"),
         ((tube, [1.0], ["tri3"]), "'elements' is for case files"),
         (("forma04a", [1.0, 0.5]), "give a case its number of levels"),
+        (("forma04a", 3, None, None, {"force": 1.0}), "its theory in the table .theory.PAIR."),
+        ((tube, [1.0], None, None, {"force_": 1.0}), "theory: unknown quantity 'force_': did you mean 'force'"),
         ((lambda size: None, [1.0]), "size = 1: the function <lambda> must return a Model, or what fc.solve returns"),
         ((lambda size: 1 / 0, [1.0]), "the function <lambda> failed at line .*: ZeroDivisionError"),
     ],
 )
 def test_what_no_study_can_use_is_told(given, message):
     with pytest.raises(fc.CaseError, match=message):
-        fc.convergence_study(*given)
+        fc.convergence_study(*given[:4], theory=given[4] if len(given) > 4 else None)
 
 
 @pytest.mark.parametrize(
