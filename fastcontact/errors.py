@@ -113,8 +113,9 @@ OTHER_WORDS = {
     "elements": "cells", "groups": "group_names", "status": "active", "add_load": "add_force", "add_bolt": "add_pretension",
     "plastic_strain": "cell_fields", "work": "dissipation", "save": "result_writer", "to_vtk": "result_writer",
     "archard": "wear", "add_preload": "add_pretension", "add_displacement": "prescribe", "add_symmetry": "fix",
-    "add_friction": "add_contact", "boundary": "support", "load": "pressure force traction", "loads": "pressure force traction",
-    "solve": "run", "study": "converge sweep", "convert": "export", "show": "info plot", "view": "plot",
+    "add_friction": "add_contact", "boundary": "support", "load": "pressure force traction",
+    "loads": "pressure force traction", "solve": "run", "study": "converge sweep", "convert": "export",
+    "show": "info plot", "view": "plot",
 }  # fmt: skip
 
 
@@ -122,7 +123,8 @@ def nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> list[str]:
     """Return the known names that may be meant by a name: those of `OTHER_WORDS`, or up to three with similar spelling."""
     names = {candidate.casefold().lstrip("-"): candidate for candidate in reversed([*known])}
     meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
-    near = [text for key, text in names.items() if key.rpartition(".")[2].replace("_", "") in meant]
+    plainest = {key.replace("_", ""): text for key, text in reversed(names.items())}
+    near = [text for key, text in plainest.items() if key.rpartition(".")[2] in meant]
     near = near or difflib.get_close_matches(name, names.values(), n=3, cutoff=cutoff)
     plain = name.casefold().lstrip("-")
     return near or [names[key] for key in difflib.get_close_matches(plain, names, n=3, cutoff=cutoff)]

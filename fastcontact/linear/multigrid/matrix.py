@@ -296,7 +296,7 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     stored = ~below
     rows, group = row[stored], (diagonal + np.int32(2) * above)[stored]
     columns = indices[stored][np.argsort(np.int64(3) * rows + group, kind="stable")]
-    start = pointers(np.bincount(rows, minlength=n))
+    start = pointers(np.bincount(rows, minlength=n).astype(np.int32))
     upper = start[1:] - np.bincount(row[above], minlength=n).astype(np.int32)
     return start, upper, columns, length
 
