@@ -120,44 +120,40 @@ class PairOptions:
         """Return which nodes (m,) of a side are excluded from contact."""
         return np.zeros(len(side.points), bool) if self.excluded is None else self.excluded[side.points]
 
-    def coefficients(self, friction: float, candidates: Candidates) -> Array:
-        """Return the coefficients of friction (n,) of candidates: `friction`, or zero at frictionless nodes [-]."""
-        return np.where(self._slippery(candidates) & (self.frictionless_along is None), 0.0, friction)
-
-    def _slippery(self, candidates: Candidates) -> Mask:
-        """Return which candidates (n,) have no friction, or none along `frictionless_along`."""
-        if self.frictionless is None:
-            return np.full(len(candidates.nodes), self.frictionless_along is not None)
-        return candidates.belonging_to(self.frictionless)
-
     def rubbing(
-        self, directions: Sequence[Array], candidates: Candidates
-    ) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-        """Return tangents that are aligned with the direction without friction.
+        self, friction: float, directions: Sequence[Array], candidates: Candidates
+    ) -> tuple[Array, tuple[Array, ...], tuple[Array, ...]]:
+        """Return coefficients of friction, and tangents that are aligned with the direction without friction.
 
         Parameters
         ----------
+        friction : float
+            Coefficient of friction of the pair [-].
         directions : sequence of k ndarray (n, dim)
             Unit tangents.
         candidates : Candidates
 
         Returns
         -------
+        coefficients : ndarray (n,)
+            Coefficients of friction of the candidates, zero where there is no friction in any direction [-].
         tangents : tuple of k ndarray (n, dim)
             Unit tangents, rotated such that the first is the direction without friction at frictionless candidates.
         rubbing : tuple of k ndarray (n, dim)
             The same tangents, set to zero in the direction without friction.
         """
-        along = self.frictionless_along
+        along, slippery = self.frictionless_along, np.full(len(candidates.nodes), self.frictionless_along is not None)
+        if self.frictionless is not None:
+            slippery = candidates.belonging_to(self.frictionless)
         if along is None:
-            return tuple(directions), tuple(directions)
+            return np.where(slippery, 0.0, friction), tuple(directions), tuple(directions)
         normal = normals(directions)
         free = along - (normal @ along)[:, None] * normal
         length = np.linalg.norm(free, axis=1, keepdims=True)
-        slippery = self._slippery(candidates)[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(along))
-        first = np.where(slippery, free / np.where(slippery, length, 1.0), directions[0])
-        turned = (first, *(np.where(slippery, np.cross(normal, first), other) for other in directions[1:]))
-        return turned, (np.where(slippery, 0.0, first), *turned[1:])
+        across = slippery[:, None] & (length > SINGLE_PRECISION * np.linalg.norm(along))
+        first = np.where(across, free / np.where(across, length, 1.0), directions[0])
+        turned = (first, *(np.where(across, np.cross(normal, first), other) for other in directions[1:]))
+        return np.full(len(slippery), friction), turned, (np.where(across, 0.0, first), *turned[1:])
 
     def added_gap(
         self, candidates: Candidates, pairing: Pairing, primary: object, reference: Array, factor: float

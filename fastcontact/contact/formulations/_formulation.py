@@ -337,9 +337,9 @@ class Formulation(ABC):
         if not self.slides:
             geometry = self._geometry(candidates, pairing, at)
             return Constraints(B, gap0, positions, compliance, geometry=geometry)
-        directions, rubbing = self.options.rubbing(tangents(pairing.normal, self._held_at(candidates)), candidates)
+        axes = tangents(pairing.normal, self._held_at(candidates))
+        friction, directions, rubbing = self.options.rubbing(self.friction, axes, candidates)
         along, slip0 = self.slips(candidates, pairing, rubbing, at)
-        friction = self.options.coefficients(self.friction, candidates)
         geometry = self._geometry(candidates, pairing, at, directions)
         return Constraints(B, gap0, positions, compliance, along, directions, friction, slip0, geometry=geometry)
 

@@ -158,7 +158,7 @@ class WeightedMortar(Formulation):
         projectors = np.zeros((*normal.shape, normal.shape[1]))
         for along, where in held:
             projectors[where] += along[where, :, None] * along[where, None, :]
-        directions, rubbing = self.options.rubbing(tangents(normal, projectors), candidates)
+        friction, directions, rubbing = self.options.rubbing(self.friction, tangents(normal, projectors), candidates)
         slips, additional = self._slips(rubbing, held, coverage, mean, rows, weight)
         length, between = self._closing(constraints, normal, at)
         closing = length[:, None] * between
@@ -171,7 +171,7 @@ class WeightedMortar(Formulation):
             constraints,
             tangents=slips,
             directions=directions,
-            friction=self.options.coefficients(self.friction, candidates),
+            friction=friction,
             slip0=slip0,
             geometry=partial(geometry, slipping=(np.stack(rubbing), mean, length)),
         )
