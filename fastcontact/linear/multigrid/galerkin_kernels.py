@@ -14,112 +14,41 @@ from fastcontact.linear.multigrid.symmetric_storage_kernels import part_of, plac
 
 
 @kernel
-def _aggregates_of(i, indptr, indices, aggregate, aggregates):
-    """Fill `aggregates` with the aggregates of node i and its neighbours, ascending; return their number."""
-    count = 0
-    for k in range(indptr[i], indptr[i + 1]):
-        of_neighbour = aggregate[indices[k]]
-        if of_neighbour < 0:
-            continue
-        at = count
-        while at > 0 and aggregates[at - 1] > of_neighbour:
-            at -= 1
-        if at > 0 and aggregates[at - 1] == of_neighbour:
-            continue
-        for e in range(count, at, -1):
-            aggregates[e] = aggregates[e - 1]
-        aggregates[at] = of_neighbour
-        count += 1
-    return count
-
-
-@kernel
-def count_prolongator(low, high, indptr, indices, aggregate, widest, count):
-    """Fill `count` (n_nodes,) with the number of aggregates of each node and its neighbours, up to `widest`."""
-    aggregates = np.empty(widest, np.int32)
-    for i in range(low, high):
-        count[i] = _aggregates_of(i, indptr, indices, aggregate, aggregates)
-
-
-@kernel
-def _smooth_row(
-    i,
-    indptr,
-    indices,
-    storage,
-    data,
-    inverse,
-    aggregate,
-    tentative,
-    omega,
-    start,
-    columns,
-    out,
-    aggregates,
-    sums,
-    rows,
-    cols,
-):
-    part = part_of(storage, i)
-    m, n = len(rows), len(cols)
-    count = _aggregates_of(i, indptr, indices, aggregate, aggregates)
-    for e in range(count * m * n):
-        sums[e] = 0.0
-    for k in range(indptr[i], indptr[i + 1]):
-        j = indices[k]
-        if aggregate[j] < 0:
-            continue
-        at = 0
-        while aggregates[at] != aggregate[j]:
-            at += 1
-        slot, turned = place_of(storage, part, i, j, k)
-        if turned:
-            add_transposed(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
-        else:
-            add_product(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
-    for at in range(count):
-        base = (start[i] + at) * m * n
-        columns[start[i] + at] = aggregates[at]
-        for r in range(m):
-            for c in range(n):
-                s = 0.0
-                for t in range(m):
-                    s += inverse[(i * m + r) * m + t] * sums[(at * m + t) * n + c]
-                first = tentative[(i * m + r) * n + c] if aggregates[at] == aggregate[i] else 0.0
-                out[base + r * n + c] = first - omega * s
-
-
-@kernel
 def smooth_prolongator(
-    low,
-    high,
-    indptr,
-    indices,
-    storage,
-    data,
-    inverse,
-    aggregate,
-    tentative,
-    omega,
-    start,
-    widest,
-    columns,
-    out,
-    rows,
-    cols,
+    low, high, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, rows, cols
 ):
-    """Fill the columns of ``(I - omega D^-1 A) T``, with the row pointers `start`, and its blocks `out`.
+    """Fill the blocks `out` of ``(I - omega D^-1 A) T``, with the row pointers `start` and the sorted `columns`.
 
     `tentative` (n_nodes * m * n,) is the block of T in each node's own aggregate; `aggregate` is -1 for nodes in none.
-    `widest` is the largest number of blocks in a row of the result.
     """
-    near = np.empty(widest, np.int32)
-    sums = np.empty(widest * len(rows) * len(cols))
+    m, n, widest = len(rows), len(cols), 0
     for i in range(low, high):
-        _smooth_row(
-            i, indptr, indices, storage, data, inverse, aggregate, tentative, omega, start, columns, out, near, sums,
-            rows, cols,
-        )  # fmt: skip
+        widest = max(widest, start[i + 1] - start[i])
+    sums = np.empty(widest * m * n)
+    for i in range(low, high):
+        part = part_of(storage, i)
+        for e in range((start[i + 1] - start[i]) * m * n):
+            sums[e] = 0.0
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            if aggregate[j] < 0:
+                continue
+            at = 0
+            while columns[start[i] + at] != aggregate[j]:
+                at += 1
+            slot, turned = place_of(storage, part, i, j, k)
+            if turned:
+                add_transposed(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
+            else:
+                add_product(sums, at * m * n, data, slot * m * m, tentative, j * m * n, (rows, rows, cols))
+        for e in range(start[i], start[i + 1]):
+            for r in range(m):
+                for c in range(n):
+                    s = 0.0
+                    for t in range(m):
+                        s += inverse[(i * m + r) * m + t] * sums[((e - start[i]) * m + t) * n + c]
+                    first = tentative[(i * m + r) * n + c] if columns[e] == aggregate[i] else 0.0
+                    out[(e * m + r) * n + c] = first - omega * s
 
 
 @kernel

@@ -24,7 +24,7 @@ from fastcontact.arrays import Array, Numbers
 from fastcontact.linear.multigrid import cycle_kernels, galerkin_kernels
 from fastcontact.linear.multigrid.coarse import COARSEST, Coarse
 from fastcontact.linear.multigrid.level import Level
-from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers, widest_row
+from fastcontact.linear.multigrid.matrix import ALL, WORK_OF_ROW, BlockMatrix, pointers
 from fastcontact.linear.multigrid.smoother import DEGREE, SAFETY, chebyshev, largest_eigenvalue
 
 
@@ -111,27 +111,21 @@ class Hierarchy:
         tentative[member] = T.data.reshape(len(member), -1)
         del T
         omega = 4.0 / 3.0 / (level.bound / SAFETY)
-        cols, count = (0,) * n_modes, np.empty(n, np.int32)
-        spread(
-            galerkin_kernels.count_prolongator,
-            n,
-            WORK_OF_ROW,
-            A.indptr,
-            A.indices,
-            aggregate,
-            widest_row(A.indptr),
-            count,
+        cols, neighbours = (
+            (0,) * n_modes,
+            csr_matrix((np.ones(len(A.indices), bool), A.indices, A.indptr), shape=(n, n)),
         )
-        indptr, widest = pointers(count), int(count.max(initial=0))
+        pattern = neighbours @ aggregates.astype(bool)
+        pattern.sort_indices()
         # The prolongator is stored in the precision of the cycle before the coarse matrix is computed, so that the latter is
         # the Galerkin product with the prolongator that the cycle uses.
-        columns, blocks = np.empty(indptr[-1], np.int32), np.empty(int(indptr[-1]) * size * n_modes, self.dtype)
+        columns, blocks = pattern.indices, np.empty(pattern.nnz * size * n_modes, self.dtype)
         spread(
             galerkin_kernels.smooth_prolongator, n, WORK_OF_ROW, A.indptr, A.indices, A.storage, A.exact, level.inverse,
-            aggregate, tentative.ravel(), omega, indptr, widest, columns, blocks, A.rows, cols,
+            aggregate, tentative.ravel(), omega, pattern.indptr, columns, blocks, A.rows, cols,
         )  # fmt: skip
         del tentative
-        P = BlockMatrix(indptr, columns, blocks, A.rows, cols)
+        P = BlockMatrix(pattern.indptr, columns, blocks, A.rows, cols)
         index = by_columns(P, n_coarse)
         return P, transposed(P, index), product(A, P, index), coarse_modes
 
@@ -236,18 +230,8 @@ def product(A: BlockMatrix, P: BlockMatrix, index: tuple[Numbers, Numbers, Numbe
     n_coarse = len(index[0]) - 1
     count, near = np.zeros(n_coarse, np.int32), np.zeros(n_coarse, np.int32)
     work = WORK_OF_ROW * len(A.indptr) // max(1, n_coarse)
-    spread(
-        galerkin_kernels.count_galerkin,
-        n_coarse,
-        work,
-        A.indptr,
-        A.indices,
-        P.indptr,
-        P.indices,
-        *index[:2],
-        count,
-        near,
-    )
+    patterns = A.indptr, A.indices, P.indptr, P.indices, *index[:2]
+    spread(galerkin_kernels.count_galerkin, n_coarse, work, *patterns, count, near)
     indptr = pointers(count)
     columns = np.empty(indptr[-1], np.int32)
     out = np.zeros(int(indptr[-1]) * len(P.cols) ** 2)

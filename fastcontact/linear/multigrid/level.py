@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,7 @@ class Level:
     P: BlockMatrix | None = None
     R: BlockMatrix | None = None
     eliminated: Elimination | None = None
-    change: tuple[AnyArray, ...] | None = None
+    change: tuple[Any, ...] | None = None
     springs: Springs | None = None
     followers: Elimination | None = None
     free_motions: FreeMotions | None = None
@@ -106,19 +107,7 @@ class Level:
         if self.springs is not None:
             self.springs.subtract_forces(x, r)
         if self.change is not None:
-            numbers, indptr, indices, data = self.change
-            spread(
-                cycle_kernels.subtract_rows,
-                len(numbers),
-                WORK_OF_ROW,
-                numbers,
-                indptr,
-                indices,
-                (data,),
-                x,
-                r,
-                self.A.rows,
-            )
+            spread(cycle_kernels.subtract_rows, len(self.change[0]), WORK_OF_ROW, *self.change, x, r, self.A.rows)
 
     def restrict(self, coarse: AnyArray) -> None:
         """Fill `coarse`, the right-hand side of the next coarser level, with the restricted residual; `r` is overwritten."""

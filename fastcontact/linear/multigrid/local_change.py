@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike
@@ -42,13 +43,13 @@ class LocalChange:
         """Return the diagonal blocks (k * size * size,) of the change."""
         return diagonal_blocks(self.blocks.indptr, self.blocks.indices, self.blocks.data, self.size)
 
-    def rows(self, kind: DTypeLike) -> tuple[AnyArray, ...]:
+    def rows(self, kind: DTypeLike) -> tuple[Any, ...]:
         """Return the change as block rows: `nodes`, `indptr`, `indices` and `data` as in `BlockMatrix`.
 
-        `indices` are numbers of nodes of the complete matrix. `kind` is the data type of `data`.
+        `indices` are numbers of nodes of the complete matrix. `kind` is the data type of `data`, which is a tuple of one.
         """
         columns = self.nodes[self.blocks.indices].astype(np.int32)
-        return self.nodes, self.blocks.indptr, columns, self.blocks.data.astype(kind).ravel()
+        return self.nodes, self.blocks.indptr, columns, (self.blocks.data.astype(kind).ravel(),)
 
     def coarser(self, P: BlockMatrix) -> LocalChange:
         """Return the Galerkin product ``P.T change P``, the change of the next coarser matrix with the prolongator P."""
