@@ -11,17 +11,8 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.analytic.pressure_curve import NAMES
 from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError
-from fastcontact.results.plot._axes import (
-    UNKNOWN,
-    Axes,
-    Panels,
-    Units,
-    contacts_of,
-    new_axes,
-    new_panels,
-    outer_legend,
-    units_of,
-)
+from fastcontact.results.plot import _axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, contacts_of, new_axes, units_of
 from fastcontact.results.step import StepResult
 from fastcontact.results.units import labelled, units_of_results
 
@@ -83,7 +74,7 @@ def history(
     >>> axes[0].figure.savefig("history.png")
     """
     if axes is None:
-        axes = Panels(new_panels(2, 1, (6.0, 5.8), sharex=True)[:, 0])
+        axes = _axes.Panels(_axes.new_panels(2, 1, (6.0, 5.8), sharex=True)[:, 0])
     upper, lower = axes
     contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
     x = np.array([step.load_factor for step in steps]) * (approach or 1.0)
@@ -189,5 +180,5 @@ def contact_zones(
     distance = labelled(f"distance from the {start}", units, "length")
     axes.set(xlabel="load factor (above: closed nodes)", ylabel=distance)
     axes.set_title(title or f"Contact '{pair}' against the load", pad=16, fontsize="medium")
-    outer_legend(axes, 3)
+    _axes.outer_legend(axes, 3)
     return axes

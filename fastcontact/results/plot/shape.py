@@ -15,21 +15,8 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import (
-    UNKNOWN,
-    Axes,
-    Field,
-    Units,
-    field_of,
-    framed,
-    mark,
-    new_axes,
-    part_shown,
-    placed,
-    settled,
-    size_around,
-    units_of,
-)
+from fastcontact.results.plot import _axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Field, Units, field_of, new_axes, placed, units_of
 from fastcontact.results.plot.patches import fill, outlines, shaded
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, view_of_extreme
 from fastcontact.results.step import StepResult
@@ -144,17 +131,17 @@ def deformed_shape(
         view = view or view_of_extreme(shown, points)
         drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
-        framed(axes, drawn, shown, heading, units, "xyz")
-        return axes if ax is not None else settled(axes)
+        _axes.framed(axes, drawn, shown, heading, units, "xyz")
+        return axes if ax is not None else _axes.settled(axes)
     extent = np.concatenate([points, points * [-1.0, 1.0]]) if mirrored else points
-    extent = extent if zoom is None else np.array(part_shown(points[shown.extreme], zoom, extent))
-    axes = new_axes(ax, size_around(extent))
+    extent = extent if zoom is None else np.array(_axes.part_shown(points[shown.extreme], zoom, extent))
+    axes = new_axes(ax, _axes.size_around(extent))
     for turned in (points, points * [-1.0, 1.0]) if mirrored else (points,):
         drawn = _draw(axes, shown, turned, edges, limits or shown.range, extent)
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
     _mark(axes, shown, points, mesh, units)
-    return framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
+    return _axes.framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False) -> None:
@@ -163,7 +150,7 @@ def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     here, there = placed(at, size), placed(before, size)
     label = f"{shown.described(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
-    mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
+    _axes.mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
 
 
 def _draw(
@@ -261,8 +248,8 @@ def section(
     flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     points = flat.reshape(-1, 2)
-    points = points if zoom is None else np.array(part_shown(flat[best], zoom, points))
-    axes = new_axes(ax, size_around(points))
+    points = points if zoom is None else np.array(_axes.part_shown(flat[best], zoom, points))
+    axes = new_axes(ax, _axes.size_around(points))
     limits = shown.range if shown.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
     drawn = shaded(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
@@ -272,13 +259,13 @@ def section(
     before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     label = f"{shown.described(values[best], units, ' on the section')}\nundeformed at {placed(before, size)}"
-    mark(axes, flat[best], label)
+    _axes.mark(axes, flat[best], label)
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
     state = f"{step.instant}, displacements x {scale:g}"
     labels = labels or ("along the section", "across it")
-    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
+    return _axes.framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
