@@ -21,7 +21,7 @@ from fastcontact._tools.paths import PathLike, existing_file
 from fastcontact.arrays import Array, Numbers
 from fastcontact.errors import FileError
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results import conversions, journal, layout
+from fastcontact.results import journal, layout, tables
 from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.step import ContactResult, MaterialStress, StepResult, StepSequence
 from fastcontact.results.units import units_of_results
@@ -280,8 +280,8 @@ class Results(StepSequence):
             If PyVista is not installed.
         """
         if step is None:
-            return conversions.series(self.mesh, self)
-        return conversions.grid(self.mesh, step if isinstance(step, StepResult) else self[step])
+            return tables.series(self.mesh, self)
+        return tables.grid(self.mesh, step if isinstance(step, StepResult) else self[step])
 
     def to_pandas(self) -> pandas.DataFrame:
         """Return the contact tables of all steps as one ``pandas.DataFrame``.
@@ -295,7 +295,7 @@ class Results(StepSequence):
         FileError
             If pandas is not installed.
         """
-        return conversions.contact_frame(self, self.units)
+        return tables.contact_frame(self, self.units)
 
     def to_xarray(self) -> Any:
         """Return the fields of all steps as an ``xarray.Dataset``, which is held in memory.
@@ -310,7 +310,7 @@ class Results(StepSequence):
         FileError
             If xarray is not installed.
         """
-        return conversions.dataset(self.mesh, self, self.units)
+        return tables.dataset(self.mesh, self, self.units)
 
     def _units_of_case(self) -> dict[str, str]:
         """Return the names of units in the case text, for files of earlier versions."""

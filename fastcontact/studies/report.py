@@ -13,9 +13,8 @@ from fastcontact._tools.html_table import html_table
 from fastcontact._tools.versions import versions
 from fastcontact.arrays import AnyArray
 from fastcontact.cases.case import Case
-from fastcontact.results.conversions import data_frame
 from fastcontact.results.plot._axes import new_panels, png
-from fastcontact.results.tables import structured
+from fastcontact.results.tables import data_frame, structured
 from fastcontact.results.units import units_of_results
 from fastcontact.studies.quantities import unit
 

@@ -14,7 +14,7 @@ from fastcontact.linear import choice as linear
 from fastcontact.mesh.generate import block, box, half_spheres
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import contact_zones
-from fastcontact.results.plot.profile import stresses_on_axis
+from fastcontact.results.plot.curves import stresses_on_axis
 
 
 def obstacle(**options):

@@ -20,8 +20,8 @@ from fastcontact.errors import ModelError
 from fastcontact.mesh.generate import union
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.model.model import Model
-from fastcontact.results.conversions import data_frame
 from fastcontact.results.step import StepResult, StepSequence, phases
+from fastcontact.results.tables import data_frame
 from fastcontact.round_off import ROUND_OFF
 
 if TYPE_CHECKING:

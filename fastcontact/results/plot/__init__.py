@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 
 from fastcontact.errors import names_of
 from fastcontact.results.plot._axes import UNITS
-from fastcontact.results.plot.animation import animate
 from fastcontact.results.plot.contact_map import contact_map
+from fastcontact.results.plot.curves import axis_stress, contact_zones, history, pressure_profile
 from fastcontact.results.plot.found import contacts
-from fastcontact.results.plot.history import contact_zones, history
-from fastcontact.results.plot.profile import axis_stress, pressure_profile
-from fastcontact.results.plot.shape import deformed_shape, section, view
+from fastcontact.results.plot.shape import animate, deformed_shape, section, view
 
 __all__ = [
     "UNITS", "animate", "axis_stress", "contact_map", "contact_zones", "contacts", "deformed_shape", "history",

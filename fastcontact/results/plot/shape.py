@@ -1,37 +1,30 @@
-"""Plot the deformed mesh, and plane sections through 3D bodies, coloured by a field; also in interactive windows."""
+"""Plot the deformed mesh, and plane sections through 3D bodies, coloured by a field; also interactively and as animations."""
 
 from __future__ import annotations
 
+import base64
+import contextlib
 import os
+import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fastcontact._tools.argument_types import typed
+from fastcontact._tools.paths import checked_target, replacing
 from fastcontact.arrays import Array
 from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.plot._axes import (
-    UNKNOWN,
-    Axes,
-    Field,
-    Units,
-    field_of,
-    framed,
-    mark,
-    new_axes,
-    part_shown,
-    placed,
-    settled,
-    size_around,
-    units_of,
-)
+from fastcontact.results.plot import _axes
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Field, Units, field_of, new_axes, placed, units_of
 from fastcontact.results.plot.patches import fill, outlines, shaded
-from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, view_of_extreme
+from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, show_box, view_of_extreme
 from fastcontact.results.step import StepResult
 
 LARGEST = 1e30  # largest coordinate that can be plotted without overflow in products of coordinates
@@ -144,17 +137,17 @@ def deformed_shape(
         view = view or view_of_extreme(shown, points)
         drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
-        framed(axes, drawn, shown, heading, units, "xyz")
-        return axes if ax is not None else settled(axes)
+        _axes.framed(axes, drawn, shown, heading, units, "xyz")
+        return axes if ax is not None else _axes.settled(axes)
     extent = np.concatenate([points, points * [-1.0, 1.0]]) if mirrored else points
-    extent = extent if zoom is None else np.array(part_shown(points[shown.extreme], zoom, extent))
-    axes = new_axes(ax, size_around(extent))
+    extent = extent if zoom is None else np.array(_axes.part_shown(points[shown.extreme], zoom, extent))
+    axes = new_axes(ax, _axes.size_around(extent))
     for turned in (points, points * [-1.0, 1.0]) if mirrored else (points,):
         drawn = _draw(axes, shown, turned, edges, limits or shown.range, extent)
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
     _mark(axes, shown, points, mesh, units)
-    return framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
+    return _axes.framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False) -> None:
@@ -163,7 +156,7 @@ def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str
     at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
     here, there = placed(at, size), placed(before, size)
     label = f"{shown.described(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
-    mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
+    _axes.mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
 
 
 def _draw(
@@ -261,8 +254,8 @@ def section(
     flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     points = flat.reshape(-1, 2)
-    points = points if zoom is None else np.array(part_shown(flat[best], zoom, points))
-    axes = new_axes(ax, size_around(points))
+    points = points if zoom is None else np.array(_axes.part_shown(flat[best], zoom, points))
+    axes = new_axes(ax, _axes.size_around(points))
     limits = shown.range if shown.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
     drawn = shaded(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
@@ -272,13 +265,13 @@ def section(
     before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     label = f"{shown.described(values[best], units, ' on the section')}\nundeformed at {placed(before, size)}"
-    mark(axes, flat[best], label)
+    _axes.mark(axes, flat[best], label)
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
     plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
     state = f"{step.instant}, displacements x {scale:g}"
     labels = labels or ("along the section", "across it")
-    return framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
+    return _axes.framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
@@ -418,3 +411,171 @@ def view(
         plotter.view_xy()
     plotter.add_axes()
     plotter.show(screenshot=screenshot or False)
+
+
+# Suffixes of animation files; all formats except the first require the program ffmpeg.
+SUFFIXES = (".gif", ".mp4", ".mkv", ".webm")
+# Resolution of a frame [dots per inch], which is low because an animation contains many frames.
+RESOLUTION = 90
+
+
+@dataclass(frozen=True)
+class MovingPicture:
+    """An animation in a file, which notebooks display.
+
+    Attributes
+    ----------
+    path : pathlib.Path
+        Path of the file.
+    """
+
+    path: Path
+
+    def _repr_html_(self) -> str:
+        """Return the animation embedded in HTML."""
+        inside = base64.b64encode(self.path.read_bytes()).decode()
+        kind = self.path.suffix[1:].lower()
+        if kind == "gif":
+            return f"<img src='data:image/gif;base64,{inside}'>"
+        return f"<video controls loop src='data:video/{kind};base64,{inside}'></video>"
+
+
+@typed(FastcontactError)
+def animate(
+    mesh: Mesh,
+    steps: Sequence[StepResult],
+    path: str | os.PathLike[str],
+    *,
+    field: str = "von_mises",
+    scale: float | None = None,
+    mirrored: bool = False,
+    pictures_per_second: int = 5,
+    title: str = "",
+    units: Units = UNKNOWN,
+    view: tuple[float, float] = (25.0, -60.0),
+) -> MovingPicture:
+    """Write an animation of the deformed shape over all load steps, with fixed axes and a fixed colour scale.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh of the steps.
+    steps : sequence of StepResult
+        Steps of an analysis, one for each frame.
+    path : str or path
+        File to write, with the suffix ``.gif`` or, if the program ffmpeg is installed, ``.mp4``, ``.mkv`` or ``.webm``.
+    field, scale, mirrored, units, view
+        Described for `deformed_shape`.
+    pictures_per_second : int
+        Frame rate [1/s].
+    title : str
+        Title of every frame, followed by the load factor.
+
+    Returns
+    -------
+    MovingPicture
+        The animation, which a notebook displays if it is the last value of a cell.
+
+    Raises
+    ------
+    FastcontactError
+        If there are no steps, the suffix is unknown, or ffmpeg is missing or fails.
+    FileError
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> import fastcontact as fc
+    >>> mesh = fc.generate.block_on_block()
+    >>> model = fc.Model(mesh, kinematics="plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.0))
+    >>> model.fix("LOWER_BOTTOM", "xy")
+    >>> model.fix("UPPER_LEFT", "x")
+    >>> model.add_pressure("UPPER_TOP", 2.0)
+    >>> model.add_contact("joint", secondary="CONT_UPPER", primary="CONT_LOWER")
+    >>> steps = fc.solve(model, 2)
+    >>> picture = fc.plot.animate(mesh, steps, "joint.gif", scale=10.0)
+    """
+    if not len(steps):
+        raise FastcontactError("there are no steps to animate")
+    if pictures_per_second < 1:
+        raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
+    target, scale = checked_target(path), scale_of(scale, mesh, steps)
+    doubled = [2.0 if mirrored else 1.0, 1.0]
+    size, projection = (_axes.size_around(mesh.points * doubled, 3.8), None) if mesh.dim == 2 else ((6.4, 6.0), "3d")
+    figure = new_axes(None, size, projection).figure
+    writer = writer_of(target, pictures_per_second)
+    colours, box = _over_all(mesh, steps, field, scale, mirrored)
+    with _failure_of_writer(target), replacing(target) as temporary, writer.saving(figure, temporary, RESOLUTION):
+        for step in steps:
+            figure.clear()
+            axes = figure.add_subplot(projection=projection)
+            heading = f"{title}\n{step.instant}, displacements x {scale:g}".strip()
+            deformed_shape(
+                mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
+                view=view, ax=axes,
+            )  # fmt: skip
+            _show(axes, box, view)
+            writer.grab_frame()
+    return MovingPicture(target)
+
+
+def _show(axes: Any, box: tuple[Array, Array], view: tuple[float, float]) -> None:
+    """Set the limits of the axes to the common limits of all frames."""
+    if len(box[0]) == 3:
+        show_box(axes, *box, view)
+        _axes.settled(axes)
+    else:
+        axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})
+
+
+def writer_of(path: Path, pictures_per_second: int) -> Any:
+    """Return the writer of an animation; FastcontactError if the suffix is unknown or ffmpeg is missing."""
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise FastcontactError(f"'{path}' does not have a suffix of animations: use {', '.join(SUFFIXES)}")
+    if suffix == ".gif":
+        return PillowWriter(fps=pictures_per_second)
+    if not FFMpegWriter.isAvailable():
+        raise FastcontactError(f"'{path}' needs the program ffmpeg, which is not installed: write a .gif instead")
+    # Most codecs require an even number of dots in both directions.
+    return FFMpegWriter(
+        fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
+    )
+
+
+@contextlib.contextmanager
+def _failure_of_writer(path: Path) -> Iterator[None]:
+    """Convert failures of ffmpeg to a FastcontactError with its last message.
+
+    Errors before the first frame are raised unchanged.
+    """
+    try:
+        yield
+    except subprocess.CalledProcessError as error:
+        lines = str(error.stderr or "").strip().splitlines()
+        reason = f"{error.returncode} ({lines[-1][:200]})" if lines else str(error.returncode)
+        raise FastcontactError(
+            f"'{path}' was not written, ffmpeg ended with code {reason}: write a .gif instead"
+        ) from error
+    except IndexError as error:  # matplotlib cannot finish a .gif without frames
+        raise error.__context__ or error from None
+
+
+def _over_all(
+    mesh: Mesh, steps: Sequence[StepResult], field: str, scale: float, mirrored: bool
+) -> tuple[tuple[float, float], tuple[Array, Array]]:
+    """Return the limits of the colour scale and the corners of the bounding box of the bodies over all steps."""
+    low, high = np.full(mesh.dim, np.inf), np.full(mesh.dim, -np.inf)
+    colours = (np.inf, -np.inf)
+    for step in steps:
+        smallest, largest = field_of(mesh, step, field).range
+        colours = min(colours[0], smallest), max(colours[1], largest)
+        points = scaled(mesh.points, scale, step.displacement)
+        low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
+    if mirrored and mesh.dim == 2:
+        low[0], high[0] = min(low[0], -high[0]), max(high[0], -low[0])
+    margin = 0.03 * float((high - low).max())
+    return colours, (low - margin, high + margin)

@@ -11,7 +11,7 @@ from fastcontact import normal_stress
 from fastcontact.cli import main
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.generate import block, box, union
-from fastcontact.results.plot.profile import stresses_on_axis
+from fastcontact.results.plot.curves import stresses_on_axis
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

@@ -521,7 +521,7 @@ def test_an_interruption_before_the_first_frame_is_told_as_such(tmp_path, monkey
     def interrupted(*given, **named):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fastcontact.results.plot.animation.deformed_shape", interrupted)
+    monkeypatch.setattr("fastcontact.results.plot.shape.deformed_shape", interrupted)
     mesh = block((1.0, 1.0), (2, 2), "quad4")
     with pytest.raises(KeyboardInterrupt):
         fc.plot.animate(mesh, [step_of(mesh)], tmp_path / "a.gif")
