@@ -454,9 +454,13 @@ def test_cooks_membrane(element: str, n: int, nu: float, error: float) -> None:
     assert found == pytest.approx(7.8270 if nu == 0.3 else 6.9078, rel=error)
 
 
-@pytest.mark.parametrize(("element", "n", "error"), [("quad8", 16, 0.01), ("quad4", 32, 0.03)])
-def test_cooks_membrane_yields(element: str, n: int, error: float) -> None:
-    """Cook's membrane with plastic strains of 2 %, against 32 x 32 cells of quad8: 1.0846."""
+@pytest.mark.parametrize(("element", "n"), [("quad8", 32), ("quad4", 96), ("tri6", 32)])
+def test_cooks_membrane_yields(element: str, n: int) -> None:
+    """Cook's membrane with plastic strains of 2 %, within 1 % of 1.091, to which refinement with both elements leads.
+
+    Plastic strains are singular at the upper clamped corner: with 16, 32, 64, 96 cells of quad8 the deflections are 1.0759,
+    1.0846, 1.0884, 1.0896, with 32, 64, 128 of quad4 1.0573, 1.0789, 1.0866; extrapolated, 1.0915 and 1.0910.
+    """
     hardening = [(0.0, 0.243), (0.05, 0.31), (0.2, 0.36), (1.0, 0.47)]
     law = fc.ElasticPlastic(E=70.0, nu=1.0 / 3.0, yield_stress=0.243, hardening=hardening)
-    assert cook(element, n, law, 1.8, 6, "small") == pytest.approx(1.0846, rel=error)
+    assert cook(element, n, law, 1.8, 6, "small") == pytest.approx(1.091, rel=0.01)
