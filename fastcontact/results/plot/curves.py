@@ -34,7 +34,8 @@ def pressure_profile(
     """Plot the contact pressure as a function of the distance from the middle, with theories for comparison.
 
     The distance is `ContactResult.place`, which in 2D is the arc length, with a sign if nodes lie on both sides of the
-    middle.
+    middle. The edge of the contact is shaded; in finite strain it is the deformed `ContactResult.radius`. If the axes already
+    contain a profile, the next one has another colour.
 
     Parameters
     ----------
