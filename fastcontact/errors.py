@@ -97,7 +97,6 @@ def warn(text: str) -> None:
 
 # Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
-NEAR = 0.52  # smallest similarity of a name that messages suggest
 SHOWN = 20  # largest number of known names in the message about an unknown one
 # Words of this package for words of its methods and of other programs.
 OTHER_WORDS = {
@@ -146,7 +145,8 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     near = [candidate for candidate in names if candidate.rpartition(".")[2] in meant]
     if not near:
         plain = {candidate.casefold().lstrip("-"): candidate for candidate in reversed(names)}
-        near = [plain[key] for key in difflib.get_close_matches(name.casefold().lstrip("-"), plain, n=3, cutoff=NEAR)]
+        cutoff = 0.6 if name.startswith("-") else 0.5  # options are many
+        near = [plain[key] for key in difflib.get_close_matches(name.casefold().lstrip("-"), plain, n=3, cutoff=cutoff)]
     if near:
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
