@@ -97,7 +97,6 @@ def warn(text: str) -> None:
 
 # Length to which messages shorten an unknown name.
 LONGEST_NAME = 120
-NEAR = 0.52  # smallest similarity of a name that messages suggest
 SHOWN = 20  # largest number of known names in the message about an unknown one
 # Words of this package for words of its methods and of other programs.
 OTHER_WORDS = {
@@ -119,7 +118,7 @@ OTHER_WORDS = {
 }  # fmt: skip
 
 
-def nearest(name: str, known: Iterable[str], cutoff: float = 0.5) -> list[str]:
+def nearest(name: str, known: Iterable[str], cutoff: float) -> list[str]:
     """Return the known names that may be meant by a name: those of `OTHER_WORDS`, or up to three with similar spelling."""
     names = {candidate.casefold().lstrip("-"): candidate for candidate in reversed([*known])}
     meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
@@ -179,7 +178,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    if near := nearest(name, names, NEAR):
+    if near := nearest(name, names, 0.6 if name.startswith("-") else 0.5):  # there are many options
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
     return f"unknown {kind} '{name}': known are {shown}"

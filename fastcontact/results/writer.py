@@ -41,21 +41,7 @@ MARGIN = 1 << 19
 # Size in the file of the indices that HDF5 caches in memory [bytes].
 INDICES = 1 << 18
 # Suffixes of formats in which results are not written.
-OTHER_FORMATS = {
-    ".vtu",
-    ".vtk",
-    ".pvd",
-    ".med",
-    ".rmed",
-    ".xdmf",
-    ".msh",
-    ".inp",
-    ".frd",
-    ".toml",
-    ".json",
-    ".csv",
-    ".png",
-}
+OTHER_FORMATS = {".vtu", ".vtk", ".pvd", ".med", ".rmed", ".xdmf"}
 
 
 @typed(FileError)
@@ -141,7 +127,7 @@ class ResultWriter:
             case_text = case_text or getattr(mesh, "case_text", None) or ""
             mesh = mesh.mesh
         self.path = checked_target(path)
-        if self.path.suffix.lower() in OTHER_FORMATS:
+        if self.path.suffix.lower() in OTHER_FORMATS and not self.path.exists():
             raise FileError(
                 f"'{path}': results are written in the format VTKHDF: name it {self.path.stem}.vtkhdf (ParaView opens it), "
                 "and convert it with 'fastcontact export'"

@@ -261,7 +261,8 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
     """
     if mesh.dim != 2:
         raise FastcontactError(
-            "stresses along the axis need a two-dimensional mesh: in three dimensions draw a section"
+            "stresses along the axis need a two-dimensional mesh: in three dimensions draw a section, or plot step.stress at "
+            "the nodes on the axis"
         )
     pole, direction = _axis(step, pair)
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()

@@ -273,7 +273,14 @@ def test_moments_of_circles_are_refused():
 def test_units_are_named_where_they_are_known_and_nothing_where_not(steps):
     asked = checks({"torque": -1.0, "force": 1.0})
     known, unknown = (lines(summary(DRUM + units + asked, steps)) for units in (UNITS, ""))
-    for text in (" N/mm, largest pressure ", " MPa, half-width ", "N mm/mm", " mm\n", "worn by up to "):
+    for text in (
+        " N/mm (normal ",
+        " N/mm), largest pressure ",
+        " MPa, half-width ",
+        "N mm/mm",
+        " mm\n",
+        "worn by up to ",
+    ):
         assert text in "\n".join(known)
     told = "\n".join(unknown)
     for dash in (" - ", " -,", " -\n", "- -", "[-]", "  is "):
