@@ -64,9 +64,14 @@ class Iteration:
         self.norm, self._moved = float(np.sqrt(self.dot(self.r, self.r))), None
 
     def change(self, n: int) -> float:
-        """Return the largest change of the first n unknowns in the last step, over the residual before it; 0 without one."""
-        alpha, p, before = self._moved or (0.0, self.x, 1.0)
-        return abs(alpha) * largest(p[:n]) / before
+        """Return the largest change of the first n unknowns in the last step, over the fall of the residual; 0 without one.
+
+        At the same rate of convergence, the product with the residual is the error that is left.
+        """
+        if self._moved is None:
+            return 0.0
+        alpha, p, before = self._moved
+        return abs(alpha) * largest(p[:n]) / (before - self.norm) if self.norm < before else np.inf
 
     def _advance(self, alpha: float, p: Array, q: Array) -> None:
         """Step ``x += alpha p``, ``r -= alpha q``."""

@@ -44,9 +44,9 @@ WATCH_EVERY = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
 # known.
 WATCH_CONTRAST_FROM = 6
-# Largest relative change of displacements in the last iteration, over the tolerance of the residual. In one material the
-# change is smaller by itself; forces in a stiff body exceed those in a soft one, whose displacements settle later.
-ERROR = 1e2
+# Largest estimated error of displacements, relative to the largest one, over the tolerance of the residual. In one material
+# the error is smaller by itself; forces in a stiff body exceed those in a soft one, whose displacements settle later.
+ERROR = 3e3
 # Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations; about that of a
 # new hierarchy, too.
 CHANGE = 15
@@ -113,7 +113,7 @@ class Multigrid:
     def begin(self) -> None:
         """Reset the statistics of warm starts for a new load step."""
         self._most_warm, self._cut_short = MOST_WARM, np.inf
-        self._yielding = np.inf  # change of displacements in an iteration, over the residual
+        self._yielding = np.inf  # change of displacements in an iteration, over the fall of the residual
 
     @property
     def nbytes(self) -> int:

@@ -109,7 +109,7 @@ def test_progress_tells_that_a_step_is_cut(capsys):
 def test_the_remedy_follows_from_how_the_geometry_moves(changes, words, enough):
     mesh = block((1.0, 1.0), (1, 1))
     side = SimpleNamespace(points=np.arange(4))
-    options = SimpleNamespace(cohesion=None)
+    options = SimpleNamespace(cohesion=None, kind="unilateral")
     pair = SimpleNamespace(secondary=side, primary=side, normals="averaged", multipliers="dual", options=options)
     model, criteria = SimpleNamespace(mesh=mesh), Criteria()
     problem = SimpleNamespace(model=model, criteria=criteria, shape=(4, 2), pairs={"joint": pair})
