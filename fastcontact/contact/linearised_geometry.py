@@ -378,7 +378,12 @@ class Slips:
         return np.einsum("nk,knd->nd", self.forces, self.tangents)
 
     def along(
-        self, du: Array, varied: Variation, points: Points, weights: csr_array, normals: tuple[Array, Array, Array]
+        self,
+        du: Array,
+        varied: Variation,
+        points: Points,
+        weights: csr_array | None,
+        normals: tuple[Array, Array, Array],
     ) -> Array:
         """Return how slips (k, n) vary with displacements [length].
 
@@ -389,24 +394,28 @@ class Slips:
         varied : Variation
             Variation of `points`.
         points : Points
-        weights : csr_array (n, n_points)
-            Weights of the points in the slips.
+        weights : csr_array (n, n_points) or None
+            Weights of the points in the slips; None if each slip is that of one point.
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
             Normals of the constraints, how they vary, and how the `primary` normals of `closing` vary.
         """
 
         def faced(values: Array) -> Array:
-            return np.asarray(-(weights @ np.einsum("nid,ni->nd", points.slopes(values), varied.xi)))
+            return -_weighted(weights, np.einsum("nid,ni->nd", points.slopes(values), varied.xi))
 
         change, (normal, turned, primary) = faced(self.motion), normals
         if self.turning is not None:
-            change -= weights @ (points.motion @ du @ self.turning)
+            change -= _weighted(weights, points.motion @ du @ self.turning)
         if self.closing is not None:
             change += self.closing.along(du, (normal, turned), primary, faced(self.start))
         leaning = np.einsum("nd,nd->n", normal, self.total)
         return np.einsum("knd,nd->kn", self.tangents, change) - np.einsum(
             "knd,nd,n->kn", self.tangents, turned, leaning
         )
+
+
+def _weighted(weights: csr_array | None, values: Array) -> Array:
+    return values if weights is None else np.asarray(weights @ values)
 
 
 def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: Array) -> Array:
@@ -426,9 +435,8 @@ class Linearised:
     side : Surface
         The secondary side.
     points : Points
-    functions : csr_array (m, n)
-        Weights of the n points in the gaps, divided by the weight of each constraint; one where
-        each gap is that of one point.
+    functions : csr_array (m, n) or None
+        Weights of the n points in the gaps, divided by the weight of each constraint; None if each gap is that of one point.
     normal : ndarray (m, dim)
         Normals of the constraints.
     multiplier : ndarray (m,)
@@ -437,42 +445,51 @@ class Linearised:
     nodal : NodalNormals or Points, optional
         Source of the normals of the constraints if they are neither means over the points nor those of the points.
     slips : Slips, optional
+    place : (ndarray of int (m,), int), optional
+        Rows of the constraints of the pair in which the m ones of this object are, and their number.
     smooth : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
         Primary normals of the slips, and their derivatives along facets, where they are not those of the points.
     """
 
     side: Surface
     points: Points
-    functions: csr_array
+    functions: csr_array | None
     normal: Array
     multiplier: Array
     tests: csr_array | None = None
     nodal: NodalNormals | Points | None = None
     slips: Slips | None = None
+    place: tuple[Indices, int] | None = None
     smooth: tuple[InterpolatedNormals, Array] | None = None
 
     def along(self, du: Array) -> tuple[Array, Array]:
         """Return the variation of nodal forces (n_points, dim) [force] and of gaps and slips (1 + k, m) [length] along du."""
         varied = self.points.along(du)
         normal = self._normals(du, varied.normal)
-        gaps = np.einsum("md,md->m", self.functions @ self.points.apart, normal)[None]
-        gaps -= np.einsum("md,md->m", self.normal, self.functions @ varied.foot)
+        gaps = np.einsum("md,md->m", _weighted(self.functions, self.points.apart), normal)[None]
+        gaps -= np.einsum("md,md->m", self.normal, _weighted(self.functions, varied.foot))
         if self.slips is not None:
             primary = normal
             if self.smooth is not None:
                 turned = self.smooth[0].along(du) + np.einsum("nid,ni->nd", self.smooth[1], varied.xi)
-                primary = self.functions @ turned
+                primary = _weighted(self.functions, turned)
             normals = self.normal, normal, primary
             gaps = np.vstack([gaps, self.slips.along(du, varied, self.points, self.functions, normals)])
         tangential = None if self.slips is None else self.slips.force
-        force = self.functions.T @ _turned(self.multiplier, tangential, self.normal, normal)
+        force = _turned(self.multiplier, tangential, self.normal, normal)
+        force = force if self.functions is None else self.functions.T @ force
+        if self.place is not None:
+            rows, of_place = self.place[0], gaps
+            gaps = np.zeros((len(gaps), self.place[1]))
+            gaps[:, rows] = of_place
         return self.points.spread(self._force, force, varied.xi), gaps
 
     @cached_property
     def _force(self) -> Array:
         """Forces at the points (n, dim) [force]."""
         force = self.multiplier[:, None] * self.normal
-        return np.asarray(self.functions.T @ (force if self.slips is None else force + self.slips.force))
+        force = force if self.slips is None else force + self.slips.force
+        return force if self.functions is None else np.asarray(self.functions.T @ force)
 
     @cached_property
     def _length(self) -> Array:
@@ -483,7 +500,7 @@ class Linearised:
     def _normals(self, du: Array, at_points: Array) -> Array:
         """Return how the normals (m, dim) of the constraints vary, from the variation of those at the points (n, dim)."""
         if self.tests is None:
-            return np.asarray(self.functions @ at_points)
+            return _weighted(self.functions, at_points)
         if isinstance(self.nodal, NodalNormals):
             return -self.nodal.along(du)
         if self.nodal is not None:

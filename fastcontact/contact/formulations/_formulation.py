@@ -213,7 +213,6 @@ class Formulation(ABC):
             before = _at_places(at.elastic_slip, constraints.positions)
             given = np.stack([-np.einsum("md,md->m", t, before) for t in constraints.directions])
             constraints = replace(constraints, elastic_slip=given)
-        constraints = replace(constraints, friction=at.friction_factor * constraints.friction)
         if self.options.gap_only:
             return constraints.without(np.ones(len(constraints), bool))
         if self.options.search_distance is not None:
@@ -225,7 +224,8 @@ class Formulation(ABC):
             return bonded(
                 self.options.cohesion, constraints, at, _at_places(self._gaps_as_they_lie, constraints.positions)
             )
-        constraints = replace(constraints, equality=self.never_opening(constraints.positions, at))
+        equality = self.never_opening(constraints.positions, at)
+        constraints = replace(constraints, equality=equality, friction=at.friction_factor * constraints.friction)
         if self.options.source is None:
             return constraints
         from fastcontact.contact.fluid_pressure import AreaVectors, wetted
@@ -366,15 +366,15 @@ class Formulation(ABC):
         coordinates = self.points + at.displacement
 
         def linearised(multiplier: Array, tangential: Array, displacement: Array) -> Linearised:
-            acts = pairing.paired & (multiplier != 0.0)
-            rows = np.flatnonzero(acts)
+            rows = np.flatnonzero(pairing.paired & (multiplier != 0.0))
             points = faced(candidates, pairing, rows, self.primary, coordinates, self.normals, at.pose)
-            of_points = csr_array((np.ones(len(rows)), (rows, np.arange(len(rows)))), shape=(len(acts), len(rows)))
-            forces = Linearised(self.secondary, points, of_points, of_points @ points.normal, multiplier)
+            forces = Linearised(
+                self.secondary, points, None, points.normal, multiplier[rows], place=(rows, len(multiplier))
+            )
             if not directions:
                 return forces
-            moved, motion = replace(at, displacement=displacement), csr_array(of_points @ points.motion)
-            slips = self._sliding(motion, np.where(acts[:, None], directions, 0.0), tangential, moved)
+            moved = replace(at, displacement=displacement)
+            slips = self._sliding(points.motion, np.stack(directions)[:, rows], tangential[rows], moved)
             if not isinstance(self.primary, Surface) or self.slip != "symmetric":
                 return replace(forces, slips=slips)
             averaged, smooth = points.averaged, None
@@ -385,8 +385,8 @@ class Formulation(ABC):
             local = np.zeros(len(coordinates), np.intp)
             local[self.secondary.points] = np.arange(len(self.secondary.points))
             nodal = NodalNormals(self.secondary, coordinates)
-            opposite = InterpolatedNormals(nodal, local[candidates.nodes], candidates.shape)
-            closing = Closing.of(of_points @ averaged.normal, opposite, motion @ slips.start)
+            opposite = InterpolatedNormals(nodal, local[candidates.nodes[rows]], candidates.shape[rows])
+            closing = Closing.of(averaged.normal, opposite, points.motion @ slips.start)
             slips = replace(slips, total=slips.total + closing.vector, closing=closing)
             return replace(forces, slips=slips, smooth=smooth)
 
