@@ -259,7 +259,7 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     diagonal, size = K.diagonal(), K.blocksize[0]
     pivots = np.where(diagonal > 0, diagonal, diagonal.max(initial=1.0)).reshape(-1, size)
     supported, row = fixed.reshape(-1, size), np.repeat(np.arange(len(K.indptr) - 1), np.diff(K.indptr))
-    on_support = supported.any(axis=1)
+    on_support = np.asarray(supported.any(axis=1))
     near = np.flatnonzero(on_support[row] | on_support[K.indices])
     row, column, blocks = row[near], K.indices[near], K.data[near]
     remaining, own = np.zeros_like(blocks), np.flatnonzero(row == column)
