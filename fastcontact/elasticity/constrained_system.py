@@ -264,7 +264,7 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     row, column, blocks = row[near], K.indices[near], K.data[near]
     remaining, own = np.zeros_like(blocks), np.flatnonzero(row == column)
     remaining[own[:, None], range(size), range(size)] = pivots[row[own]]
-    moves = (supported[row][:, :, None] | supported[column][:, None]) & (blocks != remaining)
+    moves = (supported[row][:, :, None] | supported[column][:, None]) & np.not_equal(blocks, remaining)
     block, i, j = np.nonzero(moves)
     K.data[near[block], i, j] = remaining[moves]
     rows = size * row[block] + i

@@ -301,7 +301,7 @@ def symmetric_storage(indptr: Numbers, indices: Numbers) -> Storage:
     return start, upper, columns, length
 
 
-def pointers(count: Numbers) -> Numbers:
+def pointers(count: Numbers | Indices) -> Numbers:
     """Return the row pointers (n + 1,) of rows with `count` (n,) entries."""
     return np.concatenate([[0], np.cumsum(count)]).astype(np.int32)
 
