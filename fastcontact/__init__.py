@@ -71,7 +71,7 @@ _NAMES = {
     "mesh.topology": ("ordered_line",),
     "model.model": ("Model",),
     "model.ramp": ("Ramp", "linear_ramp"),
-    "results.exports": ("write_med_results",),
+    "results.med": ("write_med_results",),
     "results.reader": ("open_results",),
     "results.step": ("ContactResult", "StepResult"),
     "results.tables": ("contact_table", "line_table", "normal_stress", "write_csv"),

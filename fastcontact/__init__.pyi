@@ -70,7 +70,7 @@ from fastcontact.model.model import Model as Model
 from fastcontact.model.ramp import Ramp as Ramp
 from fastcontact.model.ramp import linear_ramp as linear_ramp
 from fastcontact.results import plot as plot
-from fastcontact.results.exports import write_med_results as write_med_results
+from fastcontact.results.med import write_med_results as write_med_results
 from fastcontact.results.reader import open_results as open_results
 from fastcontact.results.step import ContactResult as ContactResult
 from fastcontact.results.step import StepResult as StepResult

@@ -21,13 +21,13 @@ def run(options: argparse.Namespace) -> int:
         raise CaseError("nothing to export: give --med FILE or --xdmf FILE")
     check_outputs([options.file], [options.med, options.xdmf])
     if options.med:
-        from fastcontact.results.exports import write_med_results
+        from fastcontact.results.med import write_med_results
         from fastcontact.results.reader import open_results
 
         with open_results(options.file) as results:
             write_med_results(options.med, results.mesh, results)
     if options.xdmf:
-        from fastcontact.results.exports import write_xdmf
+        from fastcontact.results.xdmf import write_xdmf
 
         write_xdmf(options.file, options.xdmf)
     say_written(options, options.med, options.xdmf)

@@ -12,7 +12,7 @@ import numpy as np
 
 import fastcontact as fc
 from fastcontact.mesh.files.med import write_med_mesh
-from fastcontact.results.exports import write_med_results
+from fastcontact.results.med import write_med_results
 
 DATA = Path(__file__).resolve().parents[2] / "data"
 

@@ -128,8 +128,7 @@ def interrupted(patch, command):
     def stop(*_, **__):
         raise KeyboardInterrupt
 
-    module = {"convergence_study": "convergence", "parameter_sweep": "sweep"}[command]
-    patch.setattr(f"fastcontact.studies.{module}.{command}", stop)
+    patch.setattr(f"fastcontact.studies.runs.{command}", stop)
     name = {"convergence_study": ["converge"], "parameter_sweep": ["sweep", "--set", "approach=1"]}[command]
     options = parser(name[0]).parse_args([name[0], "forma04a", *name[1:]])
     options.run(options)

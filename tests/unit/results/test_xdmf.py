@@ -22,8 +22,8 @@ from fastcontact.errors import CaseError, FileError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
-from fastcontact.results.exports import write_xdmf
 from fastcontact.results.step import StepResult
+from fastcontact.results.xdmf import write_xdmf
 from fastcontact.results.xmgrace import STYLES, Curve, escaped, round_axis, write_agr
 
 N_STEPS = 3

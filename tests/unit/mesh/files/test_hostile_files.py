@@ -25,7 +25,7 @@ from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
 from fastcontact.mesh.files.med import add_field, write_med_mesh
 from fastcontact.mesh.files.meshio_content import Block, build_mesh
-from fastcontact.results.exports import write_med_results
+from fastcontact.results.med import write_med_results
 
 HEAP = b"GCOL\x01\0\0\0"
 

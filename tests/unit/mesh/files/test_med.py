@@ -19,7 +19,7 @@ from fastcontact.mesh.files import med
 from fastcontact.mesh.files.med import read_med, read_med_field, write_med_mesh
 from fastcontact.mesh.files.mesh_files import read_mesh_report
 from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.exports import write_med_results
+from fastcontact.results.med import write_med_results
 from fastcontact.results.step import ContactResult, StepResult
 
 CASES = Path(__file__).resolve().parents[5] / "shared" / "cases"
