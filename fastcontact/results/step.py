@@ -513,8 +513,8 @@ class StepResult(Suggesting):
         - ``plastic_work``: work of plastic deformation.
         - ``external_work``: work of loads, supports, obstacles and thermal strains.
         - ``friction_work``: work dissipated by friction.
-        - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which they
-          close. It is overestimated in long steps, and zero in steps that are solved in increments.
+        - ``friction_while_touching``: part of the frictional work that is dissipated at nodes in the step in which their
+          gaps close. It is overestimated in long steps, and zero in steps that are solved in increments.
         - ``penalty_energy``: energy of penalties and cohesive layers.
         - ``energy_released``: energy dissipated by damage of cohesive layers.
         - ``imbalance``: external work minus the sum of all other energies.
