@@ -23,7 +23,7 @@ ARGUMENTS = {
 def run(options: argparse.Namespace) -> int:
     """Print the content of the file."""
     file, suffix = Path(options.file), Path(options.file).suffix.lower()
-    from fastcontact.cases.case_files import shipped_cases
+    from fastcontact.cases.case import shipped_cases
 
     if options.contacts or options.png:
         return _contacts(options)

@@ -223,14 +223,17 @@ class WeightedMortar(Formulation):
         return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
 
     def _points_of(self, block: FacetBlock, overlap: Overlap) -> OverlapPoints:
-        """Return Gauss points of whole facets, and the centres of the segments of linear ones that are partly covered."""
+        """Return Gauss points of whole facets, and the centres of the segments of linear ones that are less than half covered.
+
+        The dual functions of a narrow segment are large outside it.
+        """
         N, area = areas_of_rule(block, self.points, self.axisymmetric)
         whole = np.ones(len(area), bool)
         centres = [OverlapPoints(np.empty(0, np.intp), np.empty((0, N.shape[1])), np.empty(0))]
         for coupling in overlap.couplings:
             if coupling.secondary is block and self.secondary.order == 1:
                 covered = overlap.mass[self.secondary.blocks.index(block)].sum(axis=(1, 2))
-                whole = covered >= (1.0 - SINGLE_PRECISION) * area.sum(axis=1)
+                whole = covered >= 0.5 * area.sum(axis=1)
                 facet, shape = coupling.pairs[:, 0], coupling.integrals.sum(axis=2)
                 size = shape.sum(axis=1)
                 cut = ~whole[facet] & (size > 0.0)
