@@ -223,7 +223,7 @@ class WeightedMortar(Formulation):
         return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
 
     def _points_of(self, block: FacetBlock, overlap: Overlap) -> OverlapPoints:
-        """Return Gauss points of whole facets, and the centres of the segments of linear ones that are less than half covered.
+        """Return Gauss points of whole facets, and the centres of the segments of linear facets less than half covered.
 
         The dual functions of a narrow segment are large outside it.
         """
