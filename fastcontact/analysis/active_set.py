@@ -6,15 +6,15 @@ gap is ``gap0 + B u + C multiplier``. C is the compliance of the constraints the
 semidefinite; it is zero in most formulations.
 
 The primal-dual active set method (Hintermueller, Ito and Kunisch, 2003) changes all constraints whose signs are wrong at
-once. It usually converges in a few solutions, but it can cycle. If the constraints are linearly independent,
+once. It usually converges after a few linear solutions, but it can cycle. If the constraints are linearly independent,
 ``B K^-1 B.T + C`` is symmetric positive definite, so that the problem is a linear complementarity problem with a P-matrix.
 When a set recurs, the solver therefore continues with the least-index rule: it only changes the wrong constraint with the
 lowest number. No set is then repeated, and the method terminates (Murty, 1974).
 
-An iterative linear solver need not converge for a set that will change anyway. It is monitored, and stopped as soon as signs
-beyond the error bound of its residual require a different set. The method still terminates: such an early change is never
-undone by a second one, because contradicting signs are due to errors, so that each constraint changes early at most once.
-Convergence is only accepted if the linear solution has converged.
+An iterative linear solver need not converge for a set that will change anyway. It is therefore monitored, and stopped as
+soon as gaps or multipliers with wrong signs exceed the error that its residual allows. The method still terminates: each
+constraint changes in this way at most once, because a second change would contradict the first and shows that the error is
+larger than estimated. A set is accepted as final only if the linear solution has converged.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def solve(
     Parameters
     ----------
     loaded : Loaded
-        Prepared matrix K (n, n) with the right-hand side f (n,).
+        Prepared matrix K (n, n) [force / length] with the right-hand side f (n,) [force].
     constraints : Constraints
         The m constraints in the n unknowns of the solver. A constraint whose row of B is empty cannot become active.
     active : ndarray of bool (m,)
@@ -53,7 +53,7 @@ def solve(
     Returns
     -------
     Solution
-        The solution. Its `settled` is False if the iteration has reached ``accuracy.max_iterations``.
+        The solution. Its `settled` is False if the active set still changes after ``accuracy.max_iterations`` iterations.
     """
     equations = constraints.usable & constraints.equality
     active = (active & constraints.usable) | equations
@@ -67,9 +67,9 @@ def solve(
         A set that would undo an earlier change of one of the constraints `changed` is ignored.
         """
         nonlocal wanted
-        sets = _with_next_set(constraints, accuracy, equations, u, forces, active, error)
-        again = (sets.wanted != active) & changed
-        wanted = None if sets.settled or again.any() else sets.wanted
+        estimate = _with_next_set(constraints, accuracy, equations, u, forces, active, error)
+        again = (estimate.wanted != active) & changed
+        wanted = None if estimate.settled or again.any() else estimate.wanted
         return wanted is not None
 
     while True:
@@ -83,15 +83,15 @@ def solve(
             changed |= active != wanted
             active = wanted
             continue
-        sets = _with_next_set(constraints, accuracy, equations, u, forces, active)
-        if sets.settled or iteration == accuracy.max_iterations:
-            return replace(sets, iterations=iteration, response=partial(_response, loaded, constraints, rows))
+        solution = _with_next_set(constraints, accuracy, equations, u, forces, active)
+        if solution.settled or iteration == accuracy.max_iterations:
+            return replace(solution, iterations=iteration, response=partial(_response, loaded, constraints, rows))
         seen.add(active.tobytes())
-        one_by_one = one_by_one or sets.wanted.tobytes() in seen
+        one_by_one = one_by_one or solution.wanted.tobytes() in seen
         if one_by_one:
-            first = np.flatnonzero(active != sets.wanted)[0]
-            sets.wanted[:first], sets.wanted[first + 1 :] = active[:first], active[first + 1 :]
-        active = sets.wanted
+            first = np.flatnonzero(active != solution.wanted)[0]
+            solution.wanted[:first], solution.wanted[first + 1 :] = active[:first], active[first + 1 :]
+        active = solution.wanted
         iteration += 1
 
 
@@ -111,7 +111,7 @@ def _response(loaded: Loaded, constraints: Constraints, rows: Indices) -> Respon
 def _with_next_set(
     constraints: Constraints, accuracy: Accuracy, equations: Mask, u: Array, forces: Array, active: Mask, error: float = 0.0
 ) -> Solution:  # fmt: skip
-    """Return the solution with its next active set, by the signs of gaps and multipliers.
+    """Return the solution with the next active set, which follows from the signs of gaps and multipliers.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def _with_next_set(
     gap = constraints.gap0 + constraints.B @ u
     if compliance is not None:
         gap += compliance.apply(multiplier)
-    pull = max(accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
-    penetration = max(accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else accuracy.gap
-    wanted = np.where(active, multiplier > -pull, gap < -penetration) & constraints.usable | equations
+    tension_bound = max(accuracy.multiplier, error) * np.abs(forces).max(initial=0.0)
+    gap_bound = max(accuracy.gap, error * np.abs(u).max(initial=0.0)) if error else accuracy.gap
+    wanted = np.where(active, multiplier > -tension_bound, gap < -gap_bound) & constraints.usable | equations
     return Solution.frictionless(u, multiplier, gap, active, wanted)

@@ -1,8 +1,8 @@
 """Printing on terminals, warnings included, with control characters escaped.
 
 Names and titles from files may contain escape sequences, which could change the display or the behaviour of a terminal, and
-characters that change the direction of writing, which could hide part of a line (Boucher and Anderson, 2023). Characters that
-the encoding of the terminal lacks are escaped as well.
+bidirectional control characters, which could hide part of a line (Boucher and Anderson, 2023). Characters that the encoding
+of the terminal lacks are escaped as well.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ def somebody_watches() -> bool:
 def say(text: object, *, error: bool = False) -> None:
     """Print a string on standard output, or on standard error without reporting write errors.
 
-    Raises FileError if standard output cannot be written, and BrokenPipeError if its reader has ended.
+    Raises FileError if writing to standard output fails, and BrokenPipeError if the process that reads it has exited.
     """
     stream: TextIO | None = sys.stderr if error else sys.stdout
     if stream is None:  # closed before the process was started
@@ -35,21 +35,24 @@ def say(text: object, *, error: bool = False) -> None:
         print(encodable(printable(str(text)), stream), file=stream)
     except BrokenPipeError:
         raise
-    except OSError as refused:
+    except OSError as failure:
         if not error:
-            raise FileError(_unwritten(refused)) from refused
+            raise FileError(_unwritten(failure)) from failure
 
 
 def flushed(code: int) -> int:
-    """Flush standard output and return the exit code; if this fails, report the error and return 1 instead of 0."""
+    """Flush standard output and return the exit code, or 1 in place of 0 if this fails.
+
+    The error is reported if `code` is 0, except for a broken pipe.
+    """
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
-    except OSError as refused:
-        # Python would flush again at exit and print its own message.
+    except OSError as failure:
+        # At exit Python flushes once more and would print its own message: redirect the output to the null device.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        if not code and not isinstance(refused, BrokenPipeError):
-            say(f"error: {_unwritten(refused)}", error=True)
+        if not code and not isinstance(failure, BrokenPipeError):
+            say(f"error: {_unwritten(failure)}", error=True)
         return code or 1
     return code
 
@@ -74,11 +77,11 @@ def warnings_shown() -> Iterator[list[str]]:
     texts: list[str] = []
     with warnings.catch_warnings():
         warnings.simplefilter("always", FastcontactWarning)
-        ordinary = warnings.showwarning
+        original = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *rest: object) -> None:
             if not issubclass(category, FastcontactWarning):
-                ordinary(message, category, *rest)  # type: ignore[arg-type]
+                original(message, category, *rest)  # type: ignore[arg-type]
             elif str(message) not in texts:
                 texts.append(str(message))
                 log.warning("warning: %s", message)

@@ -1,4 +1,4 @@
-"""Stresses from displacements, at quadrature points, at element nodes and averaged at nodes, and equivalent stresses."""
+"""Stresses from displacements at quadrature points and nodes, internal forces, and equivalent stresses and strains."""
 
 from __future__ import annotations
 
@@ -50,11 +50,11 @@ def stress_at_points(
         Material number of each cell, or of each quadrature point, by solid element type (`MaterialField.loops`).
     displacement : ndarray (n_points, dim)
         Displacements of all points [length].
-    averaged : ndarray of bool (n_materials,), optional
-        Materials with a mean dilatation, see `dilatation`, or incompatible modes (`MaterialField.treatment`); by
-        default none.
+    averaged : ndarray of bool or uint8 (n_materials,), optional
+        Whether each material has a mean dilatation, see `dilatation`; or the codes of `MaterialField.treatment`, which also
+        state whether it has incompatible modes. By default no material has either.
     offset : StressOffset, optional
-        Stresses due to temperatures and initial states.
+        Stresses due to temperatures and initial states [pressure].
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
     return {
@@ -77,46 +77,48 @@ def nodal_stress(
     """Return the stress (n_points, n_components) [pressure] at the nodes: `nodal_average` of `stress_at_points`.
 
     Arguments are as for `stress_at_points`. Stresses at points are computed for a few cells at a time, which takes less
-    memory. With `sides` the average is over the cells of one material, (n_places, n_components) in the order of the places.
+    memory. With `sides` the result has a row for each of its slots (n_slots, n_components): the mean at a node over the cells
+    of one material.
     """
     stress = CellStress(mesh, kinematics, moduli, displacement, averaged, offset)
-    places = mesh.cells if sides is None else sides.cells
+    rows_of = mesh.cells if sides is None else sides.cells
     average = NodalAverage(mesh.n_points if sides is None else len(sides.node), moduli.shape[1])
     for name, block in mesh.solids.items():
         element = elements.get(name)
         xi, _ = element.quadrature
         cell = np.empty((1, len(xi), moduli.shape[1]))
-        room = np.empty((min(len(block), BATCH // cell.nbytes + 1), *cell.shape[1:]))
-        for first in range(0, len(block), len(room)):
-            rows = slice(first, first + len(room))
-            values = room[: len(block) - first]
+        buffer = np.empty((min(len(block), BATCH // cell.nbytes + 1), *cell.shape[1:]))
+        for first in range(0, len(block), len(buffer)):
+            rows = slice(first, first + len(buffer))
+            values = buffer[: len(block) - first]
             stress.fill(name, xi, block[rows], material[name][rows], values, np.arange(first, first + len(values)))
-            average.add(places[name][rows], element.extrapolation, values)
+            average.add(rows_of[name][rows], element.extrapolation, values)
     return average.result()
 
 
 class NodalAverage:
-    """The plain average, at each node, of the stresses of the adjacent cells."""
+    """The unweighted mean, at each node, of the stresses of the adjacent cells."""
 
     def __init__(self, count: int, components: int) -> None:
         self._total, self._count = np.zeros((count, components)), np.zeros(count)
 
     @typed(ModelError)
     def add(self, cells: Numbers, extrapolation: Array, values: Array) -> None:
-        """Add the stresses of `cells` (n_cells, n_nodes), `values` (n_cells, n_q, n_components) [pressure] at points.
+        """Add the stresses `values` (n_cells, n_q, n_components) [pressure] at quadrature points of cells.
 
-        The matrix `extrapolation` (n_nodes, n_q) [-] maps values at the points to values at the nodes.
+        The array `cells` (n_cells, n_nodes) contains the nodes of the cells. The matrix `extrapolation` (n_nodes, n_q) [-]
+        maps values at quadrature points to values at nodes.
         """
         arguments = parallel.read_only(cells), extrapolation, values
-        into = self._total, self._count
+        sums = self._total, self._count
         # The 2D kernel serves any dimension and number of components.
-        parallel.shared(lambda portion: element_2d_kernels.add_nodal(*arguments, *portion, *into), self._parts(cells))
+        parallel.shared(lambda portion: element_2d_kernels.add_nodal(*arguments, *portion, *sums), self._parts(cells))
 
     def _parts(self, cells: Numbers) -> list[tuple[int, int]]:
-        """Return ranges of nodes with about equal numbers of cells; each thread adds at its own nodes."""
-        some = np.sort(cells[::SAMPLED, 0])
-        count = len(parallel.portions(*cells.shape)) if len(some) else 1
-        ends = [0, *(int(some[k * len(some) // count]) for k in range(1, count)), len(self._count)]
+        """Return a range of nodes for each thread, such that all ranges have about the same number of cells."""
+        sampled = np.sort(cells[::SAMPLED, 0])
+        count = len(parallel.portions(*cells.shape)) if len(sampled) else 1
+        ends = [0, *(int(sampled[k * len(sampled) // count]) for k in range(1, count)), len(self._count)]
         return list(itertools.pairwise(ends))
 
     def result(self) -> Array:
@@ -129,8 +131,8 @@ class NodalAverage:
 def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
     """Return the stress (n_cells, n_nodes, n_components) [pressure] at the nodes of each cell, by solid element type.
 
-    They are extrapolated by `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO
-    of code_aster.
+    It is extrapolated by `Element.extrapolation` from `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_ELNO of
+    code_aster.
     """
     return {
         name: np.einsum("aq,cqi->cai", elements.get(name).extrapolation, values) for name, values in at_points.items()
@@ -139,11 +141,11 @@ def stress_at_element_nodes(at_points: dict[str, Array]) -> dict[str, Array]:
 
 @typed(ModelError)
 def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides | None = None) -> Array:
-    """Return the stress (n_points, n_components) [pressure] at the nodes: the plain average over the cells at each node.
+    """Return the stress (n_points, n_components) [pressure] at the nodes: the unweighted mean over the cells at each node.
 
-    The cells have the stresses `at_points` (n_cells, n_q, n_components) [pressure], as for SIEF_NOEU of code_aster. Points
-    without a solid cell have zero stress. With `sides` the average is over the cells of one material, (n_places,
-    n_components) in the order of the places.
+    It is computed from the stresses `at_points` (n_cells, n_q, n_components) [pressure], like SIEF_NOEU of code_aster. Points
+    without a solid cell have zero stress. With `sides` the result has a row for each of its slots (n_slots, n_components):
+    the mean at a node over the cells of one material.
     """
     cells, count = (mesh.cells, mesh.n_points) if sides is None else (sides.cells, len(sides.node))
     average = NodalAverage(count, next(iter(at_points.values())).shape[2])
@@ -154,9 +156,9 @@ def nodal_average(mesh: Mesh, at_points: dict[str, Array], sides: MaterialSides 
 
 @typed(ModelError)
 def internal_force(mesh: Mesh, kinematics: str, at_points: dict[str, Array]) -> Array:
-    """Return the nodal forces (n_points, dim) [force] that balance the stresses at the quadrature points.
+    """Return the nodal forces (n_points, dim) [force] in equilibrium with the stresses at quadrature points.
 
-    These are `at_points` (n_cells, n_q, n_components) [pressure], by solid element type.
+    The stresses are `at_points` (n_cells, n_q, n_components) [pressure], by solid element type.
     """
     loops, force = element_kernels.loops(mesh.dim), np.zeros((mesh.n_points, mesh.dim))
     for name, values in at_points.items():
@@ -200,7 +202,7 @@ def _with_components(stress: Array) -> Array:
     stress = np.asarray(stress, float)
     if stress.shape[-1:] not in ((4,), (6,)):
         raise ModelError(
-            f"components along the last axis are xx, yy, zz, xy, in 3D also yz, xz, not as in {stress.shape}"
+            f"the last axis must contain the components xx, yy, zz, xy, in 3D also yz, xz, but the shape is {stress.shape}"
         )
     return stress
 
@@ -209,7 +211,8 @@ def _with_components(stress: Array) -> Array:
 def equivalent_strain(strain: Array) -> Array:
     """Return the equivalent strain (...) [-] of `strain` (..., n_components) [-].
 
-    In isotropic materials it is the von Mises stress divided by 3 G. Components are xx, yy, zz, 2xy, in 3D also 2yz, 2xz.
+    For linear elastic isotropic materials it is the von Mises stress divided by 3 G. Components are xx, yy, zz and the
+    engineering shear strain xy, in 3D also those of yz and xz.
     """
     strain = _with_components(strain)
     tensor = strain * np.array([1.0] * 3 + [0.5] * (strain.shape[-1] - 3))
@@ -220,7 +223,8 @@ def equivalent_strain(strain: Array) -> Array:
 def von_mises_signed(stress: Array, equivalent: Array | None = None) -> Array:
     """Return the von Mises stress (...) [pressure] with the sign of the trace, as VMIS_SG of code_aster.
 
-    The von Mises stress of `stress` (..., n_components) [pressure] is `equivalent` (...) [pressure], if known.
+    The argument `equivalent` (...) [pressure] is the von Mises stress of `stress` (..., n_components) [pressure], if it has
+    already been computed.
     """
     stress = _with_components(stress)
     trace = stress[..., 0] + stress[..., 1] + stress[..., 2]

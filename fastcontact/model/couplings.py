@@ -1,8 +1,9 @@
 """Reference points coupled with groups, and forces and moments distributed over groups.
 
-In a rigid coupling all nodes follow the reference point; in a distributing coupling the reference point follows their mean
-motion. A reference point has no cells. Its rotation, for small angles, is the displacement of a second point at the same
-position [radian]: about x, y and z in three dimensions, about z as the first component in two.
+In a rigid coupling all nodes follow the reference point. In a distributing coupling the reference point follows the mean
+motion of the nodes. A reference point belongs to no cell. Its rotation, for small angles, is stored as the displacement of a
+second point at the same position [radian]. In 3D the components are the rotations about x, y and z; in 2D the first component
+is the rotation about z.
 """
 
 from __future__ import annotations
@@ -39,11 +40,11 @@ class Spread:
     Attributes
     ----------
     place : tuple of float (dim,)
-        Point from which distances count [length].
+        Point from which distances are measured [length].
     weighting : str
         ``"uniform"``, ``"linear"``, ``"quadratic"`` or ``"cubic"``.
     radius : float or None
-        Distance beyond which weights are zero [length]; None: the distance of the farthest node.
+        Distance beyond which weights are zero [length]; None for the distance to the farthest node.
     """
 
     place: tuple[float, ...]
@@ -53,7 +54,9 @@ class Spread:
     def check(self, name: str, dim: int) -> None:
         """Raise ModelError, with the `name` of the load, if the weighting is not admissible."""
         if len(self.place) != dim:
-            raise ModelError(f"{name}: the point {self.place} about which it is distributed must be {dim} numbers")
+            raise ModelError(
+                f"{name}: the point {self.place} from which distances are measured must have {dim} coordinates"
+            )
         for number in self.place:
             check_number(f"a coordinate of the place of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
@@ -69,11 +72,11 @@ class Spread:
 
 
 def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
-    """Return the weighting about a point, None without one; ModelError if only weighting or radius are given."""
+    """Return the weighting about a point, or None without one; ModelError if other arguments are given without a point."""
     if point is None:
         if weighting != "uniform" or radius is not None:
             raise ModelError(
-                f"{name} has a weighting or a radius, but no point from which distances count: give at=..."
+                f"{name} has a weighting or a radius, but no point from which distances are measured: give at=..."
             )
         return None
     return Spread(tuple(float(v) for v in point), weighting, radius)
@@ -82,13 +85,13 @@ def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: 
 def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Indices, Array]:
     """Return the points (n,) of a group, and their shares (n,) of a distributed load [-].
 
-    Shares are proportional to area, if the group has facets, times the weights of `spread`. Raises ModelError if no part of
-    the group lies within its radius.
+    Shares are proportional to the weights of `spread` and, if the group has facets, to the tributary areas of the nodes.
+    Raises ModelError if no part of the group lies within the radius of `spread`.
     """
     points, radius = mesh.points_of(group).astype(np.intp), 0.0
     if spread is not None and len(points):
-        away = float(np.linalg.norm(mesh.points[points] - np.array(spread.place), axis=1).max())
-        radius = away if spread.radius is None else spread.radius
+        farthest = float(np.linalg.norm(mesh.points[points] - np.array(spread.place), axis=1).max())
+        radius = farthest if spread.radius is None else spread.radius
 
     def weigh(places: Array) -> Array:
         return np.ones(len(places)) if spread is None or not radius else spread.weights(places, radius)
@@ -108,29 +111,30 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
 def mean_rotation(weight: Array, arms: Array) -> Array:
     """Return the coefficients (n_rotations, n, dim) of the displacements of n points in their mean rotation [1 / length].
 
-    The points have `weight` (n,) [-] and `arms` (n, dim) from their centroid [length]. Products of the coefficients with
-    moments are forces at the points that have these moments and no resultant.
+    The points have `weight` (n,) [-] and `arms` (n, dim) from their weighted centroid [length]. The coefficients times a
+    moment are forces at the points that have this moment and a zero resultant. Raises ModelError if the points coincide or,
+    in 3D, are collinear.
     """
     motion = by_rotation(arms)
     inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)
     if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
         raise ModelError(
-            "the points are collinear or coincide, so that they have no mean rotation about that line: use a wider group"
+            "the points are collinear or coincide, so that their mean rotation is undetermined: use a group of larger extent"
         )
     return np.einsum("kl,ndl,n->knd", np.linalg.inv(inertia), motion, weight)
 
 
 def by_rotation(arms: Array) -> Array:
-    """Return the displacement (..., dim, n_rotations) of the ends of `arms` (..., dim) by each unit rotation [length]."""
+    """Return the displacement (..., dim, n_rotations) of the ends of `arms` (..., dim) due to unit rotations [length]."""
     if arms.shape[-1] == 2:
         return np.asarray((np.array([-1.0, 1.0]) * arms[..., ::-1])[..., None])
     return np.cross(arms[..., None, :], np.eye(3))
 
 
-def turned(weight: Array, places: Array, moment: Array) -> Array:
-    """Return forces (n, dim) [force] at points with a `moment` (1,) or (3,) and no resultant.
+def forces_of_moment(weight: Array, places: Array, moment: Array) -> Array:
+    """Return nodal forces (n, dim) [force] that have the `moment` (1,) or (3,) [force times length] and a zero resultant.
 
-    They are proportional to `weight` (n,) [-] and the arms of `places` (n, dim) [length]; see `mean_rotation`.
+    They are proportional to `weight` (n,) [-] and to the arms of `places` (n, dim) [length]; see `mean_rotation`.
     """
     return np.asarray(np.einsum("k,knd->nd", moment, mean_rotation(weight, places - weight @ places)))
 
@@ -165,7 +169,7 @@ class SpreadForce(Load):
         size = float(np.ptp(mesh.points, axis=0).max())
         if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
             try:
-                nodal = nodal + turned(weight, places, moment)
+                nodal = nodal + forces_of_moment(weight, places, moment)
             except ModelError as error:
                 raise ModelError(f"{self.name}: {error}") from error
         forces[points] += nodal
@@ -183,7 +187,7 @@ class Moment(Load):
 
     def _check_place(self, mesh: Mesh, kinematics: str) -> None:
         if kinematics == "axisymmetric":
-            raise ModelError(f"{self.name}: no moment can act on an axisymmetric model (zero over the circle)")
+            raise ModelError(f"{self.name}: a moment cannot act on an axisymmetric model, since its resultant is zero")
         check_points(mesh, self.group, f"{self.name} acts nowhere")
 
     def _add_to(self, forces: Array, mesh: Mesh, kinematics: str) -> None:
@@ -195,14 +199,14 @@ class Moment(Load):
             return
         points, weight = shares_of(mesh, kinematics, self.group)
         try:
-            forces[points] += turned(weight, mesh.points[points], moment)
+            forces[points] += forces_of_moment(weight, mesh.points[points], moment)
         except ModelError as error:
             raise ModelError(f"{self.name}: {error}") from error
 
 
 @dataclass(frozen=True)
 class ReferencePoint:
-    """A reference point: its number, that of its rotation, and its position [length]."""
+    """A reference point: the numbers of its point and of the point that stores its rotation, and its position [length]."""
 
     point: int
     rotation: int
@@ -223,7 +227,10 @@ def reference_of(mesh: Mesh, name: str) -> ReferencePoint:
 def relation(
     name: str, rows: Sequence[Sequence[Term]], shape: tuple[int, int], value: float = 0.0, ramp: Table | None = None
 ) -> MultiPointConstraint:
-    """Return equations, lists of terms whose sum is `value`, as a constraint of a mesh of `shape` (n_points, dim)."""
+    """Return linear equations as a multi-point constraint of a mesh with points of `shape` (n_points, dim).
+
+    Each of the `rows` is the list of terms of an equation; their sum is `value` times the `ramp`.
+    """
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
     column = [point * dim + axis for terms in rows for point, axis, _ in terms]
@@ -242,9 +249,9 @@ def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, direct
     reference : ReferencePoint
     points : ndarray of int (n,)
     places : ndarray (n, dim)
-        Their reference coordinates [length].
+        Reference coordinates of the points [length].
     directions : ndarray (n, k, dim)
-        Unit vectors along which each point follows [-].
+        Unit vectors of the components that are coupled at each point [-].
     n_dofs : int
     """
     n, k, dim = directions.shape
@@ -260,29 +267,32 @@ def distributing_rows(
 ) -> csr_array:
     """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
-    The rotation is determined by least squares, ``J theta = sum of w r x u`` with r from the weighted mean of the points.
+    The rotation theta is determined by least squares, ``J theta = sum of w r x u``, where r is the arm from the weighted
+    centroid of the points and ``J = sum of w (r . r I - r r^T)``.
 
     Parameters
     ----------
     reference : ReferencePoint
     points : ndarray of int (n,)
     places : ndarray (n, dim)
-        Their reference coordinates [length].
+        Reference coordinates of the points [length].
     weight : ndarray (n,)
         Weights of sum 1 [-].
     directions : ndarray (k, dim)
-        Unit vectors along which the reference point follows [-].
+        Unit vectors of the components that are coupled [-].
     n_dofs : int
     """
-    middle, dim = weight @ places, places.shape[1]
-    rotation = mean_rotation(weight, places - middle)
-    turns = directions @ by_rotation(np.array(reference.place) - middle)
-    heads = np.zeros((len(rotation) + len(directions), 2, dim))  # the reference point and its rotation
-    heads[: len(rotation), 1] = np.eye(len(rotation), dim)
-    heads[len(rotation) :, 0], heads[len(rotation) :, 1, : len(rotation)] = directions, -turns
+    centroid, dim = weight @ places, places.shape[1]
+    rotation = mean_rotation(weight, places - centroid)
+    turns = directions @ by_rotation(np.array(reference.place) - centroid)
+    of_reference = np.zeros(
+        (len(rotation) + len(directions), 2, dim)
+    )  # translation and rotation of the reference point
+    of_reference[: len(rotation), 1] = np.eye(len(rotation), dim)
+    of_reference[len(rotation) :, 0], of_reference[len(rotation) :, 1, : len(rotation)] = directions, -turns
     means = np.concatenate([rotation, directions[:, None] * weight[:, None]])
-    nodes = np.tile([reference.point, reference.rotation, *points], (len(heads), 1))
-    return nodal_rows(nodes, np.concatenate([heads, -means], axis=1), n_dofs)
+    nodes = np.tile([reference.point, reference.rotation, *points], (len(of_reference), 1))
+    return nodal_rows(nodes, np.concatenate([of_reference, -means], axis=1), n_dofs)
 
 
 def coupling(
@@ -296,7 +306,7 @@ def coupling(
     mesh : Mesh
     kinematics : str
     names : (str, str)
-        Reference point and group.
+        Names of the reference point and of the coupled group.
     kind : {"rigid", "distributing"}
     axes : sequence of int
         Coupled components; all for a distributing coupling.
@@ -315,7 +325,7 @@ def coupling(
             f"{name}: in axisymmetry there are no rotations; use couple('{names[1]}', 'y') to move a group as a whole"
         )
     if kind == "distributing" and len(axes) < mesh.dim:
-        raise ModelError(f"{name}: a distributing coupling has all components of the displacement")
+        raise ModelError(f"{name}: a distributing coupling couples all components of the displacement")
     reference = reference_of(mesh, names[0])
     spread = None
     if weighting != ("uniform", None):
@@ -326,11 +336,11 @@ def coupling(
     points, weight = shares_of(mesh, kinematics, names[1], spread)
     reference_nodes = np.isin(points, (reference.point, reference.rotation))
     if reference_nodes.any() or not len(points):
-        raise ModelError(f"{name}: the group needs points, without the reference point itself")
+        raise ModelError(f"{name}: the group must have points and must not contain the reference point")
     places, directions, n_dofs = mesh.points[points], np.eye(mesh.dim)[list(axes)], mesh.points.size
     if kind == "rigid":
-        each = np.tile(directions, (len(points), 1, 1))
-        return MultiPointConstraint(name, rigid_rows(reference, points, places, each, n_dofs))
+        at_points = np.tile(directions, (len(points), 1, 1))
+        return MultiPointConstraint(name, rigid_rows(reference, points, places, at_points, n_dofs))
     try:
         return MultiPointConstraint(name, distributing_rows(reference, points, places, weight, directions, n_dofs))
     except ModelError as error:

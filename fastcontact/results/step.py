@@ -92,12 +92,16 @@ def by_largest_von_mises(
 CANCELLED = 1e-3
 
 
-def force_text(parts: Sequence[float], around: float, units: Mapping[str, str]) -> str:
-    """Return a contact force with its `ContactResult.force_parts` if there is friction, or with normal forces that cancel."""
-    total, pressed, dragged, normal = (valued(part, units, "force", 6) for part in (*parts, around))
-    if parts[0] < CANCELLED * around:
-        return f"{total}, normal {normal} all round"
-    return total + f" (normal {pressed}, tangential {dragged})" * (parts[2] > 0.0)
+def force_text(parts: Sequence[float], normal_force: float, units: Mapping[str, str]) -> str:
+    """Return a contact force as text.
+
+    `parts` are `ContactResult.force_parts` [force]. The normal and tangential parts are included if there is friction. The
+    sum of the nodal normal forces, `normal_force` [force], is included instead if these forces balance each other.
+    """
+    total, normal, tangential, normal_sum = (valued(part, units, "force", 6) for part in (*parts, normal_force))
+    if parts[0] < CANCELLED * normal_force:
+        return f"{total}, sum of normal forces {normal_sum}"
+    return total + f" (normal {normal}, tangential {tangential})" * (parts[2] > 0.0)
 
 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
@@ -175,11 +179,12 @@ class ContactResult(Suggesting):
     obstacle_angle : float, optional
         Rotation of a rigid obstacle [radian]; None unless it rotates.
     torque : float, optional
-        Torque about the axis of a rotating rigid obstacle that is in equilibrium with the contact forces, that is their
-        moment on the deformable body in the deformed configuration [force times length]; None unless the obstacle rotates.
+        Torque about the axis of rotation that holds a rotating rigid obstacle in equilibrium. It is equal to the moment of
+        the contact forces on the deformable body in the deformed configuration [force times length]; None unless the
+        obstacle rotates.
     middle : ndarray (dim,)
         Centre of the contact on the reference surface [length]. In axisymmetry it lies on the axis, unless the surface is
-        parallel to it or closes on itself, as that of an O-ring; otherwise it is the centre of pressure, moved onto the
+        parallel to it or closes on itself, like that of an O-ring; otherwise it is the centre of pressure, moved onto the
         planes of symmetry that the contact reaches. A plane of symmetry is assumed where supports hold an end of the surface.
     place : ndarray (m,)
         Position of each node relative to the `middle` [length]: the radius in axisymmetry; the signed arc length in 2D, and
@@ -201,8 +206,8 @@ class ContactResult(Suggesting):
         Integral of the pressure over the slip in this step, in pairs with friction [pressure * length].
     slip, slip_total : ndarray (m, dim)
         Tangential displacement of closed nodes relative to the opposite side, in this step and accumulated over all steps
-        [length]. Where friction is solved in increments, it counts from the instant at which a node closes. At open and at
-        sticking nodes `slip` is zero. Both are NaN if the result file was written by a version that did not store them.
+        [length]. Where friction is solved in increments, slip is measured from the instant at which a node closes. At open
+        and at sticking nodes `slip` is zero. Both arrays are NaN if a version that did not store them wrote the result file.
     primary_points : ndarray of int (k,)
         Point numbers of the nodes of the primary side; empty for a rigid obstacle.
     primary_force_vectors : ndarray (k, dim)
@@ -342,12 +347,12 @@ class ContactResult(Suggesting):
 
     @property
     def force_parts(self) -> tuple[float, float, float]:
-        """Magnitude of `force` and of its normal and tangential part; the latter is zero without friction [force]."""
+        """Magnitudes of `force` and of its normal and tangential parts [force]; without friction the last is zero."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
         along = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
         along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
-        total, pressed, dragged = np.linalg.norm([self.force, along, self.force - along], axis=1)
-        return float(total), float(pressed), float(dragged)
+        total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
+        return float(total), float(normal_part), float(tangential)
 
     @property
     def cancels(self) -> bool:
@@ -356,7 +361,7 @@ class ContactResult(Suggesting):
 
     @property
     def penetration(self) -> float:
-        """Largest penetration of closed nodes [length], due to a penalty or to weighted gaps."""
+        """Largest penetration of closed nodes [length], due to a penalty or because only weighted gaps are closed."""
         return float(-self.gap[self.active].min(initial=0.0))
 
 
@@ -397,8 +402,8 @@ class StepResult(Suggesting):
 
         - ``geometry_updates``, ``active_set_iterations``, ``linear_iterations``: numbers of iterations.
         - ``history``: list of dicts with the iterations.
-        - ``regularised``, with floating bodies: their soft springs, the forces in these springs, and motions of which nothing
-          determines the amount.
+        - ``regularised``, with floating bodies: their soft springs, the forces in these springs, and the rigid-body motions
+          whose amplitude is undetermined.
         - ``scatter``, if round-off prevents the contact geometry from meeting the criterion: relative variation of
           ``displacement`` and of the contact ``force`` [-].
         - ``temperature_factors``, ``initial_factors``, ``pressure_factors``: multipliers of the temperatures, of the
@@ -612,7 +617,7 @@ class Steps(list[StepResult]):
         return html_table(rows, HEAD, f"{len(self)} steps{left_out}")
 
 
-HEAD = ("step", "load factor", "pairings", "contact", "force", "largest pressure", "closed", "contact radius")
+HEAD = ("step", "load factor", "geometry updates", "contact", "force", "largest pressure", "closed", "contact radius")
 
 
 def _shown(steps: Steps) -> Iterable[StepResult]:
@@ -628,7 +633,7 @@ def rows_of(step: StepResult) -> list[tuple[str, ...]]:
 
 
 def phases(shape: StepResult, count: int) -> list[StepResult]:
-    """Return a vibration with a given shape at `count` equidistant phases, as steps.
+    """Return `count` steps that show a vibration mode, `shape`, at equidistant phases of a period.
 
     The load factor of a step is its phase in periods, in [0, 1). Raises ModelError if `count` is less than two.
     """

@@ -47,10 +47,10 @@ def numbers(kind):
     [
         (
             lambda: fc.recovery.von_mises([[0.0, 0.0], [1.0, 1.0]]),
-            r"components along the last axis are .* not as in \(2, 2\)",
+            r"last axis must contain the components .* but the shape is \(2, 2\)",
         ),
-        (lambda: fc.recovery.von_mises_signed(1.0), r"not as in \(\)"),
-        (lambda: fc.recovery.equivalent_strain(np.zeros((3, 5))), r"not as in \(3, 5\)"),
+        (lambda: fc.recovery.von_mises_signed(1.0), r"but the shape is \(\)"),
+        (lambda: fc.recovery.equivalent_strain(np.zeros((3, 5))), r"but the shape is \(3, 5\)"),
         (lambda: AXES_BY_CELL.moduli_at(np.ones((4, 2)), "plane_strain"), "axes by cell need to know the cells"),
         (lambda: model().load_vector(5), r"argument load of Model\.load_vector"),
         (lambda: fc.normal_stress(None, 1.0), "argument contact of normal_stress"),

@@ -78,7 +78,7 @@ def test_what_a_press_fit_holds(element, tmp_path):
     contact = steps[-1].contact["fit"]
     assert contact.normal_force == table["normal_force"][-1]
     pytest.importorskip("matplotlib", reason="pictures need matplotlib")
-    assert f"normal {contact.normal_force:.6g} all round" in repr(contact)
+    assert f"sum of normal forces {contact.normal_force:.6g}" in repr(contact)
     upper, _ = fc.plot.history(steps, "fit", units=fc.plot.UNITS)
     assert upper.get_ylabel() == "sum of the normal forces [N]"
     assert list(upper.lines[0].get_ydata()) == list(table["normal_force"])

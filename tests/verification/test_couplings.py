@@ -151,9 +151,9 @@ def test_a_case_file_has_couplings_moments_and_liquids():
             "'RIGHT' is not a reference point: build the model on fc.generate.with_ref",
         ),
         (lambda m: m.add_coupling("REF", "LEFT", kind="stiff"), "unknown kind of coupling 'stiff'"),
-        (lambda m: m.add_coupling("REF", "REF"), "the group needs points, without the reference point itself"),
+        (lambda m: m.add_coupling("REF", "REF"), "the group must have points and must not contain the reference point"),
         (lambda m: m.add_coupling("REF", "LEFT", components="z"), "unknown component 'z'"),
-        (lambda m: m.add_coupling("REF", "LEFT", kind="distributing", components="x"), "has all components"),
+        (lambda m: m.add_coupling("REF", "LEFT", kind="distributing", components="x"), "couples all components"),
         (lambda m: m.add_moment("REF", x=1.0), "in two dimensions a moment has the component z only"),
         (lambda m: m.add_moment("REF", z=np.nan), "the moment on 'REF' is nan"),
         (
@@ -179,7 +179,7 @@ def test_nothing_turns_in_axisymmetry():
     model = fc.Model(mesh, "axisymmetric")
     with pytest.raises(fc.ModelError, match=r"in axisymmetry there are no rotations; use couple\('TOP', 'y'\)"):
         model.add_coupling("REF", "TOP")
-    with pytest.raises(fc.ModelError, match="no moment can act on an axisymmetric model"):
+    with pytest.raises(fc.ModelError, match="a moment cannot act on an axisymmetric model"):
         model.add_moment("TOP", z=1.0)
 
 
@@ -375,11 +375,11 @@ def test_one_node_is_joined_with_all_of_a_group():
         (
             "add_force",
             {"group": "TOP", "y": 1.0, "weighting": "linear"},
-            "no point from which distances count: give at",
+            "no point from which distances are measured: give at",
         ),
-        ("add_force", {"group": "TOP", "y": 1.0, "radius": 1.0}, "no point from which distances count"),
+        ("add_force", {"group": "TOP", "y": 1.0, "radius": 1.0}, "no point from which distances are measured"),
         ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0), "weighting": "square"}, "weighting 'square'"),
-        ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0, 1.0)}, "must be 2 numbers"),
+        ("add_force", {"group": "TOP", "y": 1.0, "at": (1.0, 1.0, 1.0)}, "must have 2 coordinates"),
         (
             "add_force",
             {"group": "TOP", "y": 1.0, "at": (9.0, 1.0), "radius": 1.0},

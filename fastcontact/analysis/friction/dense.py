@@ -5,9 +5,9 @@ methods are tried in turn:
 
 1. Newton's method, see `cone_newton`, from several initial forces. In 2D it is an active set method, in which the state of a
    constraint is open, stick, or slip in one of two directions.
-2. Newton's method from the solution for a polyhedral friction cone with few edges. The latter is a linear complementarity
-   problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu (Klarbring, 1986;
-   Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
+2. Newton's method from the solution for a polyhedral friction cone with few edges. With such a cone the problem is a linear
+   complementarity problem, which Lemke's method solves for every positive definite F and every coefficient of friction mu
+   (Klarbring, 1986; Stewart and Trinkle, 1996; Klarbring and Pang, 1998).
 
 With large coefficients of friction the solution may not be unique. The methods compute one solution.
 """
@@ -26,11 +26,11 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, ROUND_OFF, SINGLE_PRECISION
 
 # Numbers of edges of the polyhedral cones that are tried in 3D, and largest size of a linear complementarity problem.
 EDGES, LARGEST = (8, 32), 2500
-# If slips are linearly dependent, tangential forces are not unique; examples are nodes that belong to several surfaces, and
-# nodes that supports hold on one side. F counts as dependent if a squared pivot of its scaled Cholesky factor is round-off
-# of lengths. The first compliance REGULARISATION, relative to the compliance of the gaps, is then added to all slips, and the
-# second one if the first does not suffice. If the elastic slip due to it exceeds SINGLE_PRECISION, relative to the scale of
-# gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
+# If slips are linearly dependent, tangential forces are not unique. Examples are nodes that belong to several surfaces, and
+# nodes that supports hold on one side of the contact. F counts as singular if a squared pivot of its scaled Cholesky factor
+# is below LENGTH_ROUND_OFF. A compliance, relative to that of the gaps, is then added to all slips: the first value of
+# REGULARISATION and, if it does not suffice, the second. If the elastic slip due to this compliance exceeds SINGLE_PRECISION,
+# relative to the gaps and slips without forces, the forces are not in equilibrium: the bodies jam.
 REGULARISATION = 10 * ROUND_OFF, LENGTH_ROUND_OFF
 
 
@@ -49,12 +49,17 @@ def solve(
     mu : ndarray (m,)
         Coefficients of friction [-].
     closed : ndarray of bool (m,)
-        Constraints that are assumed closed and sticking in an initial guess of Newton's method. If there are none, those
-        with a negative gap without forces.
+        Constraints that are assumed closed and sticking in an initial guess of Newton's method. If there are none, the
+        constraints whose gap without forces is negative are assumed closed and sticking.
     guess : ndarray (1 + k, m), optional
         Another initial guess of the forces, which is tried first [force].
     equality : ndarray of bool (m,), optional
         Constraints that are equations, without friction.
+
+    Returns
+    -------
+    Forces
+        Contact forces, gaps and slips, and whether the solution has converged.
     """
     n_components, m = free.shape
     equality = np.zeros(m, bool) if equality is None else equality
@@ -72,8 +77,8 @@ def solve(
         F[slips, slips] += compliance
         problem = _Problem(F, free * unit / length, law)
         for start, line_search in problem.starts(closed, guess):
-            # At least one iteration: the residual of forces of an earlier pairing may be below the round-off common to
-            # all constraints, although gaps of constraints with a large compliance are not closed.
+            # At least one iteration: the residual of forces of an earlier geometry update may be below the round-off bound,
+            # which is common to all constraints, although gaps of constraints with a large compliance are not closed.
             forces = newton(problem, start, problem.gaps(start), line_search=line_search, least=1)
             iterations += 1 + forces.iterations
             if best is None or forces.residual < best.residual:
@@ -161,7 +166,7 @@ def response(F: Array, law: Law, forces: Forces) -> Callable[[Array], Array]:
     """Return the derivative of the solution `forces`, as a function.
 
     The function returns the change (1 + k, m) of the forces due to a change (1 + k, m) of the gaps and slips without forces.
-    F is that of `solve`, and `law` the law of its constraints.
+    F and the constraints of `law` are those of `solve`.
     """
     rows = np.flatnonzero(forces.closed)
     if not len(rows):
@@ -206,15 +211,15 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     tensile forces of equations, and the largest slip along an edge (Stewart and Trinkle, 1996).
     """
     k, m = len(problem.free) - 1, problem.free.shape[1]
-    pulled = np.flatnonzero(problem.law.equality)
-    along_edges, last = (1 + edges) * m, (1 + edges) * m + len(pulled)
+    equations = np.flatnonzero(problem.law.equality)
+    along_edges, last = (1 + edges) * m, (1 + edges) * m + len(equations)
     size = last + m
     if size > LARGEST:
         return None
     angle = 2 * np.pi * np.arange(edges) / edges
     along = np.column_stack([np.cos(angle), np.sin(angle)])[:, :k]
     X = np.kron(np.block([[np.ones((1, 1)), np.zeros((1, edges))], [np.zeros((k, 1)), along.T]]), np.eye(m))
-    X = np.hstack([X, -np.eye(len(X))[:, pulled]])
+    X = np.hstack([X, -np.eye(len(X))[:, equations]])
     M = np.zeros((size, size))
     M[:last, :last] = X.T @ problem.F @ X
     M[last:, :m] = np.diag(problem.law.mu)
@@ -228,23 +233,23 @@ def _on_edges(problem: _Problem, edges: int) -> Array | None:
     return None if z is None else (X @ z[:last]).reshape(1 + k, m)
 
 
-def lemke(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
+def lemke(M: Array, q: Array, max_pivots: int) -> tuple[Array | None, int]:
     """Return z (n,) by Lemke's pivoting method (Lemke, 1965), with ``w = M z + q``, ``w >= 0``, ``z >= 0`` and ``w.T z = 0``.
 
-    The pivots end with a solution if M is copositive, if ``q.T v >= 0`` for all solutions v of the homogeneous problem
+    The method finds a solution if M is copositive, if ``q.T v >= 0`` for all solutions v of the homogeneous problem
     (q = 0), and if no basis is degenerate (Cottle, Pang and Stone, 1992, theorem 4.4.13).
 
     Parameters
     ----------
     M : ndarray (n, n)
     q : ndarray (n,)
-    most : int
+    max_pivots : int
         Largest number of pivots.
 
     Returns
     -------
     z : ndarray (n,) or None
-        The solution; None if the pivots end on a ray, or if their number exceeds `most`.
+        The solution; None if the method terminates on a secondary ray, or if more than `max_pivots` pivots are needed.
     count : int
         Number of pivots.
     """
@@ -256,7 +261,7 @@ def lemke(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
     table = np.column_stack([M, np.ones(n), q])
     basic, others = np.arange(n), np.arange(n, 2 * n + 1)
     row, column = int(q.argmin()), n
-    for count in range(1, most + 1):
+    for count in range(1, max_pivots + 1):
         _exchange(table, row, column)
         leaving = int(basic[row])
         basic[row], others[column] = others[column], leaving
@@ -269,15 +274,15 @@ def lemke(M: Array, q: Array, most: int) -> tuple[Array | None, int]:
         if blocking is None:
             return None, count
         row = blocking
-    return None, most
+    return None, max_pivots
 
 
 def _exchange(table: Array, row: int, column: int) -> None:
     """Pivot in place: exchange the basic variable of `row` with the nonbasic variable of `column`."""
-    at, factors = table[row, column], table[:, column].copy()
+    pivot, factors = table[row, column], table[:, column].copy()
     table[:, column], factors[row] = 0.0, 0.0
-    table[row] /= -at
-    table[row, column] = 1.0 / at
+    table[row] /= -pivot
+    table[row, column] = 1.0 / pivot
     table += factors[:, None] * table[row]
 
 

@@ -20,7 +20,7 @@ from fastcontact.model.ramp import Table
 
 
 def initial_conditions(content: Content, block: Block) -> None:
-    """Read *INITIAL CONDITIONS: nodal temperatures or element stresses before the first step."""
+    """Store a block *INITIAL CONDITIONS, which gives nodal temperatures or element stresses before the first step."""
     kind = " ".join(block.required("TYPE").upper().split())
     if kind not in ("TEMPERATURE", "STRESS"):
         raise block.refuse(f"TYPE={kind[:40]} is not supported, only TEMPERATURE and STRESS")
@@ -33,10 +33,10 @@ def initial_temperatures(assembly: Assembly, blocks: Iterable[Block]) -> dict[in
 
 
 def by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Location]]:
-    """Yield the points of a block with their temperatures and the locations of the lines."""
+    """Yield each point of a block with its temperature and the location of the data line."""
     for row in block.each():
         if any(row.entries[2:]):
-            raise row.refuse("gradients of the temperature are those of beams and shells: give one number")
+            raise row.refuse("temperature gradients exist in beams and shells only: give a single temperature")
         value = row.number(1)
         yield from ((point, value, row.location) for point in assembly.nodes(row.text(0), row.location))
 
@@ -44,7 +44,8 @@ def by_point(assembly: Assembly, block: Block) -> Iterator[tuple[int, float, Loc
 def add_temperatures(model: Model, histories: Histories[int]) -> None:
     """Add temperatures relative to the initial temperatures to a model.
 
-    There is a field for each shape of history or a field for each time with a corner of a history, whichever are fewer.
+    Histories that differ by a factor only share a temperature field. If there are fewer times at which the histories have
+    corners than such fields, one field for each of these times is added instead.
     """
     rises_of = (
         (tuple((time, value - table[0][1]) for time, value in table), points) for table, points in histories.alike()
@@ -58,17 +59,17 @@ def add_temperatures(model: Model, histories: Histories[int]) -> None:
             _add(model, rises, table)
         return
     for k, time in enumerate(times):  # fewer corners than shapes: one field for each corner
-        around = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
+        corners = sorted({times[0], *times[max(k - 1, 0) : k + 2], times[-1]})
         rises = np.zeros(model.mesh.n_points)
         for _, points, sizes, table in fields:
             instants, factors = zip(*table, strict=True)
             factor = np.interp(time, instants, factors)
             rises[points] = factor * (sizes(points) if callable(sizes) else sizes)
-        _add(model, rises, tuple((other, float(other == time)) for other in around))
+        _add(model, rises, tuple((corner, float(corner == time)) for corner in corners))
 
 
 def _add(model: Model, rises: Array, ramp: Table) -> None:
-    for section in model.pretensions:  # their opposite nodes are not in the deck
+    for section in model.pretensions:  # the opposite nodes of a section are not in the deck
         rises[section.opposite] = rises[section.nodes]
     if rises.any() and any(factor for _, factor in ramp):
         model.add_temperature(rises, reference=0.0, ramp=ramp)
@@ -81,7 +82,8 @@ ORDER = {2: ("xx", "yy", "zz", "xy"), 3: ("xx", "yy", "zz", "xy", "xz", "yz")}
 def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
     """Add the initial stresses to a model; the last of several lines for an element is used.
 
-    Raises CaseError if a line has not all components, or if an element is not a solid or has an orientation.
+    Raises CaseError if a line does not have exactly one value per component, or if an element is not a solid or has an
+    orientation.
     """
     content, names = deck_mesh.content, ORDER[deck_mesh.dim]
     if not content.stresses:
@@ -101,12 +103,12 @@ def add_initial_stresses(model: Model, deck_mesh: DeckMesh) -> None:
                     raise row.refuse(f"element {element.number} is not a solid, so it has no initial stress")
                 if element.section is not None and element.section.orientation:
                     raise row.refuse(
-                        f"element {element.number} has an *ORIENTATION: initial stresses along such axes are not supported"
+                        f"element {element.number} has an *ORIENTATION: initial stresses in local axes are not supported"
                     )
                 values[starts[element.type.element] + element.row] = numbers
-    given: dict[str, Any] = {name: values[:, [k]] for k, name in enumerate(names) if values[:, k].any()}
-    if given:
-        model.add_initial_stress(**given)
+    components: dict[str, Any] = {name: values[:, [k]] for k, name in enumerate(names) if values[:, k].any()}
+    if components:
+        model.add_initial_stress(**components)
 
 
 # Keywords of heat loads.
@@ -122,14 +124,16 @@ def check_steps(content: Content) -> None:
     for number, step in enumerate(content.steps):
         if first and step.heat != first.heat and (first.heat == "alone" or number > content.steps.index(first)):
             raise step.refuse(
-                "steps with heat alone, with heat and displacements, and static steps after them cannot be in one deck: make "
-                "all *HEAT TRANSFER, or *COUPLED TEMPERATURE-DISPLACEMENT"
+                "heat transfer steps, coupled temperature-displacement steps, and static steps after them cannot be in one "
+                "deck: use *HEAT TRANSFER for all steps, or *COUPLED TEMPERATURE-DISPLACEMENT for all"
             )
         for block in (given.block for given in step.given):
             if block.keyword in OF_HEAT and not step.heat:
                 raise block.refuse("needs a step with *HEAT TRANSFER or *COUPLED TEMPERATURE-DISPLACEMENT")
             if block.keyword == "TEMPERATURE" and first:
-                raise block.refuse("temperatures are computed in this deck: prescribe them by *BOUNDARY, component 11")
+                raise block.refuse(
+                    "temperatures are computed in this deck: prescribe degree of freedom 11 by *BOUNDARY"
+                )
             if block.keyword in ("CLOAD", "DLOAD", "DSLOAD") and step.heat == "alone":
                 raise block.refuse(
                     "is not a heat load: use *COUPLED TEMPERATURE-DISPLACEMENT in place of *HEAT TRANSFER"
@@ -141,12 +145,12 @@ class Spans(Generic[Name]):
 
     def __init__(self) -> None:
         self._begun: dict[Name, float] = {}
-        self._over: dict[Name, list[tuple[float, float]]] = {}
+        self._ended: dict[Name, list[tuple[float, float]]] = {}
 
     def advance(self, history: Histories[Name], begin: float) -> None:
         """Advance to the step that begins at the load factor `begin`. Call this before `history.advance`."""
         for name in history.dying:
-            self._over.setdefault(name, []).append((self._begun.pop(name), begin))
+            self._ended.setdefault(name, []).append((self._begun.pop(name), begin))
         for name in (*history.changing, *history.first):
             self._begun.setdefault(name, begin)
 
@@ -155,7 +159,7 @@ class Spans(Generic[Name]):
         alike: dict[tuple[float, float], list[Name]] = {}
         for name in names:
             last = [(self._begun[name], np.inf)] if name in self._begun else []
-            for span in (*self._over.get(name, ()), *last):
+            for span in (*self._ended.get(name, ()), *last):
                 alike.setdefault(span, []).append(name)
         return {(begin, end): members for (begin, end), members in alike.items() if begin < end}
 
@@ -172,8 +176,8 @@ class HeatConditions:
         self.powers: Histories[int] = Histories(content)
         self.fluxes: Histories[Target] = Histories(content)
         self.films: Histories[Target] = Histories(content, rest=self.rest)
-        self.fixed: Spans[int] = Spans()
-        self.blown: Spans[Target] = Spans()
+        self.temperature_spans: Spans[int] = Spans()
+        self.film_spans: Spans[Target] = Spans()
         self.film_of: dict[tuple[str, Face | None], Target] = {}
         self.begun = False
 
@@ -185,9 +189,11 @@ class HeatConditions:
     def prescribe(self, given: Given, row: Row) -> None:
         """Prescribe the temperature of nodes as a line of *BOUNDARY requires."""
         if not self.assembly.content.heat:
-            raise row.refuse("component 11, the temperature, is not within 1 to 6: in static steps use *TEMPERATURE")
+            raise row.refuse(
+                "degree of freedom 11 (temperature) is not within 1 to 6: in static steps use *TEMPERATURE"
+            )
         if "FIXED" in given.block.parameters:
-            raise row.refuse("FIXED is not supported for temperatures: give them")
+            raise row.refuse("FIXED is not supported for temperatures: give their values")
         for point in self._of_solids(row):
             self.temperatures.give(point, row.number(3, 0.0), given.amplitude, row.location)
 
@@ -209,13 +215,13 @@ class HeatConditions:
         for row in given.block.each():
             if keyword == "CFLUX":
                 if row.whole(1, TEMPERATURE) not in (0, TEMPERATURE):
-                    raise row.refuse(f"component {row.text(1)} is not 11, the temperature")
+                    raise row.refuse(f"degree of freedom {row.text(1)} is not 11, the temperature")
                 for point in self._of_solids(row):
                     self.powers.give(point, row.number(2), given.amplitude, row.location)
                 continue
             film = history is self.films
             if film and row.number(3) < 0.0:
-                raise row.refuse(f"the coefficient {row.number(3):g} of the film must not be negative")
+                raise row.refuse(f"the film coefficient {row.number(3):g} must not be negative")
             for target in targets(self.assembly, row, (row.number(3),) if film else ()):
                 if film:
                     self._in_place_of_others(target, row)
@@ -228,7 +234,7 @@ class HeatConditions:
         if before is not None and before != film:
             if before in self.films.changing:
                 (new,), (old,) = film.numbers, before.numbers
-                raise row.refuse(f"{new:g} is the second coefficient in this step, after {old:g}")
+                raise row.refuse(f"{new:g} is the second film coefficient of this face in one step, after {old:g}")
             if before in self.films.tracks and self.films.tracks[before].alive:
                 self.films.dying[before] = None
         self.film_of[film.keyword, film.face] = film
@@ -236,8 +242,8 @@ class HeatConditions:
     def advance(self, number: int, step: Step) -> None:
         """Advance to the end of step `number`, counted from 1."""
         begin = float(number - 1) if self.begun else -np.inf
-        self.fixed.advance(self.temperatures, begin)
-        self.blown.advance(self.films, begin)
+        self.temperature_spans.advance(self.temperatures, begin)
+        self.film_spans.advance(self.films, begin)
         for other in self.histories:
             other.advance(number, step)
         self.begun = self.begun or bool(step.heat)
@@ -246,14 +252,14 @@ class HeatConditions:
         """Make the mesh groups of all heat loads; return functions that add the loads to a model."""
         assembly, adders = self.assembly, []  # type: DeckMesh, list[Callable[[Model], None]]
         spans: list[tuple[float, float]] = []
-        risen = ByShape[int]()
+        rises = ByShape[int]()
         for table, names in self.temperatures.alike():
-            for span, points in self.fixed.of(names).items():
+            for span, points in self.temperature_spans.of(names).items():
                 spans += [span] * (span not in spans)
-                risen.add(spans.index(span), self._risen(table), points)
-        for number, nodes, value, table in risen:
+                rises.add(spans.index(span), self._relative(table), points)
+        for number, nodes, value, table in rises:
             group = assembly.add_points(f"temperature {len(adders)}", nodes)
-            fixed = {"value": _above(value, self.reference), "ramp": table, **_between(spans[number])}
+            fixed = {"value": _absolute(value, self.reference), "ramp": table, **_between(spans[number])}
             adders.append(partial(Model.fix_temperature, group=group, **fixed))
         for _, nodes, value, table in ByShape.of(self.powers.alike()):
             group = assembly.add_points(f"heat {len(adders)}", nodes)
@@ -273,22 +279,22 @@ class HeatConditions:
         for (keyword, cell), indices, value, table in on_faces:
             assembly.groups[group := f"{keyword.lower()} {len(adders)}"] = {cell: indices.tolist()}
             adders.append(partial(Model.add_heat_flux, group=group, value=value, ramp=table))
-        blown: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
+        faces_by_film: dict[tuple[Table, float, tuple[float, float]], list[Face]] = {}
         for table, films in self.films.alike():
-            for span, members in self.blown.of(films).items():
+            for span, members in self.film_spans.of(films).items():
                 for film in members:
                     assert film.face is not None
-                    blown.setdefault((table, film.numbers[0], span), []).append(film.face)
-        for (table, coefficient, span), faces in blown.items():
+                    faces_by_film.setdefault((table, film.numbers[0], span), []).append(film.face)
+        for (table, coefficient, span), faces in faces_by_film.items():
             group = assembly.add_facets(f"film {len(adders)}", faces)
-            rise = self._risen(table)
+            rise = self._relative(table)
             size = max((value for _, value in rise), key=abs)
             ramp = tuple((time, value / size) for time, value in rise) if size else None
-            blowing: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_between(span)}
-            adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **blowing))
+            film_options: dict[str, Any] = {"ambient": self.reference + size, "ramp": ramp, **_between(span)}
+            adders.append(partial(Model.add_film, group=group, coefficient=coefficient, **film_options))
         return adders
 
-    def _risen(self, table: Table) -> Table:
+    def _relative(self, table: Table) -> Table:
         """Return a temperature history relative to the reference temperature."""
         return tuple((time, value - self.reference) for time, value in table)
 
@@ -298,19 +304,19 @@ def _between(span: tuple[float, float]) -> dict[str, float]:
     return {name: at for name, at in zip(("begins", "ends"), span, strict=True) if np.isfinite(at)}
 
 
-def _above(value: Any, reference: float) -> Any:
-    """Return a temperature that is given relative to the reference, as a number or a function of the position."""
+def _absolute(value: Any, reference: float) -> Any:
+    """Return the absolute temperature for a rise `value` above the reference; both are numbers or functions of position."""
 
-    def risen(points: Array) -> Array:
+    def absolute(points: Array) -> Array:
         return np.asarray(value(points) + reference)
 
-    return risen if callable(value) else value + reference
+    return absolute if callable(value) else value + reference
 
 
 def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
-    """Return the initial temperature of the solids, or zero if it varies and has no effect.
+    """Return the initial temperature of the solids, or zero if it is not uniform and has no effect.
 
-    Raises CaseError if it varies and the computed temperatures expand a material.
+    Raises CaseError if it is not uniform and a coupled step computes thermal strains.
     """
     content = assembly.content
     values = {initial.get(point, 0.0) for point in assembly.of_solids}
@@ -319,8 +325,8 @@ def _reference(assembly: Assembly, initial: Mapping[int, float]) -> float:
     location = content.initial[0].location
     if content.heat == "coupled" and any(material.expansion for material in content.materials.values()):
         raise location.refuse(
-            f"initial temperatures from {min(values):g} to {max(values):g} are not supported if computed temperatures expand "
-            "bodies: strains refer to a single temperature"
+            f"initial temperatures from {min(values):g} to {max(values):g} are not supported with thermal expansion in "
+            "coupled steps: thermal strains refer to a single temperature"
         )
     content.note(location, "no effect: initial temperatures differ, and steady temperatures do not depend on them")
     return 0.0

@@ -1,8 +1,8 @@
 """Multigrid as a linear solver, and the factorisation that replaces it if multigrid does not converge.
 
-Equations ``B u = c`` are eliminated, see `multigrid.solver`, also if they have a diagonal compliance, see
-`multigrid.loaded`. Equations with a full compliance matrix cannot be eliminated. They need columns of K^-1, which take one
-solution each and are stored for the complete analysis.
+Constraint equations ``B u = c`` are eliminated (`multigrid.solver`), also if they have a diagonal compliance
+(`multigrid.loaded`). Equations with a full compliance matrix cannot be eliminated. They need columns of K^-1, each of which
+takes one linear solution; the columns are stored for the complete analysis.
 
 A factorisation replaces multigrid for the rest of the analysis if too many columns are needed, if the iteration stalls on
 thin or nearly incompressible parts, or if a load step has taken more work than a factorisation. Very large matrices are not
@@ -51,7 +51,7 @@ class Amg(Multigrid, LinearSolver):
     Attributes
     ----------
     instead : Direct or None
-        The direct solver that has replaced multigrid.
+        The direct solver that has replaced multigrid; None as long as multigrid is used.
     gave_up : str
         Reason for the replacement; empty if there was none.
     """
@@ -85,7 +85,7 @@ class Amg(Multigrid, LinearSolver):
         return self.K if release else K
 
     def load(self, f: Array) -> Loaded:
-        """Return the prepared matrix with the right-hand side `f` (n,) [force], and reset the limit of work."""
+        """Return the prepared matrix with the right-hand side `f` (n,) [force], and reset the work limit."""
         self.begin()
         self.allowed = self.work + self.affordable if self._may_factorise else None
         return _Loaded(self, f)
@@ -102,8 +102,8 @@ class Amg(Multigrid, LinearSolver):
             return self.instead.improve(excess)
         if self._may_factorise and not self.tolerance > ROUND_OFF * excess:
             self._factorise(
-                f"multigrid gave up and factors took over, which cost more time and memory: at its tolerance of "
-                f"{self.tolerance:.1e} it leaves forces out of balance by {excess:.1e} times what is allowed"
+                "multigrid gave up and a factorisation replaced it, which costs more time and memory: at its tolerance of "
+                f"{self.tolerance:.1e} the out-of-balance forces are {excess:.1e} times the bound"
             )
             return True
         return tighten(self, excess)
@@ -120,7 +120,7 @@ class Amg(Multigrid, LinearSolver):
         }  # fmt: skip
 
     def _constrained_by(self) -> dict[str, Any]:
-        """Return the equations and springs for which the hierarchy was changed, as arrays; None if there are none."""
+        """Return the equations and springs that the hierarchy contains, as arrays; each is None if there are none."""
         equations, springs, tied = self._hierarchy_equations, self._hierarchy_springs, None
         if equations is not None:
             rows = equations.weights
@@ -160,11 +160,11 @@ class Amg(Multigrid, LinearSolver):
             raise stalled
         if isinstance(stalled, TooManyIterationsError):
             why = (
-                f"multigrid gave up and factors took over, which cost more memory: the work of {self.affordable} iterations "
-                f"in one load step takes longer than a factorisation of {self.K.shape[0]} unknowns"
+                f"multigrid gave up and a factorisation replaced it, which costs more memory: {self.affordable} iterations "
+                f"in one load step take longer than a factorisation of {self.K.shape[0]} unknowns"
             )
         else:
-            why = f"multigrid gave up and factors took over, which cost more time and memory: {stalled}"
+            why = f"multigrid gave up and a factorisation replaced it, which costs more time and memory: {stalled}"
         self._factorise(why)
 
     @property
@@ -203,7 +203,7 @@ def _elimination(tied: Mapping[str, Any], n: int) -> Elimination:
 
 
 def _or_by_factors(method: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a method of `_Loaded` that uses the factorisation if the iteration stalls, or if multigrid is replaced."""
+    """Return a method of `_Loaded` that uses the factorisation if the iteration stalls or multigrid has been replaced."""
 
     @functools.wraps(method)
     def with_fallback(self: _Loaded, *args: Any, **options: Any) -> Any:
@@ -235,7 +235,7 @@ class _Loaded(LoadedMultigrid):
         friction: FrictionTerms | None = None, C: Array | None = None,
     ) -> tuple[Array, Array]:  # fmt: skip
         if self._solver.instead is not None:
-            raise ConvergenceError("factors give the compliance of friction")
+            raise ConvergenceError("with a factorisation, friction is solved on the Delassus operator")
         try:
             return super().solve_nonsymmetric(B, c, nodes, guess, tolerance, friction, C)
         except StallError as stalled:

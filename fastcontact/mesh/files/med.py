@@ -1,7 +1,8 @@
-"""MED files, as Salome and code_aster read and write them: meshes with groups, nodal results at all instants.
+"""MED files, as Salome and code_aster read and write them: meshes with groups, and fields at nodes or cells.
 
-Only h5py is needed. Arrays are stored component by component ("no interlace"), node numbers start at 1. Meshes of MED 2.3 to
-4.x are read. Files are written in version 3.0.0, which all later libraries read, or 4.0.0, the first with wedges of 18 nodes.
+Only h5py is needed. Arrays are stored component by component ("no interlace"), and node numbers start at 1. Meshes of MED 2.3
+to 4.x are read. Files are written in version 3.0.0, which all later libraries read, or in 4.0.0, the first version with
+18-node wedges.
 """
 
 from __future__ import annotations
@@ -23,9 +24,9 @@ from fastcontact.mesh.files.meshio_content import VERTEX, Block, build_mesh, che
 from fastcontact.mesh.mesh import Mesh
 
 # Elements with another node order in MED: node k here is node NODE_ORDER[code][k] of MED. MED numbers the base of a solid as
-# seen from outside, fastcontact as seen from inside, so that cells of MED are mirror images.
+# seen from outside, fastcontact as seen from inside.
 NODE_ORDER = {element.med: element.reversed for element in elements.ELEMENTS.values() if element.dim == 3}
-# The order of face centres is bottom, sides all round, top in MED, and -x, +x, -y, +y, bottom, top here.
+# MED orders the face centres as bottom, the four sides in turn, top; fastcontact as -x, +x, -y, +y, bottom, top.
 _FACES_OF_H27 = dict(zip(range(20, 26), (24, 22, 21, 23, 20, 25)))
 NODE_ORDER["H27"] = tuple(_FACES_OF_H27.get(node, node) for node in NODE_ORDER["H27"])
 NAME_SIZE = 64
@@ -38,13 +39,13 @@ AXES = ("X", "Y", "Z")
 MED_SUFFIXES = (".med", ".mmed", ".rmed")
 GROUP_NAME_SIZE = 80
 FAMILY_NAME_SIZE = 64
-# Number of folder levels between a mesh and its families: one, for those of points or of cells.
+# Largest number of folder levels between a mesh and its families. MED has one, with separate folders for points and cells.
 LEVELS = 2
 Families = dict[int, tuple[str, ...]]
 
 
 class MedContent(NamedTuple):
-    """A mesh, its name in the file, the version of the format ("" if unknown), and the number of cells of one node."""
+    """A mesh, its name in the file, the version of the format ("" if unknown), and the number of one-node cells."""
 
     mesh: Mesh
     name: str
@@ -53,7 +54,7 @@ class MedContent(NamedTuple):
 
 
 def read_med(path: PathLike, mesh_name: str | None = None) -> MedContent:
-    """Read a mesh with its groups, with the orientation of cells in the file.
+    """Read a mesh with its groups; the orientation of the cells is that of the file.
 
     If the file contains several meshes, `mesh_name` is read; if the mesh has several time steps, the first one is read.
     """
@@ -77,7 +78,7 @@ def _chosen_mesh(file: Any, path: PathLike, mesh_name: str | None) -> str:
         return mesh_name
     if len(names) > 1:
         listed = ", ".join(f"'{name[:NAME_SIZE]}'" for name in names[:12]) + (", ..." if len(names) > 12 else "")
-        raise FileError(f"'{path}' contains {len(names)} meshes ({listed}): say which one with mesh_name")
+        raise FileError(f"'{path}' contains {len(names)} meshes ({listed}): choose one with mesh_name")
     return str(names[0])
 
 
@@ -154,7 +155,7 @@ def _members(entry: Any, count: int, families: Families) -> dict[str, Indices]:
         return {}
     numbers = values(entry, "FAM")
     if numbers.shape != (count,):
-        raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: write it anew")
+        raise MeshError(f"it has {numbers.size} family numbers for {count} cells or nodes: write the file again")
     return family_members(numbers, families)
 
 
@@ -177,7 +178,8 @@ def _read_nodes(entry: Any, code: str) -> AnyArray:
 def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> None:
     """Write a mesh with all its groups; the file appears only when it is complete.
 
-    Readers return the elements in alphabetical order of their MED codes. Names may have up to 64 bytes, those of groups 80.
+    The element types may be in another order when the file is read. The name of the mesh may have up to 64 bytes, and those
+    of groups up to 80. Raises FileError if a name is not admissible or the file cannot be written.
     """
     with new_file(path, mesh) as file:
         add_mesh(file, mesh, mesh_name)
@@ -187,14 +189,14 @@ def write_med_mesh(path: PathLike, mesh: Mesh, *, mesh_name: str = "mesh") -> No
 def new_file(path: PathLike, mesh: Mesh) -> Iterator[Any]:
     """Open a new MED file, which appears at `path` when it is complete; `mesh` determines the version."""
     version = 4 if "wedge18" in mesh.cells else 3
-    with replacing(path) as temporary, _in_order(version >= 4), new_hdf5(temporary) as file:
+    with replacing(path) as temporary, _order_tracked(version >= 4), new_hdf5(temporary) as file:
         _set(file.create_group("INFOS_GENERALES"), MAJ=version, MIN=0, REL=0)
         yield file
 
 
 @contextmanager
-def _in_order(wanted: bool) -> Iterator[None]:
-    """Make new HDF5 groups track the order of their members, which libraries require in files of version 4."""
+def _order_tracked(wanted: bool) -> Iterator[None]:
+    """Make new HDF5 groups track the order of their members if `wanted`; the MED library requires it in version 4."""
     import h5py
 
     settings = h5py.get_config()
@@ -300,7 +302,7 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
     Returns
     -------
     times : ndarray (n_instants,)
-        Times in the order of the step numbers of the file [-]; load factors in files of fastcontact.
+        Times in the order of the step numbers [time, as in the file]; load factors [-] in files of fastcontact.
     values : ndarray (n_instants, n_points, n_components)
         NaN at points without a value; in the unit of the field, e.g. [length] for ``"DEPL"``.
 
@@ -320,12 +322,12 @@ def read_med_field(path: PathLike, field: str) -> tuple[Array, Array]:
 
 
 def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Array, Array | None]:
-    """Return a field at points or cells from a file of MED 3 or later: times, values and places.
+    """Return a field at points or cells from a file of MED 3 or later: times, values and positions.
 
-    Times (n_instants,) are in the order of the file [-]. Values (n_instants, n, n_components) are NaN where there are none
-    [unit of the field]. Places (n, dim) are the points, None if they are in another file, or the middles of the cells
-    [length]. Raises FileError if the file cannot be read, has no such field, or the field does not have one value per point
-    or cell.
+    Times (n_instants,) are in the order of the step numbers [time, as in the file]. Values (n_instants, n, n_components) are
+    NaN where the field has none [unit of the field]. Positions (n, dim) are those of the points, or None if the mesh is in
+    another file, or the means of the nodes of each cell [length]. Raises FileError if the file cannot be read, has no such
+    field, or the field does not have one value per point or cell.
     """
     with opened(path) as file:
         check_known("field", field, list(file["CHA"]) if "CHA" in file else [], FileError, f"'{path}': ")
@@ -336,20 +338,22 @@ def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Arra
             raise FileError(f"field '{field}' of '{path}' is on the mesh '{name}', which is in another file")
         instants = sorted((e for e in group.values() if "PDT" in e.attrs and _supports(e, at_points)), key=_order)
         if not instants:
-            where = "nodes" if at_points else "cells"
-            raise FileError(f"field '{field}' of '{path}' has no values at {where} in the layout of MED 3 or 4")
+            kind = "nodes" if at_points else "cells"
+            raise FileError(f"field '{field}' of '{path}' has no values at {kind} in the layout of MED 3 or 4")
         step = None if mesh is None else _first_step(mesh)
-        points, count = None if mesh is None else _read_points(step, mesh), int(attribute(group, "NCO"))
-        fields, places = [], []  # type: list[Array], list[Array]
+        points, width = None if mesh is None else _read_points(step, mesh), int(attribute(group, "NCO"))
+        fields, positions = [], []  # type: list[Array], list[Array]
         for support in sorted({support for entry in instants for support in _supports(entry, at_points)}):
-            at = points if points is None or at_points else _middles(path, field, step, points, support)
-            sizes = [values(p, "CO").size // count for e in instants for p in e[support].values()] if at is None else []
-            n_values = max(sizes) if at is None else len(at)
-            check_size(f"field '{field}' of '{path}'", (len(instants), n_values, count), file)
-            fields.append(np.stack([_read_instant(file, entry.get(support), n_values, count) for entry in instants]))
-            places += [] if at is None else [at]
+            where = points if points is None or at_points else _cell_centres(path, field, step, points, support)
+            sizes = (
+                [values(p, "CO").size // width for e in instants for p in e[support].values()] if where is None else []
+            )
+            n_values = max(sizes) if where is None else len(where)
+            check_size(f"field '{field}' of '{path}'", (len(instants), n_values, width), file)
+            fields.append(np.stack([_read_instant(file, entry.get(support), n_values, width) for entry in instants]))
+            positions += [] if where is None else [where]
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
-        return times, np.concatenate(fields, axis=1), np.concatenate(places) if places else None
+        return times, np.concatenate(fields, axis=1), np.concatenate(positions) if positions else None
 
 
 def _supports(entry: Any, at_points: bool) -> list[str]:
@@ -357,14 +361,14 @@ def _supports(entry: Any, at_points: bool) -> list[str]:
     return [key for key in entry if (key == "NOE" if at_points else key.startswith("MAI."))]
 
 
-def _middles(path: PathLike, field: str, step: Any, points: Array, support: str) -> Array:
-    """Return the middles (n_cells, dim) of the cells of a kind with values of a field [length]."""
+def _cell_centres(path: PathLike, field: str, step: Any, points: Array, support: str) -> Array:
+    """Return the means (n_cells, dim) of the nodes of each cell of a kind with values of a field [length]."""
     code = support.removeprefix("MAI.")
     if code not in elements.BY_MED or code not in step.get("MAI", {}):
         raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
     nodes = _read_nodes(step["MAI"][code], code)
     if len(nodes) and (nodes.min() < 0 or nodes.max() >= len(points)):
-        raise FileError(f"a cell of '{path}' refers to a missing point: write the file anew")
+        raise FileError(f"a cell of '{path}' refers to a missing point: write the file again")
     return np.asarray(points[nodes].mean(axis=1))
 
 
@@ -382,7 +386,7 @@ def _read_instant(file: Any, support: Any, n_values: int, n_components: int) -> 
             continue
         rows = values(file["PROFILS"][name], "PFL").astype(np.int64) - 1
         if rows.min(initial=0) < 0 or rows.max(initial=0) >= n_values:
-            raise FileError(f"profile '{name}' refers to point {rows.max() + 1} of {n_values}: write the file anew")
+            raise FileError(f"profile '{name}' refers to point {rows.max() + 1} of {n_values}: write the file again")
         field[rows] = values_of_profile
     return field
 
@@ -391,9 +395,11 @@ def checked_name(kind: str, name: str, size: int) -> bytes:
     """Return a name encoded for MED; FileError if it is empty, too long, or cannot be read back unchanged."""
     encoded = name.encode("utf-8")
     if not encoded or len(encoded) > size:
-        raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, and MED takes 1 to {size}: rename it")
+        raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, but MED allows 1 to {size}: rename it")
     if name.endswith(" ") or "\0" in name:
-        raise FileError(f"{kind} name '{name}' ends with a blank, which MED does not keep: rename it")
+        raise FileError(
+            f"{kind} name '{name}' ends with a blank or has a zero byte, which MED does not keep: rename it"
+        )
     return encoded
 
 
@@ -421,7 +427,7 @@ def _names_in(family: Any) -> tuple[str, ...]:
     if "GRO" not in family:
         return ()
     raw = values(family["GRO"], "NOM").tobytes()
-    # MED 2 stores one string for all names, later versions one row per name; the bytes are equal except for a zero.
+    # MED 2 stores one string for all names, later versions one row per name; the bytes differ only by a zero at the end.
     count = -(-len(raw) // GROUP_NAME_SIZE)
     if "NBR" in family["GRO"].attrs:
         count = min(count, int(attribute(family["GRO"], "NBR")))
@@ -449,8 +455,8 @@ def family_members(numbers: AnyArray, families: Families) -> dict[str, Indices]:
 def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[Numbers, Families]:
     """Return the family number of each of `count` cells or points, and the groups of each family.
 
-    There is one family for each combination of groups that occurs, and one for all groups without members.
-    Numbers run from `sign`, +1 for points and -1 for cells, away from zero; 0 means no group.
+    There is one family for each combination of groups that occurs, and one for all groups without members. With `sign` = +1
+    for points and -1 for cells, the families have the numbers `sign`, 2 `sign`, ...; 0 means no group.
     """
     labels = np.zeros(count, np.intp)
     combinations: list[tuple[str, ...]] = [()]

@@ -19,14 +19,14 @@ Curve = Callable[[Array], Array]
 class Spacing:
     """Desired edge length as a function of the distance from the pole, which is the origin.
 
-    The length is `near` within `plateau` of the pole, then grows linearly to `far` at `reach`, and stays there.
+    The length is `near` up to the distance `plateau` from the pole, varies linearly to `far` at `reach`, and is `far` beyond.
 
     Attributes
     ----------
     near, far : float
         Edge lengths at the pole and far from it [length].
     plateau, reach : float
-        Distances from the pole between which the edge length grows [length].
+        Distances from the pole between which the edge length varies [length].
     """
 
     near: float
@@ -50,16 +50,17 @@ class Spacing:
 
 
 def segments_for(length: float, size: float) -> int:
-    """Return the smallest number of equal segments not longer than `size`."""
+    """Return the smallest number of equal segments of a `length` that are not longer than `size` [both length]."""
     return segments(length / size)
 
 
 def geometric(length: float, first: float, last: float) -> Array:
     """Return relative abscissae (n + 1,) [-] from 0 to 1 of segments in geometric progression.
 
-    The ratio of the last segment to the first is exactly ``last / first``, and n is the smallest number for which no segment
-    is longer than desired; all segments are shorter by a common factor. From the sum of a geometric series,
-    S = (last q - first) / (q - 1), the ratio of neighbours is q = (S - first) / (S - last).
+    The n segments of a line of `length` [length] are those of the progression from `first` to `last` [length], multiplied by
+    a common factor of at most one; n is the smallest number for which such a factor exists. The ratio of the last segment to
+    the first is ``last / first``, unless a single segment suffices. From the sum of a geometric series,
+    S = (last q - first) / (q - 1), the ratio of adjacent segments is q = (S - first) / (S - last).
     """
     if first == last:
         return np.linspace(0.0, 1.0, segments_for(length, first) + 1)
@@ -75,32 +76,35 @@ def geometric(length: float, first: float, last: float) -> Array:
 
 
 def divided(curve: Curve, length: float, spacing: Spacing) -> Array:
-    """Return points (n + 1, 2) [length] on a curve, no segment longer than its `spacing`.
+    """Return points (n + 1, 2) [length] that divide a curve of given `length` [length] into segments according to `spacing`.
 
-    `curve` (n,) [-] maps parameters from 0 to 1 to points at constant speed.
+    The function `curve` (n, 2) [length] of parameters (n,) [-] from 0 to 1 must have constant speed.
     """
     if spacing.uniform:
         return curve(np.linspace(0.0, 1.0, segments_for(length, spacing.far) + 1))
     # The integral of ds / h counts the segments; 16 samples per smallest segment resolve it.
     fine = np.linspace(0.0, 1.0, 16 * segments_for(length, min(spacing.near, spacing.far)) + 1)
     density = length / spacing(curve(0.5 * (fine[:-1] + fine[1:])))
-    number = np.concatenate([[0.0], np.cumsum(density * np.diff(fine))])
-    n = segments(number[-1])
-    parameter = np.interp(np.linspace(0.0, number[-1], n + 1), number, fine)
+    cumulative = np.concatenate([[0.0], np.cumsum(density * np.diff(fine))])
+    n = segments(cumulative[-1])
+    parameter = np.interp(np.linspace(0.0, cumulative[-1], n + 1), cumulative, fine)
     parameter[0], parameter[-1] = 0.0, 1.0
     return curve(parameter)
 
 
 def graded(length: float, spacing: Spacing) -> Array:
-    """Return positions (n + 1,) [length] from 0 to `length`, at distances given by a spacing with its pole at 0."""
+    """Return positions (n + 1,) [length] from 0 to `length` [length], graded by a spacing with its pole at 0."""
     return divided(lambda s: np.column_stack([length * s, np.zeros(len(s))]), length, spacing)[:, 0]
 
 
 def growing(length: float, first: float, growth: float) -> Array:
-    """Return positions (n + 1,) [length] from 0 to `length`, with distances from about `first`, growing by `growth`."""
+    """Return positions (n + 1,) [length] from 0 to `length` [length] with distances in geometric progression.
+
+    The first distance is at most `first` [length], and successive distances have the ratio `growth` [-] > 1.
+    """
     n = segments(np.log1p(length * (growth - 1.0) / first) / np.log(growth))
-    places = np.concatenate([[0.0], np.cumsum(growth ** np.arange(n))])
-    return np.asarray(length * places / places[-1])
+    position = np.concatenate([[0.0], np.cumsum(growth ** np.arange(n))])
+    return np.asarray(length * position / position[-1])
 
 
 def straight(start: Sequence[float], end: Sequence[float], relative: Array) -> Array:
@@ -124,7 +128,7 @@ def rectangular(x: Array, y: Array) -> Array:
 
 
 def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, v: Array) -> Array:
-    """Return the grid (n + 1, m + 1, 2) [length] between four sides by bilinear blending; it has exactly their nodes.
+    """Return the grid (n + 1, m + 1, 2) [length] between four sides by bilinear blending; its border is the given nodes.
 
     It is the bilinearly blended Coons patch (W. J. Gordon and C. A. Hall, Int. J. Numer. Meth. Engng 7, 1973, eq. 6). The
     sides are `bottom` (n + 1, 2) [length] and `top` (n + 1, 2) [length], with the relative abscissae `u` (n + 1,) [-] of
@@ -141,7 +145,7 @@ def transfinite(bottom: Array, right: Array, top: Array, left: Array, u: Array, 
 
 
 def structured(grid: Array, solid: str, sides: Mapping[str, str], triangles: bool = False) -> Mesh:
-    """Return the linear mesh of a grid, its cells in the group `solid`.
+    """Return the linear mesh of a grid, with all cells in the group `solid`.
 
     The `grid` (n + 1, m + 1, 2) [length] is right-handed: the first index runs to the right, the second up. `sides` maps
     BOTTOM, RIGHT, TOP, LEFT to names of groups of lines; with `triangles`, each quadrangle is divided in two along

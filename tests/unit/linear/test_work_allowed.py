@@ -34,7 +34,7 @@ def test_multigrid_that_costs_more_than_factors_hands_over_in_time_and_says_at_w
     model = columns_with_friction()
     solver, found = solved(model, "amg")
     assert solver.counters.iterations <= solver.affordable + 1 + solver.instead.counters.iterations
-    assert f"the work of {solver.affordable} iterations in one load step" in solver.gave_up
+    assert f"{solver.affordable} iterations in one load step take longer" in solver.gave_up
     assert f"a factorisation of {model.n_dofs} unknowns" in solver.gave_up
     exact = solved(model, "direct")[1]
     assert found.displacement == pytest.approx(exact.displacement, abs=1e-10 * np.abs(exact.displacement).max())

@@ -320,7 +320,7 @@ NO_PLACE, NO_CENTRE = (
     "the place .* of reference point 'HANDLE' must be 2 numbers",
     "centre .* must be 2 finite numbers, not",
 )
-NO_RAMP, NO_TURN = "the ramp must be a number of steps, load factors", ".* have no mean rotation"
+NO_RAMP, NO_TURN = "the ramp must be a number of steps, load factors", ".* mean rotation is undetermined"
 
 
 def touching_corners():

@@ -172,7 +172,7 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
     [
         (", STEADY STATE", "", r"line 63, \*HEAT TRANSFER: only STEADY STATE"),
         ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n0.\n", r"\*CONDUCTIVITY: material 'A': the conductivity 0 must be"),
-        ("STATE\n", "STATE\n*FILM\nup, F2, 20., -3.\n", r"\*FILM: the coefficient -3 of the film"),
+        ("STATE\n", "STATE\n*FILM\nup, F2, 20., -3.\n", r"\*FILM: the film coefficient -3 must not"),
         ("*END STEP\n", "*END STEP\n*STEP\n*FREQUENCY\n3\n*END STEP\n", r"\*STEP: \*FREQUENCY after \*HEAT TRANSFER"),
         ("*CONDUCTIVITY\n50.\n", "", r"\*MATERIAL: material 'A' has no \*CONDUCTIVITY"),
         ("*CONDUCTIVITY\n50.\n", "*CONDUCTIVITY\n50., 0.\n60., 100.\n", r"2 data lines, but one .* temperatures"),
@@ -181,14 +181,14 @@ def test_a_static_step_before_and_heat_of_friction_by_time(tmp_path):
         ("STATE\n", "STATE\n*RADIATE\nup, R1, 2.\n", r"\*RADIATE: .*without radiation"),
         ("STATE\n", "STATE\n*FILM\nup, F2NU, 2., 3.\n", r"\*FILM: F2NU is not supported; known are F1, F2"),
         ("STATE\n", "STATE\n*DFLUX\nup, S9, 2.\n", r"\*DFLUX: element 4 of type DC3D8 has no face 9"),
-        ("STATE\n", "STATE\n*CFLUX\nHOT, 3, 2.\n", r"\*CFLUX: component 3 is not 11"),
+        ("STATE\n", "STATE\n*CFLUX\nHOT, 3, 2.\n", r"\*CFLUX: degree of freedom 3 is not 11"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 0., 20.\n2000., 1., 50.\n", r"depends on the temperature"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n1000., 1.\n2000., 1.\n", r"\*GAP CONDUCTANCE: .* ascend"),
         ("*GAP CONDUCTANCE\n1000.\n", "*GAP CONDUCTANCE\n-1000.\n", r"\*GAP CONDUCTANCE: the conductance -1000"),
         ("1000.\n", "1000.\n*GAP CONDUCTANCE\n1000., 0.\n2000., 1.\n", r"a constant conductance and a table"),
         ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.3\n", r"must be 0.5"),
         ("NAME=I\n", "NAME=I\n*GAP HEAT GENERATION\n1., 0.5, 3.\n", r"a prescribed sliding velocity is not supported"),
-        ("HEAT TRANSFER, STEADY STATE", "STATIC", r"line 7, .*component 11|conduct heat alone"),
+        ("HEAT TRANSFER, STEADY STATE", "STATIC", r"line 7, .*degree of freedom 11|conduct heat alone"),
         ("HOT, 11, 11, 100.", "99, 11, 11, 100.", r"node 99 is not defined"),
     ],
 )  # fmt: skip
@@ -242,7 +242,7 @@ def test_temperatures_come_go_and_come_again_from_what_they_find(tmp_path):
 
 def test_two_films_on_a_face_and_heat_that_nothing_holds_are_refused(tmp_path):
     head = two_bars() + MATERIALS + CONTACT
-    with pytest.raises(fc.CaseError, match="3 is the second coefficient in this step, after 2"):
+    with pytest.raises(fc.CaseError, match="3 is the second film coefficient of this face in one step, after 2"):
         deck_of(tmp_path, head + ENDS + STEP.format("*FILM\n5, F2, 20., 2.\n*FILM\n5, F2, 20., 3.\n"))
     gone = ENDS + STEP.format("") + STEP.format("*BOUNDARY, OP=NEW\n")
     deck = deck_of(tmp_path, head + gone)

@@ -117,7 +117,7 @@ def test_expansion_without_temperatures_is_noted(tmp_path):
         (heated("*Expansion, type=ANISO\n1.e-5\n"), r"\*EXPANSION: TYPE=ANISO is not supported"),
         (heated("*Expansion\n1.e-5, 20., 3.\n"), r"\*EXPANSION: .*has 1 coefficients"),
         (heated(steps="*Temperature, file=heat.frd\n"), r"\*TEMPERATURE: the parameter FILE"),
-        (heated(steps="*Temperature\nall, 120., 3.\n"), r"\*TEMPERATURE: gradients"),
+        (heated(steps="*Temperature\nall, 120., 3.\n"), r"\*TEMPERATURE: temperature gradients"),
         (heated(steps="*Temperature\nnone, 120.\n"), r"\*TEMPERATURE: set 'none' is not defined"),
         (heated(steps="*Cflux\n17, 11, 3.\n"), r"\*CFLUX: needs a step with"),
     ],

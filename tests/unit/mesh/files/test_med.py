@@ -517,7 +517,7 @@ def test_no_mesh_and_two_meshes(tmp_path):
     write_med_mesh(path, all_elements(), mesh_name="upper")
     with h5py.File(path, "a") as file:
         file.copy("ENS_MAA/upper", "ENS_MAA/lower")
-    with pytest.raises(FileError, match=r"2 meshes \('lower', 'upper'\): say which one with mesh_name"):
+    with pytest.raises(FileError, match=r"2 meshes \('lower', 'upper'\): choose one with mesh_name"):
         read_med(path)
     with pytest.raises(FileError, match="unknown mesh 'uper': did you mean 'upper'"):
         read_med(path, mesh_name="uper")
@@ -624,7 +624,7 @@ def test_soft_links_inside_the_file_are_followed(tmp_path):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("g" * 81, "81 bytes, and MED takes 1 to 80"),
+        ("g" * 81, "81 bytes, but MED allows 1 to 80"),
         ("é" * 41, "82 bytes"),
         ("", "0 bytes"),
         ("end ", "blank"),
