@@ -432,11 +432,11 @@ CONTACT = [
     Mistake("friction that is negative", lambda: pair_of("CONT_UPPER", "CONT_LOWER", friction=-0.1), fc.ContactError,
             r"the coefficient of friction -0\.1 must be a number >= 0"),
     Mistake("tied with a penalty", lambda: pair_of("CONT_UPPER", "CONT_LOWER", kind="tied", penalty=1.0), fc.ContactError,
-            r"contact 'pair' is tied, which keeps the sides as they lie, exactly: leave out 'penalty'"),
+            r"contact 'pair' is tied, which keeps the initial gaps exactly: leave out 'penalty'"),
     Mistake("a penalty of zero", lambda: pair_of("CONT_UPPER", "CONT_LOWER", penalty=0.0), fc.ContactError,
             r"penalty = 0\.0 of contact 'pair' must be positive; leave it out for no penetration"),
     Mistake("all nodes excluded", lambda: pair_of("CONT_UPPER", "CONT_LOWER", excluded="CONT_UPPER"), fc.ContactError,
-            r"contact 'pair' excludes all nodes of 'CONT_UPPER': nothing is left to touch"),
+            r"contact 'pair' excludes all nodes of 'CONT_UPPER': no node remains that could be in contact"),
     Mistake("bodies pulled apart by a force", lambda: solved(lifted()), fc.ConvergenceError,
             r"the loads pull bodies away, and no contact stops them \(.*\): reverse the loads or add supports \(step 1 from 0 to 1\)"),
 ]
