@@ -180,4 +180,4 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     if near := nearest(name, names, 0.6 if name.startswith("-") else 0.5):  # options are many and often similar
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
-    return f"unknown {kind} '{name}': known are {shown}"
+    return f"unknown {kind} '{name}': expected one of {shown}"

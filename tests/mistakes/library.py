@@ -324,7 +324,7 @@ SUPPORTS = [
     Mistake("a support on an empty group", lambda: blocks(empty_group("NONE")).fix("NONE", "x"), fc.ModelError,
             r"group 'NONE' is empty: no displacement can be prescribed on it"),
     Mistake("a support in z of a plane model", lambda: blocks().fix("LOWER_LEFT", "z"), fc.ModelError,
-            r"prescribe\('LOWER_LEFT'\): unknown component 'z': known are x, y"),
+            r"prescribe\('LOWER_LEFT'\): unknown component 'z': expected one of x, y"),
     Mistake("a support that moves the axis of symmetry", lambda: solved(on_axis(lambda model: model.prescribe("TOP", x=0.1))),
             fc.ModelError,
             r"x = 0\.1 is prescribed at point \d+ on the axis of symmetry, where the radial displacement is zero: leave the points at x = 0 out of the group"),
