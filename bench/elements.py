@@ -107,7 +107,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=9, help="runs of each (9)")
     options = parser.parse_args()
     if unknown := set(options.elements) - set(MESHES):
-        parser.error(f"no mesh for {', '.join(sorted(unknown))}: known are {', '.join(MESHES)}")
+        parser.error(f"no mesh for {', '.join(sorted(unknown))}: expected one of {', '.join(MESHES)}")
     print(" | ".join(COLUMNS))
     for element in options.elements or MESHES:
         print(" | ".join(measured(element, options.runs)), flush=True)

@@ -1,4 +1,4 @@
-"""Exceptions and warnings of fastcontact, and messages about unknown names."""
+"""Exceptions and warnings of fastcontact, and messages that suggest known names for unknown ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def printable(text: str) -> str:
 
 
 class FastcontactError(Exception):
-    """Base class of the errors that fastcontact raises, whose messages are one line."""
+    """Base class of the errors that fastcontact raises. Their messages consist of one line."""
 
     def __str__(self) -> str:
         # Names and values from files may contain line ends, control characters and thousands of characters.
@@ -77,7 +77,7 @@ class FastcontactWarning(UserWarning):
 
 @contextmanager
 def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Prefix the messages of errors in the block with a file name, unless they contain it."""
+    """Prefix the messages of errors in the block with a file name, unless they contain it; ConvergenceError is unchanged."""
     try:
         yield
     except FastcontactError as error:
@@ -87,7 +87,7 @@ def in_file(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def warn(text: str) -> None:
-    """Issue a FastcontactWarning that refers to the line outside the package from which it was called."""
+    """Issue a FastcontactWarning that is attributed to the line of the user's code that called the package."""
     package = os.path.dirname(__file__) + os.sep
     level, frame = 2, sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(package):
@@ -95,10 +95,9 @@ def warn(text: str) -> None:
     warnings.warn(text, FastcontactWarning, stacklevel=level)
 
 
-# Length to which messages shorten an unknown name.
-LONGEST_NAME = 120
+LONGEST_NAME = 120  # largest number of characters of an unknown name in a message
 SHOWN = 20  # largest number of known names in the message about an unknown one
-# Words of this package for words of its methods and of other programs.
+# Names of fastcontact, separated by spaces, by the names that other programs or other parts of fastcontact use.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
@@ -119,7 +118,7 @@ OTHER_WORDS = {
 
 
 def nearest(name: str, known: Iterable[str], cutoff: float) -> list[str]:
-    """Return the known names that may be meant by a name: those of `OTHER_WORDS`, or up to three with similar spelling."""
+    """Return the known names that a name may stand for: those in `OTHER_WORDS`, or up to three with similar spelling."""
     names = {candidate.casefold().lstrip("-"): candidate for candidate in reversed([*known])}
     meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
     plainest = {key.replace("_", ""): text for key, text in reversed(names.items())}
@@ -144,19 +143,19 @@ def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeErro
 
 
 class Suggesting:
-    """Base of classes whose objects suggest their nearest attributes in the AttributeError for one that they lack."""
+    """Base class of objects that suggest similar names in the AttributeError for a missing attribute."""
 
-    if not TYPE_CHECKING:  # not for type checkers, which report unknown names themselves
+    if not TYPE_CHECKING:  # hidden from type checkers, which report unknown names themselves
 
         def __getattr__(self, name: str) -> object:
-            if name.startswith("_"):  # tools look up such names
+            if name.startswith("_"):  # tools such as IPython look up private names
                 raise AttributeError(name)
             known = [each for each in dir(self) if not each.startswith("_")]
             raise no_attribute(f"'{type(self).__name__}' object", name, known)
 
 
 def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` for a module with the public names `known`."""
+    """Return ``__getattr__`` and ``__dir__`` for the module called `module` with the public names `known`."""
 
     def missing(name: str) -> object:
         raise AttributeError(name) if name.startswith("_") else no_attribute(f"module '{module}'", name, known)
@@ -167,7 +166,7 @@ def names_of(module: str, known: list[str]) -> tuple[Callable[[str], object], Ca
 def check_known(
     kind: str, name: object, known: Collection[str], error: type[FastcontactError], about: str = ""
 ) -> None:
-    """Raise `error` with the nearest known names unless a name is in `known`; `about` precedes the message."""
+    """Raise `error` with the nearest known names unless `name` is in `known`; `about` precedes the message."""
     if not isinstance(name, str) or name not in known:
         raise error(about + unknown(kind, str(name), known))
 
@@ -178,7 +177,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    if near := nearest(name, names, 0.6 if name.startswith("-") else 0.5):  # there are many options
+    if near := nearest(name, names, 0.6 if name.startswith("-") else 0.5):  # options are many and often similar
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
-    return f"unknown {kind} '{name}': known are {shown}"
+    return f"unknown {kind} '{name}': expected one of {shown}"

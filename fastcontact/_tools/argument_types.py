@@ -102,7 +102,9 @@ def _refusal(
         if wrong := text.partition("unexpected keyword argument '")[2].rstrip("'"):
             known = [key for key in signature.parameters if key != "self"]
             near = nearest(wrong, known, 0.6)
-            text += f": did you mean {' or '.join(map(repr, near))}?" if near else f": known are {', '.join(known)}"
+            text += (
+                f": did you mean {' or '.join(map(repr, near))}?" if near else f": expected one of {', '.join(known)}"
+            )
         return TypeError(text)
     raise AssertionError(called)
 

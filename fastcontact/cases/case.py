@@ -14,7 +14,7 @@ from fastcontact._tools.paths import existing_file, is_stream
 from fastcontact.analysis.criteria import Criteria
 from fastcontact.cases.checks import Check, read_check
 from fastcontact.cases.keys import NUMBER, RAMP, SENSITIVITY, TOP, at, called, check_keys, check_settings, tables
-from fastcontact.cases.model_tables import LISTS, build_model, points
+from fastcontact.cases.model_tables import LISTS, build_model, ramp_points
 from fastcontact.errors import CaseError, check_known, in_file, unknown
 from fastcontact.linear.choice import check_tolerance
 from fastcontact.linear.protocol import TOLERANCE
@@ -373,7 +373,7 @@ def _ramp(data: dict[str, Any]) -> Ramp:
     check_keys("ramp", data, RAMP)
     if "instants" not in data:
         if "table" in data:
-            table = points(data["table"])
+            table = ramp_points(data["table"])
             return Ramp(linear_ramp(data.get("steps", 20), table[-1][0]).instants, table)
         return linear_ramp(data.get("steps", 20), float(data.get("end", 1.0)))
     if "steps" in data or "end" in data:
@@ -382,7 +382,7 @@ def _ramp(data: dict[str, Any]) -> Ramp:
     if wrong:
         raise CaseError(f"ramp.instants contains {wrong[0]!r}, which is not a number")
     instants = [float(t) for t in data["instants"]]
-    return Ramp(tuple(instants), points(data["table"])) if "table" in data else ramp_of(instants)
+    return Ramp(tuple(instants), ramp_points(data["table"])) if "table" in data else ramp_of(instants)
 
 
 def _probes(mesh: Mesh, data: dict[str, Any]) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""The model of a case file: materials, supports, loads, constraints, springs, contact pairs and obstacles."""
+"""Construction of the model of a case file: materials, supports, loads, constraints, springs, contact pairs and obstacles."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fastcontact.mesh.mesh import OPPOSITE, Mesh
 from fastcontact.model.model import Model
 from fastcontact.model.ramp import Table
 
-# Keys with values that may depend on the position.
+# Keys whose values may depend on the position.
 VALUES = ("E", "nu", "G", "density", "expansion", "conductivity", "value", "coefficient", "ambient", *COMPONENTS)
 
 
@@ -36,7 +36,7 @@ def _add_material(model: Model, groups: Any = None, **constants: Any) -> None:
     kind = _material_law(constants)
     constants.pop("law", None)
     if kind is LinearElastic:
-        # A list is not an array over cells, for which case files use tables.
+        # A list contains the components along the axes. Values by cell are given by tables instead.
         if isinstance(constants.get("expansion"), list):
             check_expansion(constants["expansion"], 1)
         if isinstance(constants.get("conductivity"), list):
@@ -55,7 +55,7 @@ def _add_temperature(model: Model, **given: Any) -> None:
                 raise CaseError(f"the key '{key}' belongs to a temperature with 'file'")
         model.add_temperature(**given)
     elif "field" not in given:
-        raise CaseError("a temperature with 'file' needs 'field', its name there")
+        raise CaseError("a temperature with 'file' needs 'field', the name of the field in the file")
     else:
         model.add_temperature_file(**given)
 
@@ -93,7 +93,7 @@ def _check_material(where: str, entry: dict[str, Any]) -> None:
     law = _material_law(entry)
     for key in entry:
         if key not in ("groups", "law") and key not in inspect.signature(law).parameters:
-            raise CaseError(f"the key '{where}.{key}' does not belong to a material that is {_LAWS[law]}")
+            raise CaseError(f"the key '{where}.{key}' does not belong to {_LAWS[law]}")
 
 
 # Nonlinear laws by name in case files.
@@ -104,12 +104,12 @@ NONLINEAR: dict[str, type[Material]] = {
     "yeoh": Yeoh,
     "ogden": Ogden,
 }
-# Names of the laws in messages.
+# Descriptions of materials by law, for messages.
 _LAWS: dict[type[Material], str] = {
-    LinearElastic: "isotropic",
-    Orthotropic: "orthotropic (E, nu and G are lists of three)",
-    Anisotropic: "anisotropic (D is a matrix)",
-    **{law: f"{name} (its law)" for name, law in NONLINEAR.items()},
+    LinearElastic: "an isotropic material",
+    Orthotropic: "an orthotropic material (E, nu and G are lists of three)",
+    Anisotropic: "an anisotropic material (D is a matrix)",
+    **{law: f"a material with the law '{name}'" for name, law in NONLINEAR.items()},
 }
 # Order in which messages list the types of a value.
 _ORDER = (*NUMBER, list, dict)
@@ -125,7 +125,7 @@ def _constants() -> dict[str, tuple[type, ...]]:
     return {key: tuple(sorted(kinds, key=[*_ORDER, bool, str].index)) for key, kinds in known.items()}
 
 
-# Functions by kind of table, for kinds without a method `add_KIND` of `Model` that takes the table.
+# Functions by kind of table, for the kinds whose keys are not the arguments of a method `add_KIND` of `Model`.
 _NAMED: dict[str, Callable[..., None]] = {
     "material": _add_material,
     "support": Model.prescribe,
@@ -136,7 +136,7 @@ _NAMED: dict[str, Callable[..., None]] = {
     "relation": Model.relate,
     "group_relation": Model.relate_groups,
 }
-# Functions by kind of table, in the order in which the tables are added to the model.
+# All functions by kind of table, in the order in which the tables are added to the model.
 _ADD: dict[str, Callable[..., None]] = {
     kind: _NAMED.get(kind) or getattr(Model, f"add_{kind}")
     for kind in (
@@ -146,25 +146,25 @@ _ADD: dict[str, Callable[..., None]] = {
         "cyclic_symmetry", "spring", "pretension",
     )
 }  # fmt: skip
-# Tables that refer to contact pairs, which are added after the pairs.
+# Functions for tables that refer to contact pairs and are therefore added after the pairs.
 _ADD_TO_CONTACT: dict[str, Callable[..., None]] = {"fluid_pressure": Model.add_fluid_pressure}
 
 
 def _keys(*adding: Callable[..., None], **further: Any) -> tuple[dict[str, Any], list[str]]:
     """Return the types of the keys of a table and its required keys, from the signatures of `adding`."""
     known: dict[str, Any] = {}
-    needed = []
+    required = []
     for add in adding:
         annotated = types_of(inspect.unwrap(add))
-        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first one is the model
+        for key, parameter in [*inspect.signature(add).parameters.items()][1:]:  # the first parameter is the model
             kinds = toml_types(annotated[key])
             if parameter.kind is parameter.VAR_KEYWORD:
                 initial = add in (Model.add_initial_stress, Model.add_initial_strain)
                 known |= dict.fromkeys(COMPONENTS, kinds) if initial else AXES
             else:
                 known[key] = kinds if key in (*VALUES, "axes") else tuple(kind for kind in kinds if kind is not dict)
-                needed += [key] * (parameter.default is parameter.empty)
-    return {**known, **further}, needed
+                required += [key] * (parameter.default is parameter.empty)
+    return {**known, **further}, required
 
 
 # Types of the keys and required keys by kind of table.
@@ -210,13 +210,13 @@ def build_model(mesh: Mesh, data: dict[str, Any], text: str, folder: Path) -> Mo
 def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping[str, Callable[..., None]]) -> None:
     """Add the entries of the lists of tables of the kinds in `adding`; CaseError if one is invalid."""
     for kind, add in adding.items():
-        known, needed = LISTS[kind]
+        known, required = LISTS[kind]
         for i, entry in enumerate(tables(kind, data.get(kind, []))):
             where = f"{kind}[{i}]"
             check_keys(where, entry, known)
             if kind == "material":
                 _check_material(where, entry)
-            for key in _without_default(_material_law(entry)) if kind == "material" else needed:
+            for key in _without_default(_material_law(entry)) if kind == "material" else required:
                 if key not in entry:
                     raise CaseError(f"{where} needs '{key}'")
             with at(where):
@@ -225,16 +225,18 @@ def _add_lists(model: Model, data: dict[str, Any], folder: Path, adding: Mapping
 
 
 def _add_contacts(model: Model, data: dict[str, Any]) -> None:
-    """Add the contact pairs of the data, then those that are detected automatically if the data request it."""
+    """Add the contact pairs of a case file, and then the automatically detected pairs if the file requests them."""
     named = data.get("contact", {})
     if isinstance(named, str) and named != "auto":
         raise CaseError(f"'contact' must be \"auto\" or tables [contact.NAME], not {repr(named)}")
     for name, entry in named.items() if isinstance(named, dict) else ():
         if not isinstance(entry, dict):
-            raise CaseError(f"'contact' needs a name for each pair: write [contact.NAME] above its keys, not '{name}'")
+            raise CaseError(
+                f"'contact' needs a name for each pair: write [contact.NAME] above its keys instead of '{name}'"
+            )
         for key in ("secondary", "primary"):
             if not isinstance(entry.get(key), str):
-                renamed = "".join(f"; rename '{other}' to it" for other in entry if OTHER_WORDS.get(other) == key)
+                renamed = "".join(f"; rename '{other}' to '{key}'" for other in entry if OTHER_WORDS.get(other) == key)
                 raise CaseError(f"contact.{name} needs '{key}', the name of a group of facets{renamed}")
         with at(f"contact.{name}"):
             model.add_contact(name, **entry)
@@ -251,7 +253,7 @@ def _from_files(where: str, entry: dict[str, Any], mesh: Mesh, folder: Path) -> 
             return value
         check_keys(name, value, FIELD)
         if "field" not in value:
-            raise CaseError(f"'{name}' needs 'field', its name in the file")
+            raise CaseError(f"'{name}' needs 'field', the name of the field in the file")
         return read_field(mesh, groups=entry.get("groups"), **_with_paths(folder, value))
 
     return _changed(where, entry, CONSTANTS, read)
@@ -262,7 +264,7 @@ def _changed(
 ) -> dict[str, Any]:
     """Return an entry with `change` applied to the values of `keys`, or to each value of a list.
 
-    `change` is called with the location of the value in the case file, for messages, and the value.
+    `change` receives the location of the value in the case file, for messages, and the value.
     """
     values = dict(entry)
     for key in (key for key in keys if key in entry):
@@ -318,7 +320,7 @@ def _add_obstacle(model: Model, name: str, entry: Any, folder: Path) -> None:
         raise CaseError(f"{where} needs 'secondary', the name of a group of facets")
     rest = {key: value for key, value in entry.items() if key != "shape"}
     shape = entry.get("shape")
-    if shape == "mesh":  # the arguments of the shape may be keys of the obstacle
+    if shape == "mesh":  # arguments of the shape may be given as keys of the obstacle
         shape = {"kind": "mesh", **{key: rest.pop(key) for key in SURFACE if key in rest}}
     obstacle = _obstacle(f"{where}.shape", shape, model.mesh, folder)
     for key in ("motion", "force"):
@@ -353,7 +355,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
         check_keys(f"{where}.rotation", entry["rotation"], ROTATION)
         arguments["rotation"] = _arguments(f"{where}.rotation", entry["rotation"])
     if "ramp" in entry:
-        arguments["ramp"] = points(entry["ramp"], f"{where}.ramp")
+        arguments["ramp"] = ramp_points(entry["ramp"], f"{where}.ramp")
     for term in entry.get("terms", []):
         kinds: list[Any] = [(str, int), str, NUMBER]
         if not isinstance(term, list) or len(term) != 3 or not all(isinstance(v, k) for v, k in zip(term, kinds)):
@@ -363,7 +365,7 @@ def _arguments(where: str, entry: dict[str, Any]) -> dict[str, Any]:
     return arguments
 
 
-def points(table: list[Any], where: str = "ramp.table") -> Table:
+def ramp_points(table: list[Any], where: str = "ramp.table") -> Table:
     """Return a ramp as pairs of instant and load multiplier [-]; CaseError if it is not a list of pairs of numbers."""
     pairs = isinstance(table, list) and all(
         isinstance(row, list) and len(row) == 2 and all(isinstance(v, NUMBER) for v in row) for row in table

@@ -1,18 +1,18 @@
 r"""Linearised contact geometry: variation of contact forces, gaps and slips with the displacements.
 
-The rows of constraints depend on the displacements: points slide over the facets they face, and normals rotate. A
+The constraint rows depend on the displacements, because points slide over the opposite facets and normals rotate. A
 secondary point :math:`x`, with shape functions :math:`N_s` and contact force :math:`p = \lambda n + \tau`, faces the
-primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k`, with the normal n. For a variation of the displacements its nodal
-forces and its gap vary, in addition to the rows themselves, by
+primary point :math:`y(\xi) = \sum_k N_k(\xi) y_k`, with the normal n. A variation of the displacements
+changes its nodal forces f and its gap g, in addition to their change at fixed rows, by
 
 .. math:: \delta f = N_s^T \delta p - N^T \delta p - N_{,\alpha}^T p \, \delta \xi^\alpha, \qquad
           \delta p = \lambda \, \delta n - (\tau \cdot \delta n) n, \qquad
           \delta g = - n \cdot y_{,\alpha} \delta \xi^\alpha + (x - y) \cdot \delta n
 
 (Laursen, Computational Contact and Impact Mechanics, 2002, section 5.3; Wriggers, Computational Contact Mechanics, 2006,
-chapter 9; for mortar Popp, Gee and Wall, 2009, with friction Gitterle, Popp, Gee and Wall, 2010). Tangents follow the
-normal without spin, :math:`\delta t = - (t \cdot \delta n) n`: a spin would only rotate the components of tangential
-forces and slips. For slips see `Slips`.
+chapter 9; for mortar Popp, Gee and Wall, 2009, with friction Gitterle, Popp, Gee and Wall, 2010). Tangents t follow the
+normal without spin, :math:`\delta t = - (t \cdot \delta n) n`, because a spin would only rotate the components of tangential
+forces and slips. `Slips` contains the equations of slips.
 """
 
 from __future__ import annotations
@@ -43,11 +43,18 @@ from fastcontact.round_off import DIFFERENCES, TINY
 
 
 class NodalNormals:
-    """Nodal normals of a side at `coordinates` (n_points, dim) [length], as `nodal_normals`, and their variation.
+    """Nodal normals of a side, equal to those of `nodal_normals`, and their variation.
+
+    Parameters
+    ----------
+    side : Surface
+    coordinates : ndarray (n_points, dim)
+        Coordinates of all points at which the normals are computed [length].
 
     Attributes
     ----------
     normal : ndarray (m, dim)
+        Unit normals at the m nodes of the side [-].
     """
 
     def __init__(self, side: Surface, coordinates: Array) -> None:
@@ -58,30 +65,34 @@ class NodalNormals:
             slope = element.gradient(element.nodes)
             axes = np.einsum("qka,fkd->fqad", slope, corners)
             normal, angle = facet_normals(block, coordinates), facet_angles(element, corners)
-            up = np.linalg.solve(np.einsum("fqad,fqbd->fqab", axes, axes), axes)
+            dual_axes = np.linalg.solve(np.einsum("fqad,fqbd->fqab", axes, axes), axes)
             np.add.at(total, block.local, angle[:, :, None] * normal)
-            self._parts.append((block, slope, normal, angle[:, :, None, None] * up, _angle_gradient(element, corners)))
+            self._parts.append(
+                (block, slope, normal, angle[:, :, None, None] * dual_axes, _angle_gradient(element, corners))
+            )
         side.add_across_ends(total)
         self._length = np.linalg.norm(total, axis=1, keepdims=True)
         self.normal = total / self._length
 
     def along(self, du: Array) -> Array:
-        """Return how the normals (m, dim) vary with displacements (n_points, dim) [length]."""
+        """Return the variation (m, dim) [-] of the normals for a variation `du` (n_points, dim) of displacements [length]."""
         total = np.zeros_like(self.normal)
-        for block, slope, normal, up, wider in self._parts:
+        for block, slope, normal, dual_axes, angle_gradient in self._parts:
             moved = du[block.facets]
-            leans = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(moved, 1, 2), slope)
-            np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", up, leans))
-            if wider is not None:
-                np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", wider, moved)[:, :, None] * normal)
+            tilt = np.einsum("fqk,qka->fqa", normal @ np.swapaxes(moved, 1, 2), slope)
+            np.add.at(total, block.local, -np.einsum("fqad,fqa->fqd", dual_axes, tilt))
+            if angle_gradient is not None:
+                np.add.at(total, block.local, np.einsum("fqkd,fkd->fq", angle_gradient, moved)[:, :, None] * normal)
         self._side.add_across_ends(total)
         return across(self.normal, total) / self._length
 
 
 def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
-    """Return the derivatives (n, q, k, dim) of the angles at nodes q of facets with nodes (n, k, dim); None on lines.
+    """Return the derivatives (n, q, k, dim) [1 / length] of the angles at the nodes q of facets; None on lines.
 
-    The angle between unit edges a and b varies with the end of a by ``-(b - cos a) / (|a| sin)``.
+    `nodes` (n, k, dim) contains the coordinates of the nodes of the facets [length]. The derivative of the angle between
+    two edges with unit vectors a and b, with respect to the end of the first edge, is ``-(b - (a . b) a)``, normalised and
+    divided by the length of this edge.
     """
     if element.dim == 1:
         return None
@@ -101,20 +112,23 @@ def _angle_gradient(element: elements.Element, nodes: Array) -> Array | None:
 
 
 class InterpolatedNormals:
-    """Unit normals interpolated between those at nodes, at fixed reference coordinates, and their variation.
+    """Unit normals at n points, interpolated from nodal normals at fixed reference coordinates, and their variation.
 
     Parameters
     ----------
     nodal : NodalNormals
+        Nodal normals of the side.
     local : ndarray of int (n, k)
-        Nodes of the points, as positions on the side.
+        Nodes of the facet of each point, numbered on the side.
     shape : ndarray (n, k)
+        Values of their shape functions at the point [-].
     at_nodes : ndarray (n, k, dim), optional
-        Normals at these nodes, which differ from those of `nodal` at corners.
+        Normals at these nodes, which differ from those of `nodal` at corners [-].
 
     Attributes
     ----------
     normal : ndarray (n, dim)
+        Unit normals at the points [-].
     """
 
     def __init__(self, nodal: NodalNormals, local: Indices, shape: Array, at_nodes: Array | None = None) -> None:
@@ -126,12 +140,15 @@ class InterpolatedNormals:
 
     @classmethod
     def smooth(cls, side: Surface, coordinates: Array, facet: Indices, at: Places) -> InterpolatedNormals:
-        """Return the normals of a side as a smooth surface at points of its facets (n,), see `smooth_normals`."""
+        """Return the interpolated `smooth_normals` of a side at the places `at` of its facets `facet` (n,)."""
         at_nodes = at_nodes_of_facets(smooth_normals(side, coordinates))[facet]
         return cls(NodalNormals(side, coordinates), at.local, at.shape, at_nodes)
 
     def bend(self, gradient: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) along facets, from those of shape functions (n, k, dim - 1)."""
+        """Return the derivatives (n, dim - 1, dim) of the normals along facets.
+
+        `gradient` (n, k, dim - 1) contains the derivatives of the shape functions.
+        """
         bend = np.einsum("nki,nkd->nid", gradient, self._at_nodes) / self._length[:, None]
         return np.asarray(bend - np.einsum("nid,nd->ni", bend, self.normal)[:, :, None] * self.normal[:, None])
 
@@ -146,7 +163,17 @@ def across(normal: Array, vector: Array) -> Array:
 
 
 class Variation(NamedTuple):
-    """Variation of projections: reference coordinates (n, dim - 1), the point faced at fixed facet, normals (n, dim)."""
+    """Variation of the projections of n points.
+
+    Attributes
+    ----------
+    xi : ndarray (n, dim - 1)
+        Variation of the reference coordinates of the facing points [-].
+    foot : ndarray (n, dim)
+        Variation of the positions of the facing points due to that of xi, with fixed facets [length].
+    normal : ndarray (n, dim)
+        Variation of the normals [-].
+    """
 
     xi: Array
     foot: Array
@@ -160,6 +187,7 @@ class _SurfacePoints:
     ----------
     candidates : Candidates
     pairing : Pairing
+        Pairing of the candidates with the primary side.
     rows : ndarray of int (n,)
         Rows of the points in `candidates`.
     primary : Surface
@@ -168,7 +196,21 @@ class _SurfacePoints:
     normals : str or tuple of float
         Normals of the primary side: ``"facet"``, ``"averaged"``, or a fixed vector.
     closest : bool
-        Whether the points face their closest points, instead of those along the normals; both coincide for facet normals.
+        Whether the points face their closest points on the primary side, instead of the points along the normals. Both
+        coincide for facet normals.
+
+    Attributes
+    ----------
+    motion : csr_array (n, n_points)
+        Map from nodal vectors to their values at the points minus those at the facing points [-].
+    apart : ndarray (n, dim)
+        Vectors from the facing points to the points [length].
+    axes : ndarray (n, dim - 1, dim)
+        Tangent vectors of the primary facets at the facing points [length].
+    normal : ndarray (n, dim)
+        Normals of the primary side at the facing points [-].
+    averaged : InterpolatedNormals or None
+        Source of averaged normals.
     """
 
     def __init__(
@@ -177,7 +219,7 @@ class _SurfacePoints:
     ) -> None:  # fmt: skip
         at, n_points, facet = pairing.places(primary, rows), len(coordinates), pairing.facet[rows]
         nodes, shape = np.hstack([candidates.nodes[rows], at.nodes]), np.hstack([candidates.shape[rows], -at.shape])
-        self.motion = shapes_at(shape, nodes, n_points)  # motion of points relative to the facing points
+        self.motion = shapes_at(shape, nodes, n_points)
         self._slopes = [shapes_at(slope, at.nodes, n_points) for slope in np.moveaxis(at.gradient, 2, 0)]
         self._spreading = [csr_array(matrix.T) for matrix in (self.motion, *self._slopes)]
         self.axes = self.slopes(coordinates)
@@ -194,7 +236,8 @@ class _SurfacePoints:
             self.normal, self._bend = self.averaged.normal, self.averaged.bend(at.gradient)
         else:
             self.normal = np.broadcast_to(np.array(normals, float), self.normal.shape)
-        # The component along the direction d of the projection is eliminated from ``a_i dxi_i + g dd = dv``.
+        # With the tangent vectors a_i, the distance g along the direction d of the projection, and the motion v of points
+        # relative to the facing points, ``a_i dxi_i + g dd = dv``. The component along d is eliminated.
         along, bend = (pairing.normal[rows], bend) if closest else (self.normal, self._bend)
         frame = np.stack(tangents(along), axis=1)
         self._closest, self._bent, self._gap = (
@@ -206,35 +249,39 @@ class _SurfacePoints:
         self._inverse = inverse @ frame
 
     def _facet_bend(self, primary: Surface, coordinates: Array, facet: Indices, xi: Array, at: Places) -> Array:
-        """Prepare the variation of facet normals; return their derivatives (n, dim - 1, dim) along the facet."""
-        self._up = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
+        """Return the derivatives (n, dim - 1, dim) of facet normals along facets, and store the dual axes of the facets."""
+        self._dual_axes = np.linalg.solve(np.einsum("nid,njd->nij", self.axes, self.axes), self.axes)
         # Shape functions are at most quadratic along each axis, so that central differences of gradients are exact.
         ends = [(xi + step, xi - step) for step in 0.5 * np.eye(xi.shape[1])]
         second = np.stack(
             [places(primary, facet, a).gradient - places(primary, facet, b).gradient for a, b in ends], axis=3
         )
         curvature = np.einsum("nkij,nkd,nd->nij", second, coordinates[at.nodes], self.normal)
-        return -np.einsum("njd,nij->nid", self._up, curvature)
+        return -np.einsum("njd,nij->nid", self._dual_axes, curvature)
 
     def slopes(self, values: Array) -> Array:
-        """Return the derivatives (n, dim - 1, dim) along facets of nodal values (n_points, dim) at the facing points."""
+        """Return the derivatives (n, dim - 1, dim) of a nodal field (n_points, dim) along facets at the facing points."""
         return np.stack([slope @ values for slope in self._slopes], axis=1)
 
     def along(self, du: Array) -> Variation:
-        """Return how projections and normals vary with displacements (n_points, dim) [length]."""
-        moved, facets = self.motion @ du, np.zeros_like(self.normal)
+        """Return the variation of projections and normals for a variation `du` (n_points, dim) of displacements [length]."""
+        moved, of_facet = self.motion @ du, np.zeros_like(self.normal)
         if self._facet is not None:
-            leans = np.einsum("nid,nd->ni", self.slopes(du), self._facet)
-            facets = -np.einsum("nid,ni->nd", self._up, leans)
-        still = facets if self._bent else np.zeros_like(facets)
+            tilt = np.einsum("nid,nd->ni", self.slopes(du), self._facet)
+            of_facet = -np.einsum("nid,ni->nd", self._dual_axes, tilt)
+        at_fixed_xi = of_facet if self._bent else np.zeros_like(of_facet)
         if self.averaged is not None:
-            still = self.averaged.along(du)
-        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * (facets if self._closest else still))
+            at_fixed_xi = self.averaged.along(du)
+        xi = np.einsum("nid,nd->ni", self._inverse, moved - self._gap * (of_facet if self._closest else at_fixed_xi))
         foot = np.einsum("nid,ni->nd", self.axes, xi)
-        return Variation(xi, foot, still + np.einsum("nid,ni->nd", self._bend, xi))
+        return Variation(xi, foot, at_fixed_xi + np.einsum("nid,ni->nd", self._bend, xi))
 
     def spread(self, force: Array, varied: Array, xi: Array) -> Array:
-        """Return the variation (n_points, dim) of nodal forces: points have a `force` that is `varied`, both (n, dim)."""
+        """Return the variation (n_points, dim) of nodal forces [force].
+
+        The points carry `force` (n, dim) [force] with the variation `varied` (n, dim) [force], and `xi` is that of
+        `Variation`.
+        """
         motion, *slopes = self._spreading
         total: Array = motion @ varied
         for slope, step in zip(slopes, xi.T, strict=True):
@@ -243,12 +290,12 @@ class _SurfacePoints:
 
 
 class _ObstaclePoints:
-    """Points that face a rigid obstacle, whose normals vary with their positions and which has no nodes.
+    """Points that face a rigid obstacle, which has no nodes. Its normals depend on the positions of the points.
 
     Parameters
     ----------
     secondary : csr_array (n, n_points)
-        Weights of the nodes.
+        Shape functions of the points, by node [-].
     obstacle : RigidSide
     coordinates : ndarray (n_points, dim)
         Coordinates of the pairing [length].
@@ -286,20 +333,20 @@ Points = _SurfacePoints | _ObstaclePoints
 
 @dataclass(frozen=True, eq=False)
 class Closing:
-    """Correction q m for the part of a relative motion that closes a gap, ``q = a . o / a . m``, see `Slips`.
+    """Part q m of a relative motion that closes a gap, with ``q = a . o / a . m``; see `Slips`.
 
     Attributes
     ----------
     mean, size : ndarray (n, dim), ndarray (n, 1)
-        Mean direction m of both sides' normals, and the length of their difference [-].
+        Mean direction m of the normals of both sides, and the length of the difference of these normals [-].
     secondary : NodalNormals or InterpolatedNormals
         Normals of the secondary side.
     opening : ndarray (n, dim)
-        Distance o of both sides at the beginning of the step [length].
+        Vector o from the primary to the secondary side at the beginning of the step [length].
     length : ndarray (n,)
-        q [length]; zero where nothing closes.
+        Length q; zero where no gap closes [length].
     along_mean : bool
-        Whether the direction a is m, and not the normal of the constraint.
+        Whether the direction a is m; otherwise it is the normal of the constraint.
     """
 
     mean: Array
@@ -313,7 +360,10 @@ class Closing:
     def of(
         cls, primary: Array, secondary: NodalNormals | InterpolatedNormals, opening: Array, length: Array | None = None
     ) -> Closing:
-        """Return the closing motion between sides with normals `primary` (n, dim) and `secondary`, along m by default."""
+        """Return the closing motion between sides with the normals `primary` (n, dim) and `secondary`.
+
+        Without a given `length` (n,), the direction a is m.
+        """
         mean = primary - secondary.normal
         size = np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), TINY)
         mean /= size
@@ -322,11 +372,15 @@ class Closing:
 
     @property
     def vector(self) -> Array:
-        """q m (n, dim) [length]."""
+        """The vectors q m (n, dim) [length]."""
         return self.length[:, None] * self.mean
 
     def along(self, du: Array, normal: tuple[Array, Array], primary: Array, opening: Array) -> Array:
-        """Return the variation (n, dim) [length] from those of normals of the constraints, of `primary` and of `opening`."""
+        """Return the variation (n, dim) of q m [length].
+
+        `normal` contains the normals of the constraints and their variation; `primary` and `opening` are the variations of
+        the primary normals and of o, all (n, dim).
+        """
         mean = self.mean
         turned = across(mean, primary - self.secondary.along(du)) / self.size
         a, varied = (mean, turned) if self.along_mean else normal
@@ -341,25 +395,28 @@ class Closing:
 class Slips:
     r"""Slips in a step at n points or weighted gaps along k tangents t, and the tangential forces.
 
-    They are the components of
+    Slips are the components along t of s,
 
     .. math:: s = r + q m, \qquad q = \frac{a \cdot o}{a \cdot m}, \qquad
               \delta (t \cdot s) = t \cdot \delta s - (t \cdot \delta n) (n \cdot s)
 
     with the relative motion r of the step. If slip is symmetric, adding q m removes the part of the motion that closes the
-    initial distance o. Both r and o vary as points face other primary points: :math:`\delta r = - \sum_k N_{k, \alpha}
-    \Delta u_k \delta \xi^\alpha`, and o in the same way with the initial positions instead of the displacement increments.
+    initial distance o along the normal a of the constraint or along m. Both r and o vary as points face other primary
+    points: :math:`\delta r = - \sum_k N_{k, \alpha} \Delta u_k \delta \xi^\alpha`, and o in the same way with the initial
+    positions instead of the displacement increments.
 
     Attributes
     ----------
     tangents : ndarray (k, n, dim)
+        Unit tangents t [-].
     forces : ndarray (n, k)
-        [force].
+        Tangential forces along the tangents [force].
     total : ndarray (n, dim)
-        s [length].
+        Slip vectors s [length].
     motion, start : ndarray (n_points, dim)
         Increments of displacements in the step and positions at its beginning, of all nodes [length].
     closing : Closing, optional
+        Part q m; None for obstacles and if slip is not symmetric.
     turning : ndarray (dim, dim), optional
         Derivative of the motion that points share with a rotating obstacle with respect to their displacements [-].
     """
@@ -385,7 +442,7 @@ class Slips:
         weights: csr_array | None,
         normals: tuple[Array, Array, Array],
     ) -> Array:
-        """Return how slips (k, n) vary with displacements [length].
+        """Return the variation (k, n) of slips for a variation of the displacements [length].
 
         Parameters
         ----------
@@ -397,17 +454,17 @@ class Slips:
         weights : csr_array (n, n_points) or None
             Weights of the points in the slips; None if each slip is that of one point.
         normals : (ndarray (n, dim), ndarray (n, dim), ndarray (n, dim))
-            Normals of the constraints, how they vary, and how the `primary` normals of `closing` vary.
+            Normals of the constraints, their variation, and the variation of the primary normals of `closing` [-].
         """
 
-        def faced(values: Array) -> Array:
+        def by_sliding(values: Array) -> Array:
             return -_weighted(weights, np.einsum("nid,ni->nd", points.slopes(values), varied.xi))
 
-        change, (normal, turned, primary) = faced(self.motion), normals
+        change, (normal, turned, primary) = by_sliding(self.motion), normals
         if self.turning is not None:
             change -= _weighted(weights, points.motion @ du @ self.turning)
         if self.closing is not None:
-            change += self.closing.along(du, (normal, turned), primary, faced(self.start))
+            change += self.closing.along(du, (normal, turned), primary, by_sliding(self.start))
         leaning = np.einsum("nd,nd->n", normal, self.total)
         return np.einsum("knd,nd->kn", self.tangents, change) - np.einsum(
             "knd,nd,n->kn", self.tangents, turned, leaning
@@ -428,7 +485,7 @@ def _turned(multiplier: Array, tangential: Array | None, normal: Array, varied: 
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """Contact forces, gaps and slips of one pair, linearised at its pairing, and at multipliers and displacements.
+    """Contact forces, gaps and slips of one pair, linearised about a pairing and the multipliers found with it.
 
     Attributes
     ----------
@@ -438,15 +495,17 @@ class Linearised:
     functions : csr_array (m, n) or None
         Weights of the n points in the gaps, divided by the weight of each constraint; None if each gap is that of one point.
     normal : ndarray (m, dim)
-        Normals of the constraints.
+        Normals of the constraints [-].
     multiplier : ndarray (m,)
+        Lagrange multipliers of the constraints [force].
     tests : csr_array (m, n), optional
-        Weights of the points in the mean normals, if these are the normals of the constraints.
+        Weights of the points in the mean normals, if the normals of the constraints are such means.
     nodal : NodalNormals or Points, optional
         Source of the normals of the constraints if they are neither means over the points nor those of the points.
     slips : Slips, optional
+        Slips of the constraints; None without tangential constraints.
     place : (ndarray of int (m,), int), optional
-        Rows of the constraints of the pair in which the m ones of this object are, and their number.
+        Rows of the m constraints among all constraints of the pair, and the number of the latter.
     smooth : (InterpolatedNormals, ndarray (n, dim - 1, dim)), optional
         Primary normals of the slips, and their derivatives along facets, where they are not those of the points.
     """
@@ -498,7 +557,7 @@ class Linearised:
         return np.where(length > 0.0, length, 1.0)
 
     def _normals(self, du: Array, at_points: Array) -> Array:
-        """Return how the normals (m, dim) of the constraints vary, from the variation of those at the points (n, dim)."""
+        """Return the variation (m, dim) of the normals of the constraints, given the variation (n, dim) at the points."""
         if self.tests is None:
             return _weighted(self.functions, at_points)
         if isinstance(self.nodal, NodalNormals):
@@ -508,15 +567,15 @@ class Linearised:
         return across(self.normal, self._mean(at_points)) / self._length
 
     def _mean(self, vectors: Array) -> Array:
-        """Return integrals (m, dim) of vectors at the points (n, dim) with the tests of nodes."""
+        """Return the sums (m, dim) of vectors at the points (n, dim), weighted with `tests`."""
         assert self.tests is not None
         total = np.asarray(self.tests @ vectors)
         self.side.add_across_ends(total)
         return total
 
 
-# A function of the multipliers (m,) and tangential forces (m, k) [force] and the displacements (n_points, dim) [length] of
-# the solution.
+# A function that returns the linearised geometry for the multipliers (m,) [force], the tangential forces (m, k) [force] and
+# the displacements (n_points, dim) [length] of a solution.
 Geometry = Callable[[Array, Array, Array], Linearised]
 
 
@@ -524,10 +583,9 @@ def faced(
     candidates: Candidates, pairing: Pairing, rows: Indices, primary: Surface | RigidSide, coordinates: Array,
     normals: object, pose: Pose, closest: bool = False,
 ) -> Points:  # fmt: skip
-    """Return the points `rows` (n,) of a `pairing` computed at `coordinates` (n_points, dim) [length].
+    """Return the points in the rows `rows` (n,) of `pairing`, which was computed at `coordinates` (n_points, dim) [length].
 
-    The primary side is an obstacle in its `pose`, or has `normals` as in `pairing.pair`; with `closest`, it is paired with
-    facet normals instead.
+    `pose` applies to obstacles. `normals` and `closest` apply to meshed primary sides and are described for `_SurfacePoints`.
     """
     if not isinstance(primary, RigidSide):
         return _SurfacePoints(candidates, pairing, rows, primary, coordinates, normals, closest)

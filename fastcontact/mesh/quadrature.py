@@ -1,6 +1,7 @@
 """Quadrature rules on reference lines, triangles, squares and solids.
 
-A `Rule` consists of points (n_q, dim) and weights (n_q,), both dimensionless [-].
+A `Rule` is a pair of points (n_q, dim) in reference coordinates and weights (n_q,), both dimensionless [-]. The weights add
+up to the measure of the reference cell.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from fastcontact.arrays import Array
 Rule = tuple[Array, Array]
 
 
-@cache  # used in every pairing of mortar in two dimensions
+@cache  # mortar contact calls it in every pairing in 2D
 def gauss_line(n: int) -> Rule:
     """Return the Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)
@@ -27,7 +28,7 @@ def simpson_line() -> Rule:
 
 
 def gauss_square(n: int) -> Rule:
-    """Return the tensor Gauss rule with n x n points on [-1, 1]^2."""
+    """Return the tensor-product Gauss rule with n x n points on [-1, 1]^2, exact to degree 2n - 1 in each coordinate."""
     return square(gauss_line(n))
 
 
@@ -37,28 +38,28 @@ def triangle_1() -> Rule:
 
 
 def triangle_3() -> Rule:
-    """Return the rule of three interior points of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
+    """Return the rule with three interior points of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
     return np.array([[1.0, 1.0], [4.0, 1.0], [1.0, 4.0]]) / 6.0, np.full(3, 1.0 / 6.0)
 
 
 def triangle_6() -> Rule:
-    """Return the rule of six interior points of the triangle, exact to degree 4 (Dunavant, 1985)."""
+    """Return the rule with six interior points of the triangle, exact to degree 4 (Dunavant, 1985)."""
     return _symmetric([], [(0.223381589678011, 0.445948490915965), (0.109951743655322, 0.091576213509771)], [])
 
 
 def triangle_3_sides() -> Rule:
-    """Return the rule of the middles of the sides of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
+    """Return the rule with the midpoints of the sides of the triangle, exact to degree 2 (Strang and Fix, 1973)."""
     return np.array([[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]]) / 2.0, np.full(3, 1.0 / 6.0)
 
 
 def triangle_7() -> Rule:
-    """Return the rule of seven interior points of the triangle, exact to degree 5 (Radon, 1948)."""
+    """Return the rule with seven interior points of the triangle, exact to degree 5 (Radon, 1948)."""
     roots = np.sqrt(15.0) * np.array([1.0, -1.0])
     return _symmetric([9.0 / 40.0], [((155.0 + root) / 1200.0, (6.0 + root) / 21.0) for root in roots], [])
 
 
 def triangle_12() -> Rule:
-    """Return the rule of twelve interior points of the triangle, exact to degree 6 (Dunavant, 1985)."""
+    """Return the rule with twelve interior points of the triangle, exact to degree 6 (Dunavant, 1985)."""
     return _symmetric(
         [],
         [(0.1167862757263978, 0.2492867451708992), (0.05084490637020978, 0.06308901449150417)],
@@ -67,7 +68,7 @@ def triangle_12() -> Rule:
 
 
 def triangle_16() -> Rule:
-    """Return the rule of sixteen interior points of the triangle, exact to degree 8 (Dunavant, 1985)."""
+    """Return the rule with sixteen interior points of the triangle, exact to degree 8 (Dunavant, 1985)."""
     return _symmetric(
         [0.144315607677777],
         [
@@ -80,7 +81,11 @@ def triangle_16() -> Rule:
 
 
 def _symmetric(centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
-    """Return a rule on the triangle from its orbits: weights (of sum 1), and coordinates up to permutation."""
+    """Return the symmetric rule on the triangle with the given orbits.
+
+    Each orbit is given by the weight of its points and by their independent barycentric coordinates: none for the centroid,
+    one for orbits of three points, and two for orbits of six. The weights of all points add up to 1.
+    """
     points, weights = [[1.0 / 3.0, 1.0 / 3.0] for _ in centre], list(centre)
     for weight, a in threes:
         points += [[a, a], [1 - 2 * a, a], [a, 1 - 2 * a]]
@@ -93,12 +98,12 @@ def _symmetric(centre: list[float], threes: list[tuple[float, float]], sixes: li
 
 
 def triangle(degree: int) -> Rule:
-    """Return the symmetric rule on the triangle that is exact to `degree`: 2, 4, 6 or 8 with 3, 6, 12 or 16 points."""
+    """Return the symmetric rule on the triangle that is exact to `degree` 2, 4, 6 or 8; it has 3, 6, 12 or 16 points."""
     return {2: triangle_3, 4: triangle_6, 6: triangle_12, 8: triangle_16}[degree]()
 
 
 def triangle_7_closed() -> Rule:
-    """Return the rule of the corners, the middles of the sides and the centre of the triangle.
+    """Return the rule with the corners, the midpoints of the sides and the centroid of the triangle.
 
     It is exact to degree 3, and all weights are positive (Hammer and Stroud, 1956).
     """
@@ -107,7 +112,7 @@ def triangle_7_closed() -> Rule:
 
 
 def quartered_triangle(rule: Rule) -> Rule:
-    """Return a rule on the triangle applied to its four quarters, with coincident points merged."""
+    """Return the composite rule on the four congruent quarters of the triangle, with coincident points merged."""
     points, weights = rule
     shifts = np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.5]])
     pieces = [shift + 0.5 * points for shift in shifts] + [0.5 - 0.5 * points]
@@ -130,7 +135,7 @@ def _merged(points: Array, weights: Array) -> Rule:
 
 
 def gauss_cube(n: int) -> Rule:
-    """Return the tensor Gauss rule with n x n x n points on [-1, 1]^3."""
+    """Return the tensor-product Gauss rule with n x n x n points on [-1, 1]^3, exact to degree 2n - 1 in each coordinate."""
     x, w = np.polynomial.legendre.leggauss(n)
     X, Y, Z = np.meshgrid(x, x, x, indexing="ij")
     return np.column_stack([X.ravel(), Y.ravel(), Z.ravel()]), np.einsum("i,j,k->ijk", w, w, w).ravel()
@@ -142,7 +147,7 @@ def tetrahedron_1() -> Rule:
 
 
 def tetrahedron_5() -> Rule:
-    """Return the rule of five points of the tetrahedron, exact to degree 3 (Hammer, Marlowe and Stroud, 1956).
+    """Return the rule with five points of the tetrahedron, exact to degree 3 (Hammer, Marlowe and Stroud, 1956).
 
     The weight of the centroid is negative.
     """
@@ -159,11 +164,11 @@ def prism(triangle: Rule, line: Rule) -> Rule:
 
 
 def pyramid_5() -> Rule:
-    """Return the rule of five points of the pyramid with base [-1, 1]^2 at z = 0 and apex (0, 0, 1), exact to degree 2.
+    """Return the rule with five points of the pyramid with base [-1, 1]^2 at z = 0 and apex (0, 0, 1), exact to degree 2.
 
-    Four points lie above the middles of the half diagonals of the base and one on the axis, with equal weights. The heights h
-    and k solve 4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, so that 1, z and z^2 are integrated exactly. code_aster has the same rule
-    in PYRAM5.
+    Four points lie above the midpoints of the half diagonals of the base, and one lies on the axis. All weights are equal.
+    The heights h and k solve 4 h + k = 5/4 and 4 h^2 + k^2 = 1/2, so that 1, z and z^2 are integrated exactly. code_aster
+    has the same rule in PYRAM5.
     """
     h, k = (10.0 - np.sqrt(15.0)) / 40.0, 0.25 + np.sqrt(15.0) / 10.0
     points = [[0.5, 0.5, h], [-0.5, 0.5, h], [-0.5, -0.5, h], [0.5, -0.5, h], [0.0, 0.0, k]]
@@ -173,9 +178,9 @@ def pyramid_5() -> Rule:
 def conical_pyramid(n: int) -> Rule:
     """Return the conical product rule with n x n x n points on the pyramid of `pyramid_5`, exact to degree 2n - 1.
 
-    It is a Gauss-Legendre rule in x / (1 - z) and y / (1 - z), and a Gauss-Jacobi rule with the weight (1 - z)^2 in z
-    (Stroud, 1971, section 2.5). It is also exact for the rational shape functions of pyramids, which are polynomials in these
-    coordinates.
+    It is the product of Gauss-Legendre rules in x / (1 - z) and y / (1 - z) and of a Gauss-Jacobi rule with the weight
+    (1 - z)^2 in z (Stroud, 1971, section 2.5). It is also exact for the rational shape functions of pyramids, which are
+    polynomials in these coordinates.
     """
     x, w = np.polynomial.legendre.leggauss(n)
     z, v = _gauss_squared_complement(n)
@@ -187,7 +192,8 @@ def conical_pyramid(n: int) -> Rule:
 def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
     """Return the Gauss rule with `n` points on [0, 1] for the weight (1 - z)^2 (Golub and Welsch, 1969).
 
-    Its points follow from the eigenvalues of the recurrence matrix of the Jacobi polynomials with exponents 2 and 0.
+    Its points are the eigenvalues of the recurrence matrix of the Jacobi polynomials with exponents 2 and 0, mapped to
+    [0, 1].
     """
     k = np.arange(n)
     diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
@@ -198,9 +204,10 @@ def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
 
 
 def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
-    """Return a product rule with `n` points along each direction on the reference cell of a linear element.
+    """Return a product rule on the reference cell of the linear element `cell`, with `n` points in each direction.
 
-    The Cartesian directions of squares, cubes and prisms have `straight` points instead, if given.
+    If `straight` is given, it replaces `n` in the Cartesian directions of squares, cubes and prisms. Raises KeyError for an
+    unknown element.
     """
     m = n if straight is None else straight
     return {
@@ -215,7 +222,7 @@ def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
 
 
 def subdivided(rule: Rule, count: int) -> Rule:
-    """Return a rule on [-1, 1] applied to `count` equal intervals, with coincident points merged."""
+    """Return the composite rule on `count` equal intervals of [-1, 1], with coincident points merged."""
     points, weights = rule
     left = -1.0 + 2.0 * np.arange(count) / count
     all_points = (left[:, None] + (points[:, 0] + 1.0) / count).ravel()
@@ -225,7 +232,7 @@ def subdivided(rule: Rule, count: int) -> Rule:
 def collapsed_triangle(n: int) -> Rule:
     """Return the product rule with n x n points on the triangle (0, 0), (1, 0), (0, 1), exact to degree 2n - 2.
 
-    It is a Gauss-Legendre rule in x and in y / (1 - x) (Stroud, 1971, section 2.4).
+    It is the product of Gauss-Legendre rules in x and in y / (1 - x) (Stroud, 1971, section 2.4).
     """
     s, w = np.polynomial.legendre.leggauss(n)
     s, w = (1.0 + s) / 2.0, w / 2.0
@@ -236,7 +243,7 @@ def collapsed_triangle(n: int) -> Rule:
 def collapsed_tetrahedron(n: int) -> Rule:
     """Return the product rule with n x n x n points on the tetrahedron of `tetrahedron_1`, exact to degree 2n - 3.
 
-    It extends `collapsed_triangle` in the same way by one dimension (Stroud, 1971, section 2.4).
+    It extends `collapsed_triangle` by one dimension (Stroud, 1971, section 2.4).
     """
     s, w = np.polynomial.legendre.leggauss(n)
     s, w = (1.0 + s) / 2.0, w / 2.0

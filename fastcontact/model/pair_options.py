@@ -1,4 +1,4 @@
-"""Options of contact pairs: their types, and checks and conversion of the options of all formulations."""
+"""Options of contact pairs: types of all options, and the conversion of those that do not depend on the formulation."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from fastcontact.model.ramp import History, table_of
 
 
 class FormulationOptions(TypedDict, total=False):
-    """Options of formulations: first those of all formulations, then those of single ones."""
+    """Options that are arguments of formulations: the first five of every formulation, the others of some formulations."""
 
     friction: float | None
     surface_smoothing: bool | None
@@ -38,7 +38,7 @@ class FormulationOptions(TypedDict, total=False):
 
 
 class SharedOptions(TypedDict, total=False):
-    """Options of every contact pair, whatever its formulation."""
+    """Options that do not depend on the formulation of a contact pair; units are stated in `PairOptions`."""
 
     kind: str | None
     clearance: Value | None
@@ -60,11 +60,12 @@ class SharedOptions(TypedDict, total=False):
 
 
 class ContactOptions(FormulationOptions, SharedOptions, total=False):
-    """Options of `add_contact` other than the sides."""
+    """Options of `Model.add_contact`, which describes them, except for the two sides."""
 
 
 SHARED_OPTIONS = tuple(sorted(SharedOptions.__annotations__))
-# Required and optional numbers of a cohesive layer and of adhesion.
+# Names of the required and of the optional constants of a cohesive layer and of adhesion. Those in CHOICES have names as
+# values, all others positive numbers.
 LAWS = {
     "cohesion": (
         ("strength", "energy"),
@@ -80,7 +81,8 @@ def pair_options(
 ) -> PairOptions:
     """Return the options of contact pair `name` with the secondary `side`, converted for formulations.
 
-    Raises ContactError or ModelError if an option is wrong; the message names the pair.
+    `mesh` contains the groups that options name. Raises ContactError or ModelError if an option is invalid; the message names
+    the pair.
     """
     if against_obstacle and "clearance_primary" in options:
         raise ContactError(
@@ -118,15 +120,13 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
     excess = [option for option in exclusive if option in options and option != chosen[0]]
     if excess or options.get("kind", "unilateral") != "unilateral":
         other = (excess or ["kind"])[0]
-        raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of both")
+        raise ContactError(f"contact '{name}' has {chosen[0]}, which excludes {other}: leave out one of the two")
     option, constants = chosen[0], options[chosen[0]]
-    needed, allowed = LAWS[option]
-    if not isinstance(constants, Mapping) or not set(needed) <= set(constants):
-        raise ContactError(
-            f"the {option} of contact '{name}' must give its {' and its '.join(needed)}, each by its name"
-        )
+    required, optional = LAWS[option]
+    if not isinstance(constants, Mapping) or not set(required) <= set(constants):
+        raise ContactError(f"the {option} of contact '{name}' needs {' and '.join(required)}, each given by name")
     for key, value in constants.items():
-        check_known(f"number of the {option} of contact '{name}'", key, needed + allowed, ContactError)
+        check_known(f"constant of the {option} of contact '{name}'", key, required + optional, ContactError)
         if key in CHOICES:
             check_known(f"{key} in the {option} of contact '{name}'", value, CHOICES[key], ContactError)
             continue
@@ -134,16 +134,16 @@ def _cohesion(name: str, options: Mapping[str, Any]) -> CohesiveLaw | None:
         if not value > 0:
             raise ContactError(f"the {key} {value} in the {option} of contact '{name}' must be positive")
     law = cohesive_law(
-        *(float(constants[key]) for key in needed),
+        *(float(constants[key]) for key in required),
         reversible=option == "adhesion",
-        **{key: value if key in CHOICES else float(value) for key, value in constants.items() if key in allowed},
+        **{key: value if key in CHOICES else float(value) for key, value in constants.items() if key in optional},
     )
-    shares = np.linspace(0.0, 1.0, 65)
-    onset, end = law.limits(np.sqrt(1.0 - shares), np.sqrt(shares))
+    shear_fractions = np.linspace(0.0, 1.0, 65)
+    onset, end = law.limits(np.sqrt(1.0 - shear_fractions), np.sqrt(shear_fractions))
     if not (onset < end).all():
         raise ContactError(
-            f"the {option} of contact '{name}' would break before its traction falls: its stiffness {law.stiffness:g} must "
-            f"be above {law.stiffness * float((onset / end).max()):g}, strength^2 / (2 energy)"
+            f"the {option} of contact '{name}' would fail before its traction decreases: its stiffness {law.stiffness:g} "
+            f"must be above {law.stiffness * float((onset / end).max()):g}, strength^2 / (2 energy)"
         )
     return law
 
@@ -166,9 +166,7 @@ def _kind(name: str, options: Mapping[str, Any], against_obstacle: bool) -> str:
         raise ContactError(f"contact '{name}' is {kind}, which does not wear: leave out 'wear' or 'kind'")
     for option in ("clearance", "clearance_primary", "penalty", "search_distance"):
         if kind == "tied" and option in options:
-            raise ContactError(
-                f"contact '{name}' is tied, which keeps the sides as they lie, exactly: leave out '{option}'"
-            )
+            raise ContactError(f"contact '{name}' is tied, which keeps the initial gaps exactly: leave out '{option}'")
     return str(kind)
 
 
@@ -224,15 +222,15 @@ def _vector(name: str, option: str, options: Mapping[str, Any], dim: int) -> Arr
 
 
 def _penalty(name: str, options: Mapping[str, Any]) -> float | OverclosureLaw | None:
-    """Return a stiffness per area, or the law of a table or of the constants of an exponential law."""
+    """Return a stiffness per area, or the law that a table or the constants of an exponential law define."""
     penalty = options.get("penalty")
     if isinstance(penalty, Mapping):
         for key, value in penalty.items():
             check_number(f"the {key} in the penalty of contact '{name}'", value)
         if set(penalty) != {"clearance", "pressure"} or min(penalty.values()) <= 0.0:
             raise ContactError(
-                f"an exponential penalty of contact '{name}' has two positive numbers, the pressure at a gap of zero and the "
-                "clearance at which a hundredth of it is left: {'clearance': 0.001, 'pressure': 5.0}"
+                f"an exponential penalty of contact '{name}' needs two positive numbers, the pressure at a gap of zero and "
+                "the clearance at which 1 % of this pressure remains: {'clearance': 0.001, 'pressure': 5.0}"
             )
         return ExponentialLaw(**penalty)
     if isinstance(penalty, (Sequence, np.ndarray)) and not isinstance(penalty, str):
@@ -251,7 +249,7 @@ def _all_positive(penalty: Field, name: str, positions: Array) -> Array:
     if not (values > 0).all():
         raise ContactError(
             f"the tangential_penalty {values.min():g} of contact '{name}' must be positive; leave it out for stick without "
-            "slip"
+            "elastic slip"
         )
     return values
 
@@ -284,7 +282,9 @@ def _nodes(name: str, option: str, options: Mapping[str, Any], mesh: Mesh, side:
                 "only that side carries constraints; swap the sides or name other nodes"
             )
     if option == "excluded" and mask[side.points].all():
-        raise ContactError(f"contact '{name}' excludes all nodes of '{side.group}': nothing is left to touch")
+        raise ContactError(
+            f"contact '{name}' excludes all nodes of '{side.group}': no node remains that could be in contact"
+        )
     return mask
 
 

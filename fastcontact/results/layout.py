@@ -1,21 +1,22 @@
-"""Layout of result files.
+"""Layout of result files, and the arrays that are written to them.
 
 A result file is an HDF5 file with two groups. Viewers read the first group, which has the layout of VTKHDF files:
 
     VTKHDF/Points, Connectivity, Offsets, Types     the mesh: solid cells only, three coordinates
-    VTKHDF/PointData, CellData                      fields; a data set contains a field of all steps in sequence
+    VTKHDF/PointData, CellData                      fields; each data set contains one field at all steps in sequence
     VTKHDF/Steps                                    NSteps, load factors, and offsets of the fields of each step
 
 The second group contains the data that VTKHDF does not support:
 
     fastcontact/mesh                                points, cells of all dimensions, groups
     fastcontact/kinematics, case, versions, units   JSON texts; units if the model defines them
-    fastcontact/steps                               a row for each step (STEP_ROW), with the position of its notes
+    fastcontact/steps                               a row for each step (STEP_ROW), which locates its notes
     fastcontact/contact/0, 1, ...                   for each pair: its name, a row for each secondary node and step, a row for
                                                     each primary node and step, and a row for each step
-    fastcontact/materials                           at interfaces: material of cells, stress by material, a row for each step
+    fastcontact/materials                           material of each cell, nodal stress by material at interfaces, a row for
+                                                    each step (SIDES_STEP); only in models with material interfaces
     fastcontact/notes                               JSON texts in sequence: iterations, warnings, ends of runs
-    fastcontact/runs                                a row for each run (RUN_ROW), with the position of its notes
+    fastcontact/runs                                a row for each run (RUN_ROW), which locates its record in the notes
     fastcontact/restart0, restart1                  packed restart data of the last two steps
 
 A new nodal array needs an attribute of `step.StepResult`, its value in `analysis.load_step`, its name in POINT_FIELDS, a
@@ -42,10 +43,10 @@ from fastcontact.results.step import ContactResult, StepResult
 
 
 def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
-    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress (m, ...) [pressure].
+    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress at them [pressure].
 
-    The points of `mesh` are the first points of the new mesh, which has only solid cells and no groups. Stress has the
-    components of `StepResult.stress`. Without interfaces `mesh` is returned.
+    The first points of the cut mesh are those of `mesh`; it has only solid cells and no groups. The stress (m, n_components)
+    has the components of `StepResult.stress`. Without interfaces, `mesh` itself is returned.
     """
     material_stress = step.material_stress
     if material_stress is None:
@@ -63,21 +64,21 @@ def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
 
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
-    """Return the mean (n_solids, n_components) [pressure] over the nodes of each cell of the stress of its material."""
+    """Return the mean (n_solids, n_components) of the nodal stress of its material over the nodes of each cell [pressure]."""
     separate_mesh, _, stress = separated(mesh, step)
     return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])
 
 
 Flags = NDArray[np.int8]
 
-# Version of the layout. Version 2 introduced the restart state and records of runs, version 3 the centre of a contact, and
-# version 4 the slip.
+# Version of the layout. Version 2 introduced the restart data and the records of runs, version 3 the middle of a contact,
+# and version 4 the slip.
 SCHEMA = 4
-# Oldest version that can be resumed.
+# Oldest version of files to which a resumed analysis can append steps.
 RESUMABLE = 2
 
-# Point data by name, with the number of components that viewers expect: 3 for vectors and 6 for symmetric tensors, of which
-# plane models have 2 and 4.
+# Number of components of point data in files, by name: 3 for vectors and 6 for symmetric tensors, as viewers expect. 2D
+# models have 2 and 4 of these components, and the others are zero.
 POINT_FIELDS = {
     "displacement": 3,
     "stress": 6,
@@ -93,7 +94,8 @@ HEAT_FIELDS = {"temperature": 1, "heat_reaction": 1}
 # Optional columns of contact tables.
 OPTIONAL_COLUMNS = ("wear", "heat_flux", "damage", "fluid_pressure", "sliding_load")
 
-# Cell data of models with material interfaces: the mean over the nodes of a cell of the nodal stress of its material.
+# Number of components of the cell data of models with material interfaces: the nodal stress of the material of a cell,
+# averaged over the nodes of the cell, and its von Mises stress.
 CELL_STRESS = "stress_in_cell"
 CELL_VON_MISES = "von_mises_in_cell"
 MATERIAL_FIELDS = {CELL_STRESS: 6, CELL_VON_MISES: 1}
@@ -107,17 +109,17 @@ XDMF_TYPES = {
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
-# Columns with the position of the rows of a contact pair for a step.
+# Columns that contain the first row and the number of rows of a contact pair at a step.
 PLACES = ("first", "count", "primary_first", "primary_count")
 
-# Row of a step with the position of its nodal stress by material.
+# Row of a step: first row and number of rows of its nodal stress by material.
 SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 
 # Row of a run: number of completed steps, and the position of its record in the notes.
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
 
 
-# Objects, in addition to steps, that a file needs to be resumed.
+# Objects, besides the steps, without which a file cannot be resumed.
 CONTINUED = (
     "fastcontact/runs", "fastcontact/notes", "fastcontact/contact", "VTKHDF/CellData", "VTKHDF/Types", "VTKHDF/Steps/Values",
     "VTKHDF/Steps/PointDataOffsets", "VTKHDF/Steps/CellDataOffsets",
@@ -125,7 +127,7 @@ CONTINUED = (
 
 
 def restart_table(number: int) -> str:
-    """Return the name of the table for the restart state of a step.
+    """Return the name of the table for the restart data of the step with a given number.
 
     Two tables alternate, so that the table of the last step is complete while the other is written.
     """
@@ -138,7 +140,7 @@ def further_columns(contact: ContactResult) -> tuple[str, ...]:
 
 
 def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
-    """Return the type of a row for a secondary node of a pair in a step; `further` are its `further_columns`."""
+    """Return the data type of the row of a secondary node of a pair at a step; `further` are its `further_columns`."""
     names = ("abscissa", "place", "gap", "pressure", "multiplier", *further)
     scalars = [(name, "<f8") for name in names]
     vectors = [
@@ -148,15 +150,15 @@ def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
 
 
 def primary_row(dim: int) -> np.dtype[Any]:
-    """Return the type of a row for the force on a primary node of a pair in a step."""
+    """Return the data type of the row of a primary node of a pair at a step, with its contact force."""
     return np.dtype([("points", "<i4"), ("force_vectors", "<f8", (dim,))])
 
 
 def contact_step(dim: int) -> np.dtype[Any]:
-    """Return the type of the row of a contact pair for a step.
+    """Return the data type of the row of a contact pair at a step.
 
-    The row contains the position of the rows of nodes in `PLACES`, and attributes of `step.ContactResult`, with NaN for None.
-    Some files of schema 2 have neither the table of `primary_row` nor its position.
+    The row contains the columns PLACES, which locate the rows of its nodes, and attributes of `step.ContactResult`, with NaN
+    for None. Some files of schema 2 have neither the table with the type `primary_row` nor the columns that refer to it.
     """
     sums = [("force", "<f8", (dim,)), ("radius", "<f8", (2,)), ("dissipation", "<f8")]
     sums.append(("obstacle_displacement", "<f8", (dim,)))  # NaN for contact between bodies
@@ -166,7 +168,7 @@ def contact_step(dim: int) -> np.dtype[Any]:
 
 
 def material_row(dim: int) -> np.dtype[Any]:
-    """Return the type of a row for the nodal stress of one material at an interface in a step."""
+    """Return the data type of the row of the stress of one material at a node on an interface at a step."""
     return np.dtype([("points", "<i4"), ("material", "<i4"), ("stress", "<f8", (4 if dim == 2 else 6,))])
 
 
@@ -198,7 +200,7 @@ def solid_cells(mesh: Mesh) -> SolidCells:
 
 
 def xdmf_topology(mesh: Mesh) -> Numbers | None:
-    """Return the XDMF code and the nodes of all solid cells in sequence, or None if XDMF does not support an element."""
+    """Return, in sequence, the XDMF code and the nodes of each solid cell, or None if XDMF does not support an element."""
     codes = [XDMF_TYPES.get(elements.get(name).vtk) for name in mesh.solids]
     known = [code for code in codes if code is not None]
     if not codes or len(known) < len(codes):
@@ -216,7 +218,10 @@ def padded(values: Array, width: int) -> Array:
 
 
 def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
-    """Return the contact pressure (n_points,) [pressure], which is zero outside the contact."""
+    """Return the contact pressure (n_points,) [pressure].
+
+    It is zero outside the contact, and the largest pressure at a point that belongs to several pairs.
+    """
     pressure = np.zeros(mesh.n_points)
     for contact in step.contact.values():
         np.maximum.at(pressure, contact.points, contact.pressure)
@@ -224,7 +229,10 @@ def contact_pressure(mesh: Mesh, step: StepResult) -> Array:
 
 
 def contact_slip(mesh: Mesh, step: StepResult, name: str) -> Array:
-    """Return ``"slip"`` or ``"slip_total"`` (n_points, dim) [length]; the largest value if a point has several pairs."""
+    """Return the field `name`, ``"slip"`` or ``"slip_total"`` (n_points, dim) [length].
+
+    At a point that belongs to several pairs it is the slip with the largest component. Outside the contact it is zero.
+    """
     slip = np.zeros((mesh.n_points, mesh.dim))
     for contact in step.contact.values():
         values = getattr(contact, name)
@@ -251,7 +259,7 @@ def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:
-    """Return, as ``group_<name>``, 1 inside and 0 outside for each group of points or facets."""
+    """Return a flag (n_points,) for each group of points or facets, called ``group_<name>``: 1 inside and 0 outside."""
     members = {}
     for name in mesh.group_names:
         if name in mesh.point_groups:
@@ -262,7 +270,7 @@ def point_flags(mesh: Mesh) -> dict[str, Flags]:
 
 
 def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
-    """Return the body of each solid cell and, as ``group_<name>``, 1 inside and 0 outside for each group of solids."""
+    """Return the number of the body of each solid cell, and a flag for each group of solids as in `point_flags`."""
     first = np.concatenate([np.empty(0, np.int32), *(block[:, 0] for block in mesh.solids.values())])
     starts = starts_of(mesh.solids)
     members = {}
@@ -274,7 +282,7 @@ def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
 
 
 def _plain(name: str) -> str:
-    """Return a name in ASCII, which old viewers require, without slashes, which separate groups in HDF5."""
+    """Return a name in ASCII without slashes: old viewers require ASCII, and slashes separate groups in HDF5."""
     letters = unicodedata.normalize("NFKD", name.replace("/", "_"))
     return "".join(c if c.isascii() else "_" for c in letters if not unicodedata.combining(c))
 

@@ -1,4 +1,4 @@
-"""Results as tables, which are NumPy structured arrays, as CSV files, and as objects of PyVista, pandas and xarray."""
+"""Tables of results as NumPy structured arrays and CSV files, and conversion of results to PyVista, pandas and xarray."""
 
 from __future__ import annotations
 
@@ -27,14 +27,16 @@ STRESS_COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
 
 @typed(CaseError)
 def contact_table(contact: ContactResult, step: StepResult | None = None) -> AnyArray:
-    """Return the state of a contact pair as a table with a row for each secondary node, in order along the surface.
+    """Return the state of a contact pair as a table with a row for each secondary node.
+
+    In 2D the nodes are ordered along the surface, in 3D by their numbers.
 
     Parameters
     ----------
     contact : ContactResult
         Result of a contact pair.
     step : StepResult, optional
-        The step to which the result belongs; it adds columns with fields of the body.
+        The step to which the result belongs, for columns with the fields of the body.
 
     Returns
     -------
@@ -43,11 +45,11 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
 
         - ``point``: number of the node;
         - ``x``, ``y`` and, in 3D, ``z``: reference coordinates [length];
-        - ``abscissa``, ``place`` and ``gap``, see `ContactResult` [length];
+        - ``abscissa``, ``place`` and ``gap``, described for `ContactResult` [length];
         - ``radius``: distance from the middle of the contact, the magnitude of ``place`` [length];
-        - ``pressure`` [pressure] and ``multiplier`` [force or pressure];
+        - ``pressure`` and ``multiplier`` [pressure];
         - ``force_x`` etc. [force], ``shear_x`` etc. [pressure], ``slip_x`` and ``slip_total_x`` etc. [length];
-        - ``heat_flux``, with the option ``conductance`` [power / area];
+        - ``heat_flux``, only with the option ``conductance`` [power / area];
         - ``active`` and ``sticking``: booleans.
 
         With `step` there are also ``displacement_x`` etc. [length] and ``stress_xx`` etc., ``normal_stress``,
@@ -85,20 +87,23 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
     }
     if step is not None:
         fields = _fields(step, contact.points)
-        before = {name: values for name, values in fields.items() if name not in ("von_mises", "von_mises_signed")}
-        columns |= before | {"normal_stress": normal_stress(contact, step)} | fields
+        without_von_mises = {
+            name: values for name, values in fields.items() if name not in ("von_mises", "von_mises_signed")
+        }
+        columns |= without_von_mises | {"normal_stress": normal_stress(contact, step)} | fields
     table = structured(columns)
     if contact.abscissa.any() or contact.coordinates.shape[1] == 3:
         return table
-    return table[np.argsort(contact.place, kind="stable")]  # a closed line has no first node
+    # A closed line, or one in several pieces, has no abscissa.
+    return table[np.argsort(contact.place, kind="stable")]
 
 
 @typed(CaseError)
 def normal_stress(contact: ContactResult, step: StepResult) -> Array:
     """Return the normal stress ``n . sigma . n`` at the secondary nodes of a contact pair.
 
-    n is the normal of the opposite primary facet and sigma the nodal stress. At closed nodes the normal stress is equal to
-    minus the contact pressure up to the discretisation error.
+    n is the normal of the opposite primary facet, and sigma the nodal stress. At closed nodes the normal stress equals the
+    negative contact pressure up to the discretisation error.
 
     Parameters
     ----------
@@ -127,11 +132,11 @@ def normal_stress(contact: ContactResult, step: StepResult) -> Array:
     array([-2., -2., -2., -2., -2., -2., -2.])
     """
     stress, (x, y) = step.stress[contact.points].T, contact.normal.T[:2]
-    across = x * x * stress[0] + y * y * stress[1] + 2.0 * x * y * stress[3]
+    normal_component = x * x * stress[0] + y * y * stress[1] + 2.0 * x * y * stress[3]
     if len(stress) == 6:
         z = contact.normal[:, 2]
-        across = across + z * z * stress[2] + 2.0 * (y * z * stress[4] + x * z * stress[5])
-    return np.where(np.linalg.norm(contact.normal, axis=1) > 0.5, across, np.nan)
+        normal_component += z * z * stress[2] + 2.0 * (y * z * stress[4] + x * z * stress[5])
+    return np.where(np.linalg.norm(contact.normal, axis=1) > 0.5, normal_component, np.nan)
 
 
 @typed(CaseError)
@@ -158,7 +163,7 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
         - ``point``: number of the node;
         - ``x``, ``y`` and, in 3D, ``z``: reference coordinates [length];
         - ``abscissa``: arc length from the first node [length];
-        - ``radius``: distance from x = 0, in 3D from the y axis [length];
+        - ``radius``: distance from the line x = 0, in 3D from the y axis [length];
         - ``displacement_x`` etc. [length];
         - ``stress_xx`` etc., ``von_mises`` and ``von_mises_signed`` [pressure].
 
@@ -195,7 +200,7 @@ def with_column(table: AnyArray, name: str, values: AnyArray) -> AnyArray:
 def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None = None) -> None:
     """Write a table as comma-separated values (RFC 4180) with one header line.
 
-    Numbers are written with as many digits as are needed to recover them exactly.
+    Floating-point numbers are written with 17 significant digits, from which they are recovered exactly.
 
     Parameters
     ----------
@@ -204,7 +209,7 @@ def write_csv(path: PathLike, table: AnyArray, units: Mapping[str, str] | None =
     table : structured ndarray (m,)
         The table, for example the result of `contact_table`.
     units : mapping of str to str, optional
-        Names of units by column, which are written in brackets in the header.
+        Names of units by column, which are appended to the names of the columns in brackets.
 
     Raises
     ------
@@ -242,7 +247,7 @@ def _text(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float):
         text = f"{value:.17g}"
-        return text if text.strip("-0123456789") else text + ".0"  # readers must not take it for an integer
+        return text if text.strip("-0123456789") else text + ".0"  # otherwise readers would parse an integer
     return str(value)
 
 
@@ -257,7 +262,9 @@ def structured(columns: Mapping[str, AnyArray | Sequence[Any]]) -> AnyArray:
 
 def _columns(table: AnyArray) -> Columns:
     if not isinstance(table, np.ndarray) or table.dtype.names is None:
-        raise CaseError(f"a table is an array with named columns, as contact_table makes it, not of the {type(table)}")
+        raise CaseError(
+            f"a table is an array with named columns, such as contact_table returns, not an object of {type(table)}"
+        )
     return {name: table[name] for name in table.dtype.names}
 
 
@@ -283,7 +290,7 @@ def _fields(step: StepResult, points: AnyArray) -> Columns:
 if TYPE_CHECKING:
     import pandas
 
-# Columns that precede those of contact tables.
+# Columns that `contact_frame` places before those of contact tables.
 LEADING = ("step", "load_factor", "contact")
 
 
@@ -300,21 +307,21 @@ def _pyvista() -> Any:
 
 
 def grid(mesh: Mesh, step: StepResult) -> Any:
-    """Return a ``pyvista.UnstructuredGrid`` of the solid cells with the fields of a step and the groups."""
+    """Return a ``pyvista.UnstructuredGrid`` of the solid cells, with the fields of a step and flags of the groups."""
     pyvista = _pyvista()
     cells = layout.solid_cells(mesh)
     # The older layout of VTK, with the size of each cell before its nodes, is supported by all versions of PyVista.
     flat = np.insert(cells.connectivity, cells.offsets[:-1], np.diff(cells.offsets))
-    made = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
+    unstructured_grid = pyvista.UnstructuredGrid(flat, cells.types, layout.padded(mesh.points, 3))
     for name, values in (layout.point_fields(mesh, step) | layout.point_flags(mesh)).items():
-        made.point_data[name] = values
+        unstructured_grid.point_data[name] = values
     by_cell: dict[str, Any] = layout.cell_fields(mesh) | step.cell_fields
     if step.material_stress is not None:
         by_cell |= {"material": step.material_stress.cells, **layout.material_fields(mesh, step)}
     for name, values in by_cell.items():
-        made.cell_data[name] = values
-    made.field_data["load_factor"] = np.array([step.load_factor])
-    return made
+        unstructured_grid.cell_data[name] = values
+    unstructured_grid.field_data["load_factor"] = np.array([step.load_factor])
+    return unstructured_grid
 
 
 def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
@@ -328,8 +335,8 @@ def series(mesh: Mesh, steps: Iterable[StepResult]) -> Any:
 def data_frame(table: Any, units: Mapping[str, str], columns: Sequence[str] | None = None) -> pandas.DataFrame:
     """Return a table as a ``pandas.DataFrame``; its ``attrs["units"]`` contains the known units by column."""
     frame = library("pandas", "pandas", "'fastcontact[table]'").DataFrame(table, columns=columns)
-    if named := {name: text for name, text in units.items() if text}:
-        frame.attrs["units"] = named
+    if known := {name: text for name, text in units.items() if text}:
+        frame.attrs["units"] = known
     return cast("pandas.DataFrame", frame)
 
 
@@ -343,14 +350,15 @@ def contact_frame(steps: Iterable[StepResult], units: Mapping[str, str]) -> pand
             for column, value in (("contact", name), ("load_factor", step.load_factor), ("step", step.index)):
                 frame.insert(0, column, value)
             frames.append(frame)
-    whole = concat(frames, ignore_index=True) if frames else None
-    return data_frame(whole, column_units(() if whole is None else whole.columns, units), None if frames else LEADING)
+    combined = concat(frames, ignore_index=True) if frames else None
+    columns = () if combined is None else combined.columns
+    return data_frame(combined, column_units(columns, units), None if frames else LEADING)
 
 
 def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> Any:
     """Return an ``xarray.Dataset`` of steps with the dimensions step, point, axis, stress_component and contact."""
-    xarray, read, dim = library("xarray", "xarray", "xarray"), list(steps), mesh.dim
-    pairs = list(dict.fromkeys(name for step in read for name in step.contact))
+    xarray, all_steps, dim = library("xarray", "xarray", "xarray"), list(steps), mesh.dim
+    pairs = list(dict.fromkeys(name for step in all_steps for name in step.contact))
     components = list(STRESS_COMPONENTS[: 4 if dim == 2 else 6])
 
     def of_pairs(step: StepResult, name: str, missing: Any) -> list[Any]:
@@ -369,12 +377,12 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     sizes = {"point": mesh.n_points, "axis": dim, "stress_component": len(components), "contact": len(pairs)}
     data = {}
     for name, (dims, quantity, of_step) in fields.items():
-        values = np.array([of_step(step) for step in read], np.float64)
-        shaped = values.reshape(len(read), *(sizes[name_of_dim] for name_of_dim in dims))
+        values = np.array([of_step(step) for step in all_steps], np.float64)
+        shaped = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
         data[name] = (("step", *dims), shaped, _unit(units, quantity))
     coordinates = {
-        "step": [step.index for step in read],
-        "load_factor": ("step", [step.load_factor for step in read]),
+        "step": [step.index for step in all_steps],
+        "load_factor": ("step", [step.load_factor for step in all_steps]),
         "axis": list(AXES[:dim]),
         "stress_component": components,
         "contact": pairs,

@@ -1,4 +1,4 @@
-"""Curves as a project file of Grace (xmgrace 5.1), with round axis limits, legend and titles."""
+"""Export of curves to project files of Grace (xmgrace 5.1), with round axis limits, a legend and titles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fastcontact.errors import CaseError, FileError, check_known
 
 STYLES = ("line", "symbols", "line+symbols")
 
-# Numbers of colours without white, of symbols and of line styles in Grace.
+# Numbers of colours (after white, the colour 0), symbols and line styles of Grace through which curves cycle.
 N_COLOURS, N_SYMBOLS, N_LINE_STYLES = 14, 6, 5
 
 # Grace uses Latin-1. Each Greek letter has a counterpart in the Symbol font.
@@ -74,7 +74,8 @@ def write_agr(
     curves : sequence of Curve
         Curves in drawing order; later curves cover earlier ones.
     title, subtitle : str
-        Title and subtitle of the plot. In all texts, Greek letters are supported and markup of Grace is escaped.
+        Title and subtitle of the plot. In all texts, Greek letters are supported, markup of Grace is
+        escaped, and other characters outside Latin-1 are replaced by similar ASCII characters or question marks.
     xlabel, ylabel : str
         Labels of the axes.
 
@@ -105,10 +106,10 @@ def write_agr(
     lines.append("@    view 0.18, 0.15, 1.20, 0.85")
     lines += [f'@    title "{escaped(title)}"', f'@    subtitle "{escaped(subtitle)}"']
     lines += [*_axis("x", xlabel, x_axis), *_axis("y", ylabel, y_axis)]
-    named = "on" if any(curve.legend for curve in shown) else "off"
-    lines += [f"@    legend {setting}" for setting in (named, "loctype view", "0.82, 0.82", "char size 0.8")]
+    legend_state = "on" if any(curve.legend for curve in shown) else "off"
+    lines += [f"@    legend {setting}" for setting in (legend_state, "loctype view", "0.82, 0.82", "char size 0.8")]
     for number, curve in enumerate(shown):
-        lines += _set_style(number, curve)
+        lines += _style_lines(number, curve)
     for number, curve in enumerate(shown):
         lines += [f"@target G0.S{number}", "@type xy"]
         lines += [f"{x:.17g} {y:.17g}" for x, y in zip(curve.x.tolist(), curve.y.tolist())]
@@ -129,30 +130,30 @@ def round_axis(values: ArrayLike) -> tuple[float, float, float]:
     """
     numbers = np.asarray(values, np.float64)
     low, high = float(numbers.min()), float(numbers.max())
-    size = max(abs(low), abs(high))
-    if high - low <= 1e-9 * size or size < 1e-300:  # a single value is shown in the middle of the axis
-        half = 0.5 * size if size >= 1e-300 else 1.0
-        low, high = low - half, high + half
-    raw = (high - low) / 8.0
-    power = 10.0 ** math.floor(math.log10(raw))
-    distance = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= raw * (1 - 1e-9))
+    magnitude = max(abs(low), abs(high))
+    if high - low <= 1e-9 * magnitude or magnitude < 1e-300:  # a single value is shown in the middle of the axis
+        half_range = 0.5 * magnitude if magnitude >= 1e-300 else 1.0
+        low, high = low - half_range, high + half_range
+    least_spacing = (high - low) / 8.0
+    power = 10.0 ** math.floor(math.log10(least_spacing))
+    spacing = next(factor * power for factor in (1.0, 2.0, 5.0, 10.0) if factor * power >= least_spacing * (1 - 1e-9))
     # With the tolerance, round-off in quotients such as 0.3 / 0.1 does not add a tick.
-    first, last = math.floor(low / distance + 1e-9), math.ceil(high / distance - 1e-9)
-    return first * distance, last * distance, distance
+    first, last = math.floor(low / spacing + 1e-9), math.ceil(high / spacing - 1e-9)
+    return first * spacing, last * spacing, spacing
 
 
 def escaped(text: str) -> str:
     """Return a Grace string that shows `text` literally, in Latin-1 with Greek letters from the Symbol font."""
     plain = " ".join(text.translate(_PLAIN).split())
-    return "".join(_MARKUP.get(letter, letter) for known in map(_known, plain) for letter in known)
+    return "".join(_MARKUP.get(letter, letter) for supported in map(_supported, plain) for letter in supported)
 
 
-def _known(letter: str) -> str:
-    """Return a letter if Grace supports it, or a similar letter in ASCII."""
+def _supported(letter: str) -> str:
+    """Return a letter if Grace supports it, otherwise similar ASCII characters or a question mark."""
     if letter in _GREEK or (letter.isprintable() and ord(letter) < 256):
         return letter
-    near = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode("ascii")
-    return near if near.isprintable() and near else "?"
+    similar = unicodedata.normalize("NFKD", letter).encode("ascii", "ignore").decode("ascii")
+    return similar if similar.isprintable() and similar else "?"
 
 
 def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
@@ -161,7 +162,7 @@ def _axis(name: str, label: str, axis: tuple[float, float, float]) -> list[str]:
     return [f"@    {name}axis  {setting}" for setting in settings]
 
 
-def _set_style(number: int, curve: Curve) -> list[str]:
+def _style_lines(number: int, curve: Curve) -> list[str]:
     colour = 1 + number % N_COLOURS
     symbol = 1 + number % N_SYMBOLS if "symbols" in curve.style else 0
     line = 1 + number // N_COLOURS % N_LINE_STYLES if "line" in curve.style else 0

@@ -1,4 +1,4 @@
-"""Studies of many runs: mesh convergence, with limits and theories, and sweeps over the values of parameters."""
+"""Studies of many runs: mesh convergence with extrapolated limits, and sweeps over the values of parameters."""
 
 from __future__ import annotations
 
@@ -59,10 +59,10 @@ def convergence_study(
 ) -> Study:
     """Solve a case or a Python model on successively finer meshes, and fit limits and orders of convergence.
 
-    From the limits follow the mesh error of every quantity and, if a theory is known, the model error. The meshes of a
-    case come from its mesh generator, with sizes that are halved from level to level, or from uniform refinement of its
-    mesh file, with new nodes on circular arcs placed on these arcs. The table ``[study]`` of a case file contains the
-    settings. The meshes of a function are those that it generates.
+    The limits give the mesh error of every quantity and, if a theory is known, the model error. The meshes of a case are
+    made by its mesh generator, with sizes that are halved from level to level, or by uniform refinement of its mesh file, in
+    which new nodes on circular boundaries are placed on the circle. The table ``[study]`` of a case file contains the
+    settings. A function makes its meshes itself.
 
     Parameters
     ----------
@@ -71,10 +71,11 @@ def convergence_study(
         solved in 20 equal steps, or the result of `solve`.
     levels : int or sequence of float
         For a case the number of meshes. At least three are required for a limit, and five for a reliable error bar. For a
-        function the mesh sizes, which may be any length that tends to zero as the mesh is refined [length].
+        function the mesh sizes, passed to it in descending order. They may be any lengths that are proportional to the mesh
+        size [length].
     elements, formulations : sequence of str, optional
-        Element types and contact formulations of a case, which are compared in all combinations; ``["all"]`` stands for all
-        of them. By default those of ``[study]`` or, without this table, those of the case.
+        Element types and contact formulations of a case, which are compared in all combinations; ``["all"]`` selects every
+        supported one. By default those of ``[study]`` or, without this table, those of the case.
     quantities : sequence of str, or dict of str to callable
         Further quantities, in addition to the standard ones. For a case, their names, such as ``"C1.stress.yy"``,
         ``"C1.displacement.y"`` and ``"C1.pressure"`` at the point group C1. For a function, names of standard quantities,
@@ -90,7 +91,7 @@ def convergence_study(
         calling process. Several processes import the calling script, which must therefore call this function under
         ``if __name__ == "__main__":``.
     store : path-like, optional
-        Folder with the results of finished runs of a case. They are reused, and new results are added.
+        Folder with the results of finished runs of a case. Stored results are reused, and new ones are added.
     on_progress : callable, optional
         Function that is called with a `Progress` after every run.
     progress : bool
@@ -103,7 +104,7 @@ def convergence_study(
     Raises
     ------
     CaseError, FastcontactError
-        If the case, a name or a number is invalid, or no mesh of any combination could be solved.
+        If the case, a name or a number is invalid, or if no mesh of any combination could be solved.
 
     Warns
     -----
@@ -112,6 +113,7 @@ def convergence_study(
 
     Examples
     --------
+    >>> import fastcontact as fc
     >>> def squeezed(size):
     ...     n = round(1 / size)
     ...     model = fc.Model(fc.generate.block(divisions=(n, n)), kinematics="plane_strain")
@@ -130,8 +132,8 @@ def convergence_study(
         return _of_function(case, levels, quantities, theory or {}, options)
     if not isinstance(levels, int | np.integer) or isinstance(quantities, Mapping) or theory is not None:
         raise CaseError(
-            "mesh sizes, functions as quantities and theory are for Python models: give a case its number of levels, and its "
-            "theory in the table [theory.PAIR]"
+            "mesh sizes, functions as quantities and 'theory' are only for Python models: give a case its number of levels, "
+            "and its theory in the table [theory.PAIR]"
         )
     case = case if isinstance(case, Case) else read_case(case)
     if levels < 1:
@@ -175,7 +177,8 @@ def _of_function(
         if fine.n_dofs <= coarse.n_dofs:
             warn(
                 f"the mesh of size {fine.h:g} has {fine.n_dofs} degrees of freedom, that of size {coarse.h:g} has "
-                f"{coarse.n_dofs}: sizes must be lengths that shrink as meshes get finer, or limits and orders mean nothing"
+                f"{coarse.n_dofs}: sizes must decrease as meshes become finer, "
+                "otherwise limits and orders of convergence are meaningless"
             )
             break
     return Study(**of_function(function, results), series=[series], failed={}, theory=None)
@@ -247,15 +250,16 @@ def _at_force(theory: Any, share: float, force: Limit | None) -> tuple[dict[str,
 
 
 def _limit(levels: Sequence[Level], quantity: str) -> Limit | None:
+    """Return the limit of a quantity; None if fewer than three levels have it, or if mesh sizes coincide."""
     known = [(level.h, level.values[quantity]) for level in levels if quantity in level.values]
     if len({h for h, _ in known}) < max(3, len(known)):
         return None
     return fit_limit(*zip(*known, strict=True))
 
 
-# Default refinement level of the meshes, on which mesh errors are smaller than the trends of interest.
+# Default refinement level of the meshes of a sweep. Its mesh errors are usually smaller than the trends of interest.
 LEVEL = 2
-# Number of points of the curve of a theory.
+# Number of points at which a theory is evaluated for a curve.
 CURVE = 60
 
 
@@ -289,8 +293,8 @@ def parameter_sweep(
     quantities : sequence of str, or dict of str to callable
         Further quantities, described for `convergence_study`.
     element, formulation : str, optional
-        Element type and contact formulation; by default the last of ``study.combinations`` or, without these, those of the
-        case.
+        Element type and contact formulation; by default those of the last combination in ``study.combinations`` or, without
+        this key, those of the case.
     level : int, optional
         Number of refinements of the mesh. By default 2 if ``[study]`` defines the meshes of level 0; otherwise the mesh of
         the case is used.
@@ -304,7 +308,7 @@ def parameter_sweep(
     Raises
     ------
     CaseError, FastcontactError
-        If the case, a parameter or a value is invalid, or the model could not be solved for any combination.
+        If the case, a parameter or a value is invalid, or if the model could not be solved for any combination.
 
     Examples
     --------
@@ -327,13 +331,15 @@ def parameter_sweep(
         refuse({"element": element, "formulation": formulation, "level": level})
         return _sweep_of_function(case, parameters, quantities, options)
     if not isinstance(parameters, Mapping) or isinstance(quantities, Mapping):
-        raise CaseError("values without a name and functions as quantities are for Python models; a case takes names")
+        raise CaseError(
+            "values without a name and functions as quantities are only for Python models: give a case names of both"
+        )
     case = case if isinstance(case, Case) else read_case(case)
     choices = _choices(parameters)
     names = tuple(dict.fromkeys((*settings(case).quantities, *quantities)))
     check_names(case, names)
     jobs = [_job(case, choice, element, formulation, level) for choice in choices]
-    # Building one case in advance finds unknown keys, with which every run would fail.
+    # Building one case in advance finds unknown keys, because of which every run would fail.
     build_case(jobs[0].data, name=case.name, folder=case.folder, mesh=case.mesh)
     results = run_study(jobs, "no point of the sweep could be solved", **options)
     return Sweep(
@@ -392,7 +398,10 @@ def _points(
 
 
 def _theory_curves(case: Case, parameters: Mapping[str, Sequence[Value]], pair: str | None) -> tuple[TheoryCurve, ...]:
-    """Return the theory of a contact pair as a function of the first parameter, for each choice of the other parameters."""
+    """Return curves of the theory of a contact pair against the first parameter, one for each choice of the other parameters.
+
+    There are none if the values of the first parameter are not numbers or are all equal.
+    """
     (first, values), *others = parameters.items()
     numbers = [float(value) for value in values if not isinstance(value, (str, bool))]
     if len(numbers) < len(values) or min(numbers) == max(numbers):
@@ -425,6 +434,7 @@ def _theory_at(
 
 
 def _job(case: Case, choice: dict[str, Value], element: str | None, formulation: str | None, level: int | None) -> Job:
+    """Return the job that solves a case for one choice of parameter values."""
     data = data_of(case)
     linked = data.get("study", {}).get("parameters", {})
     for parameter, value in choice.items():
@@ -446,7 +456,7 @@ def function_name(function: Function) -> str:
 def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the fields of a `Report` on a function.
 
-    The text is the source of the function if Python knows it, and the units are those of the models in the `results`.
+    The text is the source of the function if it is available, and the units are those of the models in the `results`.
     """
     try:
         text = inspect.getsource(function)
@@ -458,7 +468,7 @@ def of_function(function: Function, results: Sequence[dict[str, Any]]) -> dict[s
 
 
 def measures_of(wanted: Quantities) -> dict[str, Measure]:
-    """Return the quantities that are given as functions; CaseError for the name of a quantity that is not known."""
+    """Return the quantities that are given as functions; CaseError if `wanted` contains an unknown name instead."""
     if isinstance(wanted, Mapping):
         return dict(wanted)
     for name in wanted:
@@ -471,11 +481,11 @@ def measures_of(wanted: Quantities) -> dict[str, Measure]:
 
 
 def refuse(of_cases: Mapping[str, Any]) -> None:
-    """Raise CaseError if an option that only studies of case files have is given."""
+    """Raise CaseError if one of the options in `of_cases`, which only apply to case files, is not None."""
     for name, value in of_cases.items():
         if value is not None:
             raise CaseError(
-                f"'{name}' is for case files: a function makes the mesh and the contact itself, leave it out"
+                f"leave out '{name}', which is only for case files: a function defines its mesh and its contact itself"
             )
 
 

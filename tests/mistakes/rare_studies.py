@@ -136,7 +136,7 @@ def interrupted(patch, command):
 
 CALLS = [
     ("materials that are no tables", lambda: case_of(material=[1]), fc.errors.CaseError, r"'material' must be a list of tables: write \[\[material\]\] above each"),
-    ("a contact without name", lambda: case_of(material=[{"E": 1.0, "nu": 0.3}], contact={"secondary": "CONT1"}), fc.errors.CaseError, r"'contact' needs a name for each pair: write \[contact\.NAME\] above its keys, not 'secondary'"),
+    ("a contact without name", lambda: case_of(material=[{"E": 1.0, "nu": 0.3}], contact={"secondary": "CONT1"}), fc.errors.CaseError, r"'contact' needs a name for each pair: write \[contact\.NAME\] above its keys instead of 'secondary'"),
     ("a check of what is zero", lambda: check_target("check[0]", Check("a", "b.force", 0.1, "hertz", of="zero"), SimpleNamespace(zero=0.0)), fc.errors.CaseError, r"check\[0\]: the theory's zero is 0, so the relative deviation is undefined"),
     ("an unknown quantity of a study", unknown_quantity, fc.errors.CaseError, r"unknown quantity 'forse': did you mean 'force'"),
     ("a study that is interrupted", lambda patch: interrupted(patch, "convergence_study"), fc.errors.FastcontactError, r"stopped; with --store DIR the same command would continue where it stopped"),

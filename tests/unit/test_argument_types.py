@@ -108,7 +108,7 @@ def test_nothing_but_our_own_errors(name, tmp_path, monkeypatch):
         (lambda: fc.Criteria(geometry_updates=1.5), "geometry_updates = 1.5 must be None or a whole number >= 0"),
         (lambda: fc.Criteria(max_active_set_iterations=9.5), "max_active_set_iterations = 9.5 must be a whole number >= 1"),
         (lambda: fc.Model("a.med", "3d"), "the argument mesh of Model must be a Mesh, not the string 'a.med'"),
-        (lambda: fc.plot.pressure_profile(CONTACT, theory=5), "a theory has a pressure, .* which 5 has not"),
+        (lambda: fc.plot.pressure_profile(CONTACT, theory=5), "a theory needs a pressure, .* but 5 has none"),
         (lambda: fc.plot.pressure_profile(CONTACT, ax="ax"), "drawn on axes of matplotlib, not on 'ax'"),
         (lambda: fc.write_csv("a.csv", np.zeros(3)), "a table is an array with named columns"),
         (lambda: fc.generate.union(fc.generate.block(), 3), r"argument meshes\[1\] of union must be a Mesh, not the int 3"),

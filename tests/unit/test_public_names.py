@@ -67,7 +67,7 @@ def test_an_unknown_name_suggests_the_nearest_one(owner, name, told):
     [
         (lambda: fc.LinearElastic(E=1.0, nu=0.3, alpha=1e-5), "'alpha': did you mean 'expansion'?"),
         (lambda: fc.solve(None, steps=4), "'steps': did you mean 'ramp'?"),
-        (lambda: fc.linear_ramp(4, q=1), "'q': known are steps, end"),
+        (lambda: fc.linear_ramp(4, q=1), "'q': expected one of steps, end"),
     ],
 )
 def test_an_unknown_argument_suggests_the_nearest_one(call, told):

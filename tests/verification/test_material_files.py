@@ -143,7 +143,7 @@ def test_a_graded_bar_of_a_case_file(folder, E, scale, within):
 @pytest.mark.parametrize(
     ("E", "message"),
     [
-        ("{file = 'scan.vtu'}", "needs 'field', its name in the file"),
+        ("{file = 'scan.vtu'}", "needs 'field', the name of the field in the file"),
         ("{file = 'scan.vtu', field = 'F'}", "unknown field of cells 'F'"),
         ("{file = 'scan.vtu', field = 'vectors'}", "has 3 components: a field with a single number per cell is needed"),
         ("{file = 'scan.vtu', field = 'E', over = 'nodes'}", "over must be cells or points, not 'nodes'"),

@@ -164,8 +164,8 @@ def test_an_exponential_law(clearance, p0, at):
 @pytest.mark.parametrize(
     ("penalty", "message"),
     [
-        ({"clearance": 0.1}, "an exponential penalty of contact 'pair' has two positive numbers"),
-        ({"clearance": 0.1, "pressure": -1.0}, "an exponential penalty of contact 'pair' has two positive numbers"),
+        ({"clearance": 0.1}, "an exponential penalty of contact 'pair' needs two positive numbers"),
+        ({"clearance": 0.1, "pressure": -1.0}, "an exponential penalty of contact 'pair' needs two positive numbers"),
         ({"clearance": 0.1, "pressure": np.nan}, "the pressure in the penalty of contact 'pair'"),
     ],
 )

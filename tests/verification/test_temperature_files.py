@@ -219,7 +219,7 @@ def test_fields_in_case_files(folder):
         ),
         ("value = 1.0\nfile = 'heat.med'", "a temperature needs either 'value', or 'file' and 'field'"),
         ("value = 1.0\ntimes = [0, 1]", "the key 'times' belongs to a temperature with 'file'"),
-        ("file = 'heat.med'", "needs 'field', its name there"),
+        ("file = 'heat.med'", "needs 'field', the name of the field in the file"),
         ("file = 'heat.med'\nfield = 'TMP'", "unknown field 'TMP': did you mean 'TEMP'"),
         ("file = 'heat.vtu'\nfield = 'TMP'", "unknown field 'TMP': did you mean 'TEMP'"),
         ("file = 'nothing.med'\nfield = 'TEMP'", "nothing.med"),

@@ -1,4 +1,4 @@
-"""Parameters of sensitivities, and the derivatives of the residual with respect to them."""
+"""Parameters of sensitivity analyses, and the derivatives of the residual with respect to them."""
 
 from __future__ import annotations
 
@@ -27,27 +27,33 @@ from fastcontact.model.parts.base import Support, displacement_name
 from fastcontact.model.pretension import Pretension, PretensionForce
 from fastcontact.model.ramp import combined, multiplier
 
-# Constants, and the names of their components for an orthotropic material.
+# Names of the components of the constants of orthotropic materials, by constant.
 CONSTANTS = {"E": "123", "nu": NAMES, "G": NAMES, "expansion": "123"}
 
 
 def _by_constant(contact: MovingContact, parameter: Label) -> Change:
+    """Return the derivatives with respect to a constant of a material, by finite differences."""
     model, name = contact.problem.model, str(parameter[0])
     number, material, component = _constant_of(model, parameter)
-    step = CHANGED * _room(material, name, component)
+    step = CHANGED * _admissible_range(material, name, component)
 
     def at(by: float) -> MovingContact:
-        made = copy.copy(model)
-        made.materials = [
+        changed_model = copy.copy(model)
+        changed_model.materials = [
             (_changed(m, name, component, by) if i == number else m, groups)
             for i, (m, groups) in enumerate(model.materials)
         ]
-        pairs = {pair.name: made.bind(pair, contact.problem.pairs[pair.name].held) for pair in made.contact}
-        return replace(contact, problem=replace(contact.problem, model=made, pairs=pairs))
+        pairs = {
+            pair.name: changed_model.bind(pair, contact.problem.pairs[pair.name].held) for pair in changed_model.contact
+        }
+        return replace(contact, problem=replace(contact.problem, model=changed_model, pairs=pairs))
 
-    # Central differences of fourth order in the step.
-    forces = [weight * (_inside(at(far * step)) - _inside(at(-far * step))) for far, weight in ((1, 8.0), (2, -1.0))]
-    change = replace(_nothing(contact), out=(forces[0] + forces[1]) / (12.0 * step))
+    # Central differences with an error of fourth order in the step.
+    differences = [
+        weight * (_internal_forces(at(distance * step)) - _internal_forces(at(-distance * step)))
+        for distance, weight in ((1, 8.0), (2, -1.0))
+    ]
+    change = replace(_zero_change(contact), out=(differences[0] + differences[1]) / (12.0 * step))
     return replace(change, sample=contact.along(at, step)) if contact.problem.pairs else change
 
 
@@ -64,14 +70,12 @@ def _constant_of(model: Model, parameter: Label) -> tuple[int, Material, int | N
     value = getattr(material, name, None)
     components = value if isinstance(value, tuple) else (value,)
     if value is None or any(map(varying, components)):
-        raise ModelError(
-            f"the material {parameter[1]!r} has no {name}, or one that varies: its sensitivity is not available"
-        )
+        raise ModelError(f"the material {parameter[1]!r} has no constant {name}: its sensitivity is not available")
     return number, material, _component(parameter, list(CONSTANTS[name]) if len(components) > 1 else [])
 
 
 def _component(parameter: Label, names: Sequence[str]) -> int | None:
-    """Return the number of the requested component; None if a constant has only one, or all are requested."""
+    """Return the number of the requested component; None if the constant is a scalar or all components are requested."""
     if len(parameter) == 2 and (not names or parameter[0] == "expansion"):
         return None
     if len(parameter) == 2:
@@ -81,10 +85,14 @@ def _component(parameter: Label, names: Sequence[str]) -> int | None:
     return names.index(str(parameter[2]))
 
 
-def _room(material: Material, name: str, component: int | None) -> float:
-    """Return the approximate range by which a constant may change, with all others fixed."""
+def _admissible_range(material: Material, name: str, component: int | None) -> float:
+    """Return the approximate distance of a constant from the limits of its admissible range, with all others fixed.
+
+    It scales the increments of finite differences. An isotropic Poisson's ratio lies between -1 and 0.5; that of an
+    orthotropic material is admissible while the compliance matrix is positive definite.
+    """
     value = getattr(material, name)
-    if name == "expansion":  # forces are linear in it
+    if name == "expansion":  # forces are linear in it, so that any increment is accurate
         return 1.0 / CHANGED
     if name != "nu":
         return float(value if component is None else value[component])
@@ -114,25 +122,25 @@ def _changed(material: Material, name: str, component: int | None, by: float) ->
     return replace(material, **{name: value})
 
 
-def _inside(contact: MovingContact) -> Array:
-    """Return the internal forces (n_dofs,) minus those of thermal expansion and initial states [force]."""
+def _internal_forces(contact: MovingContact) -> Array:
+    """Return the internal forces (n_dofs,) minus the equivalent forces of thermal expansion and initial states [force]."""
     problem = contact.problem
     model = problem.model
     force = np.zeros(len(contact.u))
-    inside = model.internal_forces(problem.displacement(contact.u))
+    forces = model.internal_forces(problem.displacement(contact.u))
     for by_ramp in (model.thermal_forces_by_ramp(), model.initial_forces_by_ramp()):
         if by_ramp:
-            inside = inside - combined(by_ramp, problem.ramp, contact.instant, problem.displacement(contact.u).shape)
-    force[: model.n_dofs] = inside.ravel()
+            forces = forces - combined(by_ramp, problem.ramp, contact.instant, problem.displacement(contact.u).shape)
+    force[: model.n_dofs] = forces.ravel()
     return force
 
 
 Item = TypeVar("Item", bound=Load | Temperature)
 FORMS = {
-    "E": '("E", material), with the number of the axis, "1", of an Orthotropic',
-    "nu": '("nu", material), with the axes, "12", of an Orthotropic',
-    "G": '("G", material, "12") of an Orthotropic',
-    "expansion": '("expansion", material), or ("expansion", material, "1") along one axis',
+    "E": '("E", material), or ("E", material, "1") along axis 1 of an Orthotropic',
+    "nu": '("nu", material), or ("nu", material, "12") for axes 1 and 2 of an Orthotropic',
+    "G": '("G", material, "12") for axes 1 and 2 of an Orthotropic',
+    "expansion": '("expansion", material), or ("expansion", material, "1") along axis 1',
     "load": '("load", group)',
     "speed": '("speed", group)',
     "temperature": '("temperature", group)',
@@ -145,7 +153,7 @@ WITH_COMPONENT = (*CONSTANTS, "prescribed")
 
 
 def check_parameter(model: Model, parameter: Label) -> None:
-    """Raise ModelError if a model has no such parameter."""
+    """Raise ModelError if a model does not have a parameter."""
     kind = str(parameter[0]) if parameter else ""
     if kind == "friction":
         raise ModelError(
@@ -160,20 +168,21 @@ def check_parameter(model: Model, parameter: Label) -> None:
 
 
 def _item(kind: str, known: Mapping[str, Any], parameter: Label) -> Any:
-    """Return the item of a given name; ModelError if there is none."""
+    """Return the item whose name is `parameter[1]`; ModelError if there is none."""
     if parameter[1] not in known:
         raise ModelError(unknown(kind, str(parameter[1]), known))
     return known[str(parameter[1])]
 
 
-def _nothing(contact: MovingContact) -> Change:
+def _zero_change(contact: MovingContact) -> Change:
+    """Return derivatives that are zero."""
     n = len(contact.u)
     nodes = 0 if contact.closed is None else len(contact.closed)
     return Change(np.zeros(n), np.zeros(n), np.zeros(n + len(contact.active) + nodes))
 
 
 def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[str] = ()) -> list[Item]:
-    """Return the loads or temperatures on a group, restricted to it.
+    """Return the loads or temperatures on a group, restricted to this group.
 
     Raises ModelError if there are none and the name is not in `others`.
     """
@@ -189,7 +198,7 @@ def _named(kind: str, items: Sequence[Item], parameter: Label, others: Sequence[
 
 
 def _loads(model: Model, parameter: Label) -> list[Load]:
-    """Return the loads on a group; none for a force-driven obstacle."""
+    """Return the loads on a group; empty for a force-driven obstacle."""
     driven = [pair.name for pair in model.force_driven.pairs]
     return _named("group with a load, or obstacle with a force,", model.loads, parameter, driven)
 
@@ -204,7 +213,7 @@ def _forces(contact: MovingContact, loads: Sequence[Load]) -> Array:
 
 
 def _of_load(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with the factor of the loads on a group, or of the force on an obstacle."""
+    """Return the derivatives with respect to a factor of the loads on a group, or of the force on an obstacle."""
     problem = contact.problem
     driven = problem.force_driven.number(str(parameter[1]))
     out = -_forces(contact, _loads(problem.model, parameter))
@@ -213,7 +222,7 @@ def _of_load(contact: MovingContact, parameter: Label) -> Change:
         force = [value or 0.0 for value in pair.force]
         factor = multiplier(pair.ramp, problem.ramp, contact.instant)
         out[problem.force_driven.dofs(driven)] -= np.array(force) * factor
-    return replace(_nothing(contact), out=out)
+    return replace(_zero_change(contact), out=out)
 
 
 def _speeds(model: Model, parameter: Label) -> list[Centrifugal]:
@@ -223,10 +232,10 @@ def _speeds(model: Model, parameter: Label) -> list[Centrifugal]:
 
 
 def _of_speed(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with the angular speed of a group; forces are proportional to its square."""
+    """Return the derivatives with respect to the angular speed of a group; forces are proportional to its square."""
     loads = [load for load in _speeds(contact.problem.model, parameter) if load.speed]
     out = [-2.0 / load.speed * _forces(contact, [load]) for load in loads]
-    return replace(_nothing(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
+    return replace(_zero_change(contact), out=np.sum(out, axis=0) if out else np.zeros(len(contact.u)))
 
 
 def _temperatures(model: Model, parameter: Label) -> list[Temperature]:
@@ -235,8 +244,8 @@ def _temperatures(model: Model, parameter: Label) -> list[Temperature]:
 
 
 def _of_temperature(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with the factor of the temperature rise of a group."""
-    problem, change = contact.problem, _nothing(contact)
+    """Return the derivatives with respect to a factor of the temperature rise of a group."""
+    problem, change = contact.problem, _zero_change(contact)
     heated = copy.copy(problem.model)
     heated.temperatures = _temperatures(heated, parameter)
     forces = combined(heated.thermal_forces_by_ramp(), problem.ramp, contact.instant, heated.mesh.points.shape)
@@ -251,35 +260,35 @@ def _pretension(model: Model, parameter: Label) -> Pretension:
 
 
 def _of_pretension(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with the factor of the force of a pretension section, or of its shortening."""
+    """Return the derivatives with respect to a factor of the force or of the shortening of a pretension section."""
     model = contact.problem.model
     section = _pretension(model, parameter)
     if section.shortening is not None:
-        along = [i for i, relation in enumerate(model.relations) if relation.name == section.prescribed]
-        return _lifted(contact, np.zeros(contact.problem.shape), along)
+        relation_numbers = [i for i, relation in enumerate(model.relations) if relation.name == section.prescribed]
+        return _of_prescribed_values(contact, np.zeros(contact.problem.shape), relation_numbers)
     forces = [load for load in model.loads if isinstance(load, PretensionForce) and load.section is section]
-    return replace(_nothing(contact), out=-_forces(contact, forces))
+    return replace(_zero_change(contact), out=-_forces(contact, forces))
 
 
 def _prescribing(model: Model, parameter: Label) -> tuple[list[Support], list[int]]:
-    """Return the supports on a group, and the numbers of constraints that prescribe its displacement along normals."""
+    """Return the supports on a group, and the numbers of constraints that prescribe displacements along normals or axes."""
     group, only = parameter[1], "xyz".find(str(parameter[2])) if len(parameter) == 3 else None
     supports = [s for s in model.supports if s.group == group and only in (None, s.component)]
     kinds = ("normal", "x", "y", "z") if only is None else (str(parameter[2]),)
     names = {kind: displacement_name(kind, str(group)) for kind in kinds}
     wanted = {names.get("normal"), *(f"{name} along axes" for name in names.values())}
-    along = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
-    if not (supports or along):
+    relation_numbers = [number for number, relation in enumerate(model.relations) if relation.name in wanted]
+    if not (supports or relation_numbers):
         known = list(dict.fromkeys(s.group for s in model.supports))
         raise ModelError(unknown("group whose displacement is prescribed", ", ".join(map(str, parameter[1:])), known))
-    return supports, along
+    return supports, relation_numbers
 
 
 def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with the load factor of prescribed displacements of a group."""
+    """Return the derivatives with respect to a factor of the prescribed displacements of a group."""
     problem, instant = contact.problem, contact.instant
     model = problem.model
-    supports, along = _prescribing(model, parameter)
+    supports, relation_numbers = _prescribing(model, parameter)
     if any(support.rotation is not None for support in supports):
         raise ModelError(
             f"results are not linear in the rotation of '{parameter[1]}': its sensitivity is not available"
@@ -291,18 +300,21 @@ def _of_prescribed(contact: MovingContact, parameter: Label) -> Change:
         values[nodes, support.component] = given * multiplier(support.ramp, problem.ramp, instant)
     if model.kinematics == "axisymmetric":
         values[model.axis_nodes, 0] = 0.0
-    return _lifted(contact, values, along)
+    return _of_prescribed_values(contact, values, relation_numbers)
 
 
-def _lifted(contact: MovingContact, values: Array, along: Sequence[int]) -> Change:
-    """Return the change with prescribed displacements (n_points, dim) [length] and the values of some constraints."""
+def _of_prescribed_values(contact: MovingContact, values: Array, relation_numbers: Sequence[int]) -> Change:
+    """Return the derivatives with respect to a factor of prescribed displacements and of the values of constraints.
+
+    `values` (n_points, dim) are the displacements [length], and `relation_numbers` the numbers of the constraints.
+    """
     problem = contact.problem
     factors = [
-        multiplier(relation.ramp, problem.ramp, contact.instant) if i in along else 0.0
+        multiplier(relation.ramp, problem.ramp, contact.instant) if i in relation_numbers else 0.0
         for i, relation in enumerate(problem.model.relations)
     ]
     lift = problem.system.lift(values.ravel(), problem.system.values(factors))
-    return replace(_nothing(contact), lift=lift)
+    return replace(_zero_change(contact), lift=lift)
 
 
 def _moved(model: Model, parameter: Label) -> ContactPair:
@@ -313,7 +325,7 @@ def _moved(model: Model, parameter: Label) -> ContactPair:
 
 
 def _of_motion(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with the factor of the motion of a rigid obstacle."""
+    """Return the derivatives with respect to a factor of the motion of a rigid obstacle."""
     problem, name = contact.problem, str(parameter[1])
     pair = _moved(problem.model, parameter)
     motion = np.array(pair.motion) * multiplier(pair.ramp, problem.ramp, contact.instant)
@@ -322,7 +334,7 @@ def _of_motion(contact: MovingContact, parameter: Label) -> Change:
         values = np.zeros(len(contact.u))
         values[problem.force_driven.dofs(number)] = motion
         none = [0.0] * len(problem.model.relations)
-        return replace(_nothing(contact), lift=problem.system.lift(values, problem.system.values(none)))
+        return replace(_zero_change(contact), lift=problem.system.lift(values, problem.system.values(none)))
 
     def changed(by: float) -> MovingContact:
         obstacles = {**contact.load.obstacles, name: contact.load.obstacles[name] + by * motion}
@@ -330,18 +342,18 @@ def _of_motion(contact: MovingContact, parameter: Label) -> Change:
 
     size = float(np.abs(motion).max())
     if size == 0.0:
-        return _nothing(contact)
-    return replace(_nothing(contact), sample=contact.along(changed, contact.step / size))
+        return _zero_change(contact)
+    return replace(_zero_change(contact), sample=contact.along(changed, contact.step / size))
 
 
-def _opened(model: Model, parameter: Label) -> None:
+def _with_clearance(model: Model, parameter: Label) -> None:
     """Raise ModelError if a contact pair does not exist or is tied, so that it has no clearance."""
     if _item("contact pair", {pair.name: pair for pair in model.contact}, parameter).options.get("kind") == "tied":
-        raise ModelError(f"contact '{parameter[1]}' is tied: it keeps its gaps, and has no clearance")
+        raise ModelError(f"contact '{parameter[1]}' is tied: its gaps are fixed, and it has no clearance")
 
 
 def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
-    """Return the change with a length added to the gap of a contact pair."""
+    """Return the derivatives with respect to a length that is added to the gaps of a contact pair."""
     name = str(parameter[1])
     pair = contact.problem.pairs[name]
     count = len(pair.secondary.points)
@@ -350,7 +362,7 @@ def _of_clearance(contact: MovingContact, parameter: Label) -> Change:
         worn = {**contact.state.worn, name: Worn(np.full(count, by), np.zeros(count))}
         return replace(contact, state=replace(contact.state, worn=worn))
 
-    return replace(_nothing(contact), sample=contact.along(changed, contact.step))
+    return replace(_zero_change(contact), sample=contact.along(changed, contact.step))
 
 
 KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact, Label], Change]]] = {
@@ -361,5 +373,5 @@ KINDS: dict[str, tuple[Callable[[Model, Label], object], Callable[[MovingContact
     "pretension": (_pretension, _of_pretension),
     "prescribed": (_prescribing, _of_prescribed),
     "motion": (_moved, _of_motion),
-    "clearance": (_opened, _of_clearance),
+    "clearance": (_with_clearance, _of_clearance),
 }

@@ -425,7 +425,7 @@ def targets(assembly: Assembly, row: Row, numbers: tuple[float, ...] = ()) -> li
         return [Target(keyword, letter, face, (), numbers) for face in faces]
     if label not in of_elements:
         known = ", ".join([f"{letter}1", f"{letter}2", "...", *of_elements])
-        raise row.refuse(f"{load}{label[:40]} is not supported; known are {known}")
+        raise row.refuse(f"{load}{label[:40]} is not supported; expected one of {known}")
     vector = tuple(row.number(3 + i, 0.0) for i in range(of_elements[label]))
     if vector and not any(vector[-3:]):
         raise row.refuse(f"the direction of {label} is missing")

@@ -162,7 +162,7 @@ class Block(Item):
         for option in known:
             if value.replace(" ", "") == option.replace(" ", ""):
                 return option
-        raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; known are {', '.join(known)}")
+        raise self.refuse(f"{name}={value[:LONGEST_QUOTED]} is not supported; expected one of {', '.join(known)}")
 
     def required(self, name: str) -> str:
         """Return the value of a parameter; CaseError if it is missing or has no value."""

@@ -46,7 +46,7 @@ def elastic(content: Content, current: Material, block: Block) -> None:
     kinds = [known for known in CONSTANTS if len(kind) >= 3 and known.startswith(kind)]
     if not kinds:
         known = ", ".join(CONSTANTS)
-        raise block.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; known are {known}")
+        raise block.refuse(f"material '{current.name}': TYPE={kind[:40]} is not supported; expected one of {known}")
     if kinds[0] != "ISOTROPIC":
         _anisotropic(current, block, kinds[0])
         return

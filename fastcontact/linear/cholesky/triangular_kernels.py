@@ -1,9 +1,9 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Triangular solutions with the factors of a symmetric matrix, supernode by supernode.
+"""Forward and backward substitution with the supernodal factors ``L D L.T`` of a symmetric matrix.
 
-L (n, n) is lower triangular with a unit diagonal, column by column: `start` (n + 1,) and `values`, the diagonal first.
-The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows ``rows[begin[s] : begin[s + 1]]`` below
-them; their diagonal block is full.
+L (n, n) is lower triangular with a unit diagonal and stored by columns: column j is ``values[start[j] : start[j + 1]]``,
+with the diagonal first. The columns ``first[s]`` to ``first[s + 1] - 1`` of supernode s share the rows
+``rows[begin[s] : begin[s + 1]]`` below them; their diagonal block is full.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fastcontact.arrays import Array, Mask, Numbers
 
 Offsets = NDArray[np.int64]
 
-# Number of columns of L that are multiplied together in `solve_together`.
+# Largest number of columns of L in one matrix product of `solve_together`.
 PANEL = 48
 
 
@@ -24,7 +24,10 @@ PANEL = 48
 def block(
     start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, wanted: Offsets, out: Array
 ) -> None:
-    """Fill `out` (m, m), initially zero, with the rows and columns of L numbered by `wanted` (n,), which is -1 for others."""
+    """Copy the requested rows and columns of L to `out` (m, m), which is initially zero.
+
+    `wanted` (n,) contains the position in `out` of each row and column, or -1 if it is not requested.
+    """
     for s in range(len(first) - 1):
         high = first[s + 1]
         for j in range(first[s], high):
@@ -46,7 +49,7 @@ def forward(start: Offsets, values: Array, first: Offsets, begin: Offsets, rows:
         low, high = first[s], first[s + 1]
         below = begin[s + 1] - begin[s]
         j = low
-        while j < high and x[j] == 0.0:  # loads are often few
+        while j < high and x[j] == 0.0:  # right-hand sides are often sparse
             j += 1
         if j == high:
             continue
@@ -69,7 +72,7 @@ def backward(
 ) -> None:
     """Replace x (n,) by the solution of ``L.T y = x`` in which the entries `given` (n,) keep their values.
 
-    The given unknowns must be closed under dependence: with j given, so are all rows of column j.
+    If entry j is given, all entries in the rows of column j must be given.
     """
     gathered = np.empty(len(x))
     for s in range(len(first) - 2, -1, -1):
@@ -82,25 +85,25 @@ def backward(
         below = begin[s + 1] - begin[s]
         for k in range(below):
             gathered[k] = x[rows[begin[s] + k]]
-        # Two columns are processed at a time, which share the loads of the vector; the last column may be single.
+        # Columns are processed in pairs, because both read the same entries of x. The last column may be single.
         while j >= low:
             single = j == low
-            one = start[j] + 1
-            other = one if single else start[j - 1] + 2
+            first_at = start[j] + 1
+            second_at = first_at if single else start[j - 1] + 2
             first_sum, second_sum = 0.0, 0.0
-            # Slices show the compiler that entries are contiguous.
+            # Slices tell the compiler that the entries are contiguous in memory.
             n = high - 1 - j
-            a, b, beside = values[one : one + n], values[other : other + n], x[j + 1 : high]
+            a, b, beside = values[first_at : first_at + n], values[second_at : second_at + n], x[j + 1 : high]
             for k in range(n):
                 first_sum += a[k] * beside[k]
                 second_sum += b[k] * beside[k]
-            a, b = values[one + n : one + n + below], values[other + n : other + n + below]
+            a, b = values[first_at + n : first_at + n + below], values[second_at + n : second_at + n + below]
             for k in range(below):
                 first_sum += a[k] * gathered[k]
                 second_sum += b[k] * gathered[k]
             x[j] -= first_sum
             if not single:
-                x[j - 1] -= second_sum + values[other - 1] * x[j]
+                x[j - 1] -= second_sum + values[second_at - 1] * x[j]
             j -= 2
 
 
@@ -109,10 +112,11 @@ def solve_together(
     start: Offsets, values: Array, first: Offsets, begin: Offsets, rows: Numbers, d: Array, loaded: Mask, wanted: Mask,
     X: Array,
 ) -> None:  # fmt: skip
-    """Replace the rows `wanted` of X (n, k) by those of ``(L D L.T)^-1 X``, by products of panels of L with all k columns.
+    """Replace the rows `wanted` of X (n, k) by those of ``(L D L.T)^-1 X``, for all k columns at once.
 
-    Only the rows `loaded` (n,) of X have nonzero entries. The substitutions pass over supernodes that are not `_reached` from
-    them, or from the rows `wanted` (n,). Both masks are overwritten, and other rows of X have no meaning afterwards.
+    Only the rows `loaded` (n,) of X may have nonzero entries; d (n,) is the diagonal of D. The forward substitution skips
+    supernodes that are not `_reached` from the rows `loaded`, and the backward substitution those that are not `_reached`
+    from the rows `wanted` (n,). Both masks are overwritten, and the other rows of X are undefined afterwards.
     """
     widest = 0
     for s in range(len(first) - 1):
@@ -146,7 +150,10 @@ def solve_together(
 
 @kernel
 def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mask:
-    """Return which supernodes (n_supernodes,) have `marked` columns (n,), or descendants in the elimination tree that do."""
+    """Return which supernodes (n_supernodes,) contain `marked` columns (n,), or have descendants that do.
+
+    Descendants and ancestors are those in the elimination tree. All ancestors of marked columns are marked as well.
+    """
     reached = np.zeros(len(first) - 1, np.bool_)
     for s in range(len(reached)):
         reached[s] = marked[first[s] : first[s + 1]].any()
@@ -160,9 +167,9 @@ def _reached(first: Offsets, begin: Offsets, rows: Numbers, marked: Mask) -> Mas
 def _copied(
     start: Offsets, values: Array, low: int, high: int, end: int, rest: Numbers, panel: Array, below: Offsets
 ) -> int:
-    """Fill `panel` with the columns `low` to ``high - 1`` of L from row `high` on, one after another; return their length.
+    """Copy columns `low` to ``high - 1`` of L, from row `high` on, to `panel` one by one; return their length.
 
-    `below` is filled with the numbers of these rows: `high` to ``end - 1``, in the same supernode, and `rest`.
+    The numbers of these rows are written to `below`: `high` to ``end - 1`` in the same supernode, then `rest`.
     """
     size = end - high + len(rest)
     for j in range(low, high):

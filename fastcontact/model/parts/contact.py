@@ -117,10 +117,10 @@ class ModelContact(ModelConnections):
             - ``friction_heat``: fraction of the frictional work that becomes heat, of which one half flows into each side
               [-]. The heating power is computed with the load factor as time.
             - ``obstacle_temperature``: temperature of a rigid obstacle [temperature].
-            - ``search_distance``: largest distance, and largest penetration, at which a point has an opposite point, both
-              in the current configuration and at the beginning of the load step [length].
+            - ``search_distance``: largest distance, and largest penetration, at which a point has an opposite point, either
+              in the current configuration or at the beginning of the load step [length].
             - ``normals``: the normal field. ``"facet"``: normals of the primary facets. ``"averaged"``: averages over the
-              facets that meet at a node at less than 45 degrees, which conforming curved sides need. ``"secondary"``:
+              facets that meet at a node at less than 48 degrees, which conforming curved sides need. ``"secondary"``:
               normals of the secondary side. A vector (dim,): the outward normal of the entire primary side [-].
             - ``projection_tolerance``: distance, relative to the length of a facet, by which the projection of a point may
               lie beyond the end of the primary side while the point still carries force [-].

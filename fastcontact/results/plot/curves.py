@@ -1,4 +1,4 @@
-"""Plot curves of a contact: pressure along it, stresses below it, and its force, radius and zones over the load steps."""
+"""Curves of a contact: its pressure, the stresses below it, and its force, radius and zones over the load steps."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def pressure_profile(
 ) -> Axes:
     """Plot the contact pressure as a function of the distance from the middle, with theories for comparison.
 
-    The distance is `ContactResult.place`, which in 2D is the arc length, with a sign if nodes lie on both sides of the
-    middle. The edge of the contact is shaded; in finite strain it is the deformed `ContactResult.radius`. If the axes already
-    contain a profile, the next one has another colour.
+    The distance is `ContactResult.place`: the radius in axisymmetry, the arc length in plane models, and the distance from
+    the axis of the contact in 3D. It has a sign if nodes lie on both sides of the middle. The range between the bounds of the
+    contact radius is shaded. If the axes already contain a profile, the new one has another colour.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ def pressure_profile(
         A result of a function in `analytic`, such as `analytic.hertz_point`, or an object with the method ``pressure(r)``
         and the attributes ``pressure_max`` and ``radius``.
     other_theories : mapping of str to object, optional
-        Further theories by label of the legend.
+        Further theories, by their labels in the legend.
     stress : ndarray (m,), optional
         Normal stress at the secondary nodes, negative in compression, which is plotted with the opposite sign [pressure];
         see `normal_stress`.
@@ -60,6 +60,11 @@ def pressure_profile(
     Returns
     -------
     matplotlib Axes
+
+    Raises
+    ------
+    FastcontactError
+        If a theory has no pressure, or `stress` does not have the shape (m,).
 
     Examples
     --------
@@ -77,7 +82,7 @@ def pressure_profile(
     """
     if stress is not None and np.shape(stress) != np.shape(contact.place):
         raise FastcontactError(
-            f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: one of each node"
+            f"stress has the shape {np.shape(stress)}, not {np.shape(contact.place)}: give one value for each secondary node"
         )
     ax, units = new_axes(ax, (6.4, 5.0)), units_of(units, contact)
     earlier = sum(line.get_marker() == "o" for line in ax.lines)
@@ -115,11 +120,11 @@ def pressure_profile(
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
-    """Return the pressure curves of the theories, by label of the legend."""
+    """Return the pressure curves of the theories, by their labels in the legend."""
     for theory_given in (theory, *others.values()):
         if theory_given is not None and not is_dataclass(theory_given) and pressure_curve(theory_given) is None:
             raise FastcontactError(
-                f"a theory has a pressure, as those of fastcontact.analytic do, which {theory_given!r} has not"
+                f"a theory needs a pressure, such as the results of fastcontact.analytic have, but {theory_given!r} has none"
             )
     curves = {legend: pressure_curve(other) for legend, other in others.items()}
     curve = pressure_curve(theory)
@@ -127,9 +132,10 @@ def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
-    """Return the limits of the abscissa, which exceed the extent of the contact and of the theories by one third.
+    """Return the limits of the abscissa, which exceed the extent of the contact and of the theories by about one third.
 
-    Both sides of the middle are included if the surface has nodes on both sides.
+    The limits are at most slightly beyond the last node or theory. Both sides of the middle are included if the surface has
+    nodes on both sides.
     """
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
@@ -137,13 +143,13 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
     reach = 1.35 * max([closed, *radii]) or 1.02 * farthest or 1.0
     reach = min(reach, 1.02 * max(farthest, *radii, 1e-300)) if closed else reach
     low, nearest = contact.place.min(initial=0.0), float(np.abs(contact.place).min(initial=np.inf))
-    if nearest > 0.2 * reach and not curves:  # a ring, where the range between axis and bore would be empty
+    if nearest > 0.2 * reach and not curves:  # on a ring, the range between the axis and the bore would be empty
         return nearest - 0.05 * (reach - nearest), reach
     return (max(-reach, 1.02 * float(low)) if low < 0 else 0.0), reach
 
 
 def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mapping[str, str], colour: str) -> None:
-    """Shade the range of the contact radius, in 2D as arc lengths, on both sides of the contact."""
+    """Shade the range between the bounds of the contact radius, in plane models as arc lengths, at each contact end."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
@@ -153,8 +159,9 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
     label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
     if abs(centre) <= 0.01 * outside:
-        # Constraints may lie between nodes, so that the bounds of the radius are closer to each other than nodes are. Nodes
-        # beyond the contact are left out: on a curved surface, they may be as near to the middle along the tangent.
+        # The bounds of the radius may be closer to each other than two nodes, because constraints may lie between nodes.
+        # Nodes beyond the contact are excluded: on a curved surface, they may be equally near to the middle along the
+        # tangent.
         place = np.abs(contact.place)
         near = np.flatnonzero(place <= outside)[np.argsort(place[place <= outside])]
         inside, outside = np.interp(contact.radius, np.abs(contact.across)[near], place[near])
@@ -168,7 +175,7 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
 # Depth of the plotted region, in contact radii.
 PLOTTED_DEPTH = 4.0
 COMPONENTS = {"along the axis": 1, "across the axis": 0}
-# Colours of these, and of the von Mises stress.
+# Colours of the COMPONENTS and of the von Mises stress.
 COLOURS = ("C0", "C1", "C2")
 
 
@@ -197,7 +204,8 @@ def axis_stress(
     pair : str
         Name of the contact pair. The depth is measured from its node nearest to the middle of the contact.
     theories : mapping of str to object, optional
-        Theories by label of the legend: objects with the method ``stress_on_axis(depth)``, such as `analytic.hertz_point`.
+        Theories, by their labels in the legend: objects with the method ``stress_on_axis(depth)``, such as
+        `analytic.hertz_point`.
     title, units, ax
         Described for `pressure_profile`.
 
@@ -208,7 +216,7 @@ def axis_stress(
     Raises
     ------
     FastcontactError
-        If the mesh is three-dimensional or has no nodes on the axis.
+        If the mesh is three-dimensional or has no nodes on the axis, or the step has no such pair.
 
     Examples
     --------
@@ -235,7 +243,7 @@ def axis_stress(
     for number, name in enumerate(bodies):
         here = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if here.any():  # hollow symbols of the second body do not hide those of the first body
+            if here.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
                 axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
     fine = np.linspace(0.0, reach, 400)
@@ -269,7 +277,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
     height = (mesh.points[used] - pole) @ direction
     offset = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
-    # The direction of the axis follows from the normal of a facet, which is accurate to a few thousandths.
+    # The direction of an oblique axis is the normal of a facet, whose error may be a few thousandths of a radian.
     slope_tolerance = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
     on_axis = np.abs(offset) <= tolerance + slope_tolerance * np.abs(height)
     nodes, height = used[on_axis], height[on_axis]
@@ -277,7 +285,7 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
         raise FastcontactError(
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
-    # At the pole each body has a node; the positions of the adjacent cells show to which body a node belongs.
+    # Both bodies have a node at the intersection with the surface. The positions of its cells show to which body it belongs.
     body_side = _sides(mesh, nodes, pole, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
@@ -305,13 +313,14 @@ def _turned(stress: Array, direction: Array) -> Array:
 
 
 def _sides(mesh: Mesh, nodes: AnyArray, pole: Array, direction: Array) -> Array:
+    """Return the side (n,), 1 or -1, on which the cells of each node lie; see `stresses_on_axis`."""
     total = np.zeros(mesh.n_points)
     for block in mesh.solids.values():
         np.add.at(total, block, ((mesh.points[block].mean(axis=1) - pole) @ direction)[:, None])
     return np.asarray(np.sign(total[nodes]))
 
 
-# Largest number of steps at which the number of closed nodes is written above the zones.
+# Largest number of steps at which `contact_zones` shows the number of closed nodes.
 MOST_COUNTS = 20
 STATES = {"open": "0.85", "closed": "C0", "sticking": "C0", "sliding": "C1"}
 
@@ -339,7 +348,7 @@ def history(
     pair : str
         Name of a contact pair.
     law : object with the method ``at_approach(d)``, optional
-        A theory, such as `analytic.hertz_point`, which is plotted if `approach` is given.
+        A theory, such as `analytic.hertz_point`; it is only plotted if `approach` is given.
     approach : float, optional
         Approach of the bodies at load factor 1 [length]; if it is given, the abscissa is the approach.
     share : float
@@ -351,8 +360,13 @@ def history(
 
     Returns
     -------
-    tuple of matplotlib Axes
+    sequence of two matplotlib Axes
         Axes of the force and of the radius.
+
+    Raises
+    ------
+    FastcontactError
+        If there are no steps, or a step has no such pair.
 
     Examples
     --------
@@ -403,7 +417,7 @@ def history(
 
 
 def _brackets(ax: Any, x: Array, bracket: Array) -> None:
-    """Draw a bar between the lower and the upper bound of the radius at each step, or a tick without an upper bound."""
+    """Draw a bar between the bounds of the radius at each step, or a tick if there is no upper bound."""
     low, high = bracket.T
     known = np.isfinite(low)
     both = known & np.isfinite(high)
@@ -419,7 +433,7 @@ def _brackets(ax: Any, x: Array, bracket: Array) -> None:
 def contact_zones(
     steps: Sequence[StepResult], pair: str, *, title: str = "", units: Units = UNKNOWN, ax: Axes | None = None
 ) -> Axes:
-    """Plot for every load step which secondary nodes are open, closed or, with friction, sticking and sliding.
+    """Plot at every load step which secondary nodes are open, closed or, with friction, sticking or sliding.
 
     Parameters
     ----------
@@ -437,7 +451,7 @@ def contact_zones(
     Raises
     ------
     FastcontactError
-        If there are no steps.
+        If there are no steps, or a step has no such pair.
 
     Examples
     --------
@@ -453,7 +467,7 @@ def contact_zones(
     >>> ax = fc.plot.contact_zones(steps, "joint")
     """
     if not steps:
-        raise FastcontactError("there is no step whose contact could be plotted")
+        raise FastcontactError("there are no steps to plot")
     axes = new_axes(ax, (6.4, 4.8))
     contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])

@@ -421,7 +421,7 @@ def test_a_failure_without_history_shows_none():
         (["plot", "a.vtkhdf", "--histroy"], "unknown option '--histroy': did you mean '--history'"),
         (["study", "forma04a"], "unknown command 'study': did you mean 'converge' or 'sweep'?"),
         (["forma04a.toml"], "to solve a file, write 'fastcontact run forma04a.toml'"),
-        (["run", "case.toml", "--html", "a"], "unknown option '--html': known are --estimate-error, --help"),
+        (["run", "case.toml", "--html", "a"], "unknown option '--html': expected one of --estimate-error, --help"),
         (["export", "a.vtkhdf", "a.rmed"], "unexpected argument 'a.rmed': write --med a.rmed; see"),
         (["run", "a.toml", "b.toml"], "unexpected argument 'b.toml'; see 'fastcontact run --help'"),
     ],

@@ -311,7 +311,7 @@ def test_a_contact_map_with_friction_has_shear_beside_the_pressure():
         size = np.linalg.norm(getattr(contact, name), axis=1)
         assert drawn.max() == pytest.approx(size.max())
         assert field_of(mesh, steps[-1], f"contact_{name}").values[contact.points] == pytest.approx(size)
-    with pytest.raises(FastcontactError, match="unknown field beside the pressure 'gap': known are shear, slip"):
+    with pytest.raises(FastcontactError, match="unknown field beside the pressure 'gap': expected one of shear, slip"):
         fc.plot.contact_map(mesh, contact, beside="gap")
     from matplotlib.figure import Figure
 

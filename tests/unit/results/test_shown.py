@@ -242,7 +242,7 @@ def test_a_result_file_shows_a_table(model, tmp_path):
 def test_names_that_are_near_are_told(model):
     steps = fc.solve(model, 1)
     (name,) = steps[0].contact
-    with pytest.raises(KeyError, match=f"unknown contact pair 'x': known are {name}"):
+    with pytest.raises(KeyError, match=f"unknown contact pair 'x': expected one of {name}"):
         steps[0].contact["x"]
     assert steps[0].contact.get("x") is None
     for module, wrong, right in (

@@ -116,7 +116,7 @@ def test_a_sweep_calls_the_function_with_all_choices():
     [
         ((tube,), r"needs its mesh sizes, such as \[4.0, 2.0, 1.0\], not 5 levels"),
         ((tube, [1.0, -1.0]), "must be positive and all different"),
-        ((tube, [1.0], ["tri3"]), "'elements' is for case files"),
+        ((tube, [1.0], ["tri3"]), "leave out 'elements', which is only for case files"),
         (("forma04a", [1.0, 0.5]), "give a case its number of levels"),
         (("forma04a", 3, None, None, {"force": 1.0}), "its theory in the table .theory.PAIR."),
         ((tube, [1.0], None, None, {"force_": 1.0}), "theory: unknown quantity 'force_': did you mean 'force'"),
@@ -145,7 +145,7 @@ def test_options_that_do_not_fit_a_function_are_told(options, message, tmp_path,
 
 
 def test_sizes_that_are_numbers_of_cells_are_told():
-    with pytest.warns(fc.FastcontactWarning, match="sizes must be lengths that shrink"):
+    with pytest.warns(fc.FastcontactWarning, match="sizes must decrease as meshes become finer"):
         fc.convergence_study(lambda n: tube(1 / n), [2, 4, 8], quantities={"bore": bore})
 
 

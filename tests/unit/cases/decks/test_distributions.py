@@ -188,7 +188,7 @@ WHOLE_LAYER = LAYER.format("QUADS", "1., 2., 2.", "type=ENERGY, mixed mode behav
         ("*Cohesive Behavior, eligibility=ORIGINAL CONTACTS\n1000., 1000., 1000.\n", "", r"has no \*COHESIVE BEHAVIOR"),
         ("*Surface Behavior", "*Friction\n0.3\n*Surface Behavior", r"BEHAVIOR: a cohesive layer excludes \*FRICTION"),
         ("eligibility=ORIGINAL CONTACTS", "repeated contacts", r"the parameter REPEATED CONTACTS"),
-        ("1000., 1000., 1000.", "0.1, 0.1, 0.1", r"line 52.*would break before its traction falls"),
+        ("1000., 1000., 1000.", "0.1, 0.1, 0.1", r"line 52.*would fail before its traction decreases"),
     ],
 )  # fmt: skip
 def test_what_is_refused_of_cohesive(tmp_path, old, new, said):

@@ -123,7 +123,7 @@ PARTS = {
 MATERIALS = {
     "elastic of another kind": (
         instead("*Elastic", "*Elastic, type=lamina"),
-        "TYPE=LAMINA is not supported; known are",
+        "TYPE=LAMINA is not supported; expected one of",
     ),
     "constants without energy": (
         instead("*Elastic\n200000., 0.", "*Elastic, type=engineering constants\n1., 1., 1., 2., 0., 0., 1., 1.,\n1."),
@@ -229,7 +229,7 @@ LOADS = {
         "component 4 does not exist at nodes of this model",
     ),
     "force on component 7": (with_load("*Cload\n15, 7, 1.\n"), "a force cannot act on component 7 of this node"),
-    "load of another kind": (with_load("*Dload\nup, ROTA, 1.\n"), "load ROTA is not supported; known are P1, P2"),
+    "load of another kind": (with_load("*Dload\nup, ROTA, 1.\n"), "load ROTA is not supported; expected one of P1, P2"),
     "gravity without direction": (with_load("*Dload\nup, GRAV, 9.81\n"), "the direction of GRAV is missing"),
     "pressure on a spring": (
         with_load("*Dload\n7, P1, 1.\n").replace("*Nset, nset=bottom", SPRING + "*Nset, nset=bottom"),
