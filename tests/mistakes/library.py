@@ -409,7 +409,7 @@ CONTACT = [
     Mistake("the same obstacle twice",
             lambda: with_obstacle(1.0).add_obstacle("again", secondary="TOP", obstacle=fc.obstacles.HalfSpace((2.0, 1.0), (0.0, -2.0)), motion={"y": -0.01} ),
             fc.ContactError,
-            r"contact 'again' presses facets of 'TOP' on the rigid obstacle on which contact 'plane' presses them already, with 3 nodes \(first: point \d+\): leave out one of the two"),
+            r"contact 'again' presses facets of 'TOP' on the same rigid obstacle as contact 'plane', with 3 nodes \(first: point \d+\): leave out one of the two"),
     Mistake("two pairs of one name", lambda: blocks().add_contact("pair", secondary="UPPER_LEFT", primary="LOWER_RIGHT"),
             fc.ContactError, r"there is already a contact pair 'pair': names must differ"),
     Mistake("supports that push one side into the other", lambda: solved(pushed_into_each_other()), fc.ModelError,
