@@ -291,11 +291,17 @@ def _with_floating_bodies(
             last_active = active | constraints.usable & (
                 constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size
             )
-    noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
+    relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
     # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
     rigid = bodies.settle(
-        solve_at, freed, dofs.numbers(bodies.dofs), start, state.largest_rigid_force, noise, state.gap_round_off
+        solve_at,
+        freed,
+        dofs.numbers(bodies.dofs),
+        start,
+        state.largest_rigid_force,
+        relative_accuracy,
+        state.gap_round_off,
     )
     if rigid.state.settled and not rigid.slack:
         gaps = gaps_at_rest(problem.model, bodies.motions)

@@ -70,7 +70,7 @@ class HertzLine:
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eqs 4.46)."""
-        return self.stress(np.zeros_like(places := array("depth", depth)), -places, nu)
+        return self.stress(np.zeros_like(depths := array("depth", depth)), -depths, nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length], where xx = yy = -pressure."""

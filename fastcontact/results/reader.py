@@ -49,16 +49,16 @@ def read_text(dataset: Any, raw: Any) -> str:
     file_size = raw.seek(0, os.SEEK_END)
     length, offset, object_number = _unpacked(REFERENCE, raw, start, file_size)
     signature, size = _unpacked(HEAD, raw, offset, file_size)
-    at, end = offset + HEAD.size, min(offset + size, file_size)
-    while signature == SIGNATURE and at + OBJECT.size <= end:
-        number, size = _unpacked(OBJECT, raw, at, end)
-        at += OBJECT.size
-        if number == object_number and length <= size and at + length <= end:
+    position, end = offset + HEAD.size, min(offset + size, file_size)
+    while signature == SIGNATURE and position + OBJECT.size <= end:
+        number, size = _unpacked(OBJECT, raw, position, end)
+        position += OBJECT.size
+        if number == object_number and length <= size and position + length <= end:
             return raw.read(length).decode("utf-8")
         if number in (0, object_number):
             break
-        at += -(-size // 8) * 8
-    raise ValueError(f"its strings are damaged at byte {at}")
+        position += -(-size // 8) * 8
+    raise ValueError(f"its strings are damaged at byte {position}")
 
 
 def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     import pandas
 
 # Contact resultants for which a NaN in the file represents None.
-OR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
+NAN_IS_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
 @typed(FileError)
@@ -488,7 +488,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.PLACES):
         value = step[column]
-        if column in OR_NONE and not np.isfinite(value).all():
+        if column in NAN_IS_NONE and not np.isfinite(value).all():
             value = None
         resultants[column] = value.item() if isinstance(value, np.generic) else value
     resultants["radius"] = tuple(step["radius"].tolist())

@@ -155,8 +155,8 @@ def _new_points(mesh: Mesh) -> _NewPoints:
 
 def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
     """Return a key of the point at `quarters` of the edge from a to b, independent of the direction of the edge."""
-    from_least = np.where(a < b, quarters, 4 - quarters)
-    return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
+    from_smaller = np.where(a < b, quarters, 4 - quarters)
+    return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_smaller
 
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
@@ -171,8 +171,8 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
     """Return the numbers of the new points of the facets that lie on a curve."""
     ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
-    wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
-    return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
+    curve_keys = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
+    return mesh.n_points + np.flatnonzero(np.isin(keys, curve_keys))
 
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
