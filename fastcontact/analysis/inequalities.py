@@ -1,7 +1,7 @@
 """One iteration of the geometry loop: pair the contact surfaces, and solve the contact problem of this pairing.
 
-The inequalities are solved by the active set method, or by the solver for Coulomb friction. Floating bodies, which only
-contact restrains, are held by springs, whose positions are iterated; see `floating_bodies`.
+The inequalities are solved by the active set method, or by the solver for Coulomb friction. Springs hold floating bodies,
+which only contact restrains. The positions at which the springs are anchored are iterated; see `floating_bodies`.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class Iterate:
         return cls(state.u.copy(), dict(state.active), dict(state.pressure))
 
     def remember(self, constraints: StackedConstraints, solution: Solution) -> None:
-        """Store, for each pair, the active set that the solution predicts, and its nodal pressures without those of fluid."""
+        """Store for each pair the active set that the solution predicts, and the nodal pressures without fluid pressure."""
         for name, rows in constraints.rows.items():
             self.active[name] = solution.wanted[rows]
             forces = constraints.parts[name].contact_forces(solution.multiplier[rows])
@@ -83,25 +83,25 @@ class Iterate:
 
 def pair_surfaces(problem: Problem, state: State, load: StepLoad, iterate: Iterate) -> StackedConstraints:
     """Pair both sides of every contact pair on the deformed configuration, with `keep_pairing` on the undeformed one."""
-    displacement, u = problem.displacement(iterate.u).copy(), iterate.u  # which later iterations overwrite
+    displacement, u = problem.displacement(iterate.u).copy(), iterate.u  # a copy, since iterations reuse the array
     if problem.force_driven.pairs:
         u = np.where(problem.system.fixed, load.lift, u)
     paired_at = np.zeros_like(displacement) if problem.criteria.keep_pairing else displacement
     parts = {}
     for name, pair in problem.pairs.items():
-        at = problem.configuration(name, state, load, paired_at, u)
+        configuration = problem.configuration(name, state, load, paired_at, u)
         pressure, fluid = iterate.pressure.get(name), iterate.fluid.get(name)
         if pressure is not None and fluid is not None:  # impermeable where the fluid has been displaced too often
             pressure = np.where(fluid[1] < DISPLACED, pressure, np.inf)
-        parts[name] = pair.constraints(replace(at, pressure=pressure, rounded=iterate.rounded))
+        parts[name] = pair.constraints(replace(configuration, pressure=pressure, rounded=iterate.rounded))
         if (wetted := parts[name].wetted) is not None:
             wet = wetted.pressure > 0.0
             before, displaced = fluid or (wet, np.zeros(len(wet), int))
             iterate.fluid[name] = wet, displaced + (before & ~wet)
         if problem.force_driven.pairs:
             rotates = isinstance(pair.primary, RigidSide) and pair.primary.rotation is not None
-            moved = at.obstacle_motion if rotates else None
-            parts[name] = problem.force_driven.constraints(name, parts[name], at.pose.displacement, moved)
+            moved = configuration.obstacle_motion if rotates else None
+            parts[name] = problem.force_driven.constraints(name, parts[name], configuration.pose.displacement, moved)
     return stacked(parts)
 
 
@@ -171,7 +171,7 @@ class StepContext:
     def driven(self, constraints: Constraints) -> Array:
         """Return the slips imposed by supports and obstacles in the step.
 
-        They are divided by the largest imposed displacement, so that round-off can be recognised.
+        They are divided by the largest displacement, imposed or present, so that round-off can be recognised.
 
         Returns
         -------
@@ -214,7 +214,7 @@ def solve_inequalities(
     -------
     solution : Solution
     displacement : ndarray (k,)
-        Displacements of the components of `step.dofs` [length].
+        Displacement components of `step.dofs` [length].
     """
     if step.problem.floating_bodies is not None:
         return _with_floating_bodies(step, step.problem.floating_bodies, constraints, iterate, active, accuracy)
@@ -256,22 +256,22 @@ def _with_floating_bodies(
 ) -> tuple[Solution, Array]:
     """Solve if contact alone restrains some bodies; return the same as `solve_inequalities`.
 
-    The springs at rigid positions hold these bodies; `FloatingBodies.settle` iterates the positions until the springs are
-    free of forces.
+    Springs that are anchored at a rigid position of these bodies hold them. `FloatingBodies.settle` iterates the position
+    until the springs carry no force.
     """
     problem, state, lift, dofs = step.problem, step.state, step.load.lift, step.dofs
-    known, near = active, iterate.u
+    last_active, guess = active, iterate.u
 
     def solve_at(position: Array) -> Solution:
-        nonlocal known, near
-        at = lift + bodies.rigid(position)
-        solution = _solve(step, constraints, iterate, known, accuracy, at, near)
-        known, near = solution.wanted, dofs.put(near.copy(), dofs.displacement(solution.u, at))
+        nonlocal last_active, guess
+        shifted_lift = lift + bodies.rigid(position)
+        solution = _solve(step, constraints, iterate, last_active, accuracy, shifted_lift, guess)
+        last_active, guess = solution.wanted, dofs.put(guess.copy(), dofs.displacement(solution.u, shifted_lift))
         return solution
 
     def failure(text: str, **options: bool) -> ConvergenceError:
-        more = needed_friction(constraints, modes, iterate.u, *loads)
-        text = text if more is None else friction_exceeded(bodies, more, constraints.friction)
+        coefficient = needed_friction(constraints, modes, iterate.u, *loads)
+        text = text if coefficient is None else friction_exceeded(bodies, coefficient, constraints.friction)
         return ConvergenceError(text, iterate.history, **options)
 
     start, modes = iterate.u[bodies.dofs], bodies.motions.displacement
@@ -288,19 +288,27 @@ def _with_floating_bodies(
         if not (active & ~constraints.equality).any():
             start, u = start + moved, iterate.u + bodies.rigid(moved)
             # The linear program of `stopped_at` is solved to a relative accuracy of 1e-7, about that of single precision.
-            known = active | constraints.usable & (constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size)
-    noise = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
-    # The response takes many linear solutions, which are cheap with factors only.
+            last_active = active | constraints.usable & (
+                constraints.gap0 + constraints.B @ u <= SINGLE_PRECISION * size
+            )
+    relative_accuracy = 10 * max(problem.solver.tolerance, accuracy.residual or 0.0)
+    # The response requires many linear solutions, which are cheap only if the matrix is factorised.
     freed = None if problem.solver.iterative else partial(bodies.freed, constraints, dofs)
     rigid = bodies.settle(
-        solve_at, freed, dofs.numbers(bodies.dofs), start, state.largest_rigid_force, noise, state.gap_round_off
+        solve_at,
+        freed,
+        dofs.numbers(bodies.dofs),
+        start,
+        state.largest_rigid_force,
+        relative_accuracy,
+        state.gap_round_off,
     )
     if rigid.state.settled and not rigid.slack:
         gaps = gaps_at_rest(problem.model, bodies.motions)
         raise failure(not_balanced(bodies, rigid, state.largest_rigid_force, bool(constraints.friction.any()), gaps))
     iterate.rigid = rigid
     solution = rigid.state
-    held = solution.response
-    if freed is not None and held is not None:
-        solution = replace(solution, response=lambda: freed(held()).respond)
+    respond = solution.response
+    if freed is not None and respond is not None:
+        solution = replace(solution, response=lambda: freed(respond()).respond)
     return solution, dofs.displacement(solution.u, lift + bodies.rigid(rigid.position))

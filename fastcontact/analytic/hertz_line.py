@@ -18,19 +18,20 @@ from fastcontact.arrays import Array
 class HertzLine:
     """Frictionless contact of two parallel cylinders (Johnson 1985, section 4.2(c)).
 
-    Each body is regarded as the half-plane y <= 0, where x is tangential to the surface and y is the outward normal of the
-    body; ModelError if y > 0. Stress components are xx, yy, zz, xy, positive in tension. The component zz depends on
-    Poisson's ratio; the parameter `nu` of several methods is by default the Poisson's ratio of the first body. The solution
-    does not include the approach of the bodies, which in 2D depends on their shapes and supports far from the contact.
+    Each body is regarded as the half-plane y <= 0, where x is tangential to the surface and y is the coordinate along the
+    outward normal of the body. Methods raise ModelError for y > 0. Stress components are xx, yy, zz, xy, positive in
+    tension. The component zz is nu (xx + yy) in plane strain and zero in plane stress; the parameter `nu` of several
+    methods defaults to the Poisson's ratio of the first body. The solution does not include the approach of the bodies,
+    which in 2D depends on their shapes and supports far from the contact.
 
     Attributes
     ----------
     bodies : Bodies
         Elastic constants of the two bodies.
     kinematics : {"plane_strain", "plane_stress"}
-        Kinematics of the two bodies.
+        Plane strain (long cylinders) or plane stress (thin discs).
     E_star : float
-        Contact modulus [pressure].
+        Contact modulus of these kinematics, `Bodies.E_star` or `Bodies.E_star_plane_stress` [pressure].
     R_effective : float
         Relative radius of curvature R, with 1/R = 1/R1 + 1/R2 [length].
     radius : float
@@ -69,21 +70,21 @@ class HertzLine:
 
     def stress_on_axis(self, depth: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] on the axis at `depth` (...) [length], >= 0 (Johnson 1985, eqs 4.46)."""
-        return self.stress(np.zeros_like(places := array("depth", depth)), -places, nu)
+        return self.stress(np.zeros_like(depths := array("depth", depth)), -depths, nu)
 
     def surface_stress(self, x: ArrayLike, nu: float | None = None) -> Array:
         """Return the stresses (..., 4) [pressure] of the surface at `x` (...) [length], where xx = yy = -pressure."""
         return self.stress(x, np.zeros_like(array("x", x)), nu)
 
     def von_mises(self, x: ArrayLike, y: ArrayLike, nu: float | None = None) -> Array:
-        """Return the equivalent stress (...) [pressure] at points `x` (...) [length], `y` (...) [length]."""
+        """Return the von Mises stress (...) [pressure] at points `x` (...) [length], `y` (...) [length]."""
         return von_mises(self.stress(x, y, nu))
 
     def displacement(self, x: ArrayLike, y: ArrayLike, *, body: int = 1) -> Array:
         """Return the displacements (..., 2) [length] of body 1 or 2 at points `x` (...) [length], `y` (...) [length].
 
-        They are relative to the displacement of the point (0, 0), because the displacement of a half-plane is unbounded at
-        infinity, and follow by integration from the stresses of McEwen (1949). ModelError for a rigid body.
+        Displacements are relative to that of the point (0, 0), because the displacement of a half-plane is unbounded at
+        infinity. They follow by integration from the stresses of McEwen (1949). Raises ModelError for a rigid body.
         """
         E, nu = self.bodies.constants(body)
         return _half_plane.displacement(x, y, self.radius, self.pressure_max, E, nu, self.kinematics)
@@ -93,7 +94,7 @@ class HertzLine:
         return self.displacement(x, np.zeros_like(array("x", x)), body=body)
 
     def von_mises_maximum(self, nu: float | None = None) -> VonMisesMaximum:
-        """Return the largest equivalent stress on the axis x = 0 and its depth.
+        """Return the largest von Mises stress on the axis x = 0 and its depth.
 
         At the depth s b, with w = sqrt(1 + s^2) and e = 1 - 2 nu (e = 1 in plane stress), the von Mises stress is
         p0 (w - s) sqrt(3 s^2/w^2 + e^2) by eqs 4.46 of Johnson (1985). Its maximum lies at the surface, or where
@@ -103,16 +104,17 @@ class HertzLine:
 
         e = 1.0 - 2.0 * self._nu(nu) if self.kinematics == "plane_strain" else 1.0
 
-        def rise(s: float) -> float:
+        def slope(s: float) -> float:
             w = math.hypot(1.0, s)
             return 3.0 * s - 3.0 * s * s * w - e * e * w**3
 
-        s = float(brentq(rise, 0.4, 0.9, xtol=1e-15)) if rise(0.4) > 0.0 else 0.0
+        # A maximum below the surface that exceeds the value at the surface, |e|, lies at 0.58 < s < 0.79.
+        s = float(brentq(slope, 0.4, 0.9, xtol=1e-15)) if slope(0.4) > 0.0 else 0.0
         w = math.hypot(1.0, s)
-        below = (w - s) * math.sqrt(3.0 * (s / w) ** 2 + e * e)
-        if below <= abs(e):
+        subsurface = (w - s) * math.sqrt(3.0 * (s / w) ** 2 + e * e)
+        if subsurface <= abs(e):
             return VonMisesMaximum(abs(e) * self.pressure_max, 0.0)
-        return VonMisesMaximum(below * self.pressure_max, s * self.radius)
+        return VonMisesMaximum(subsurface * self.pressure_max, s * self.radius)
 
     def _nu(self, nu: float | None) -> float:
         return self.bodies.nu1 if nu is None else poisson("nu", nu)
@@ -143,7 +145,7 @@ def hertz_line(
     Parameters
     ----------
     E1, nu1, R1, E2, nu2, R2 : float
-        Described for `hertz_point`.
+        See `hertz_point`.
     force, radius, pressure_max : float
         Normal force per unit length [force/length], half-width of the contact [length] or largest pressure [pressure]; give
         exactly one of them.

@@ -105,13 +105,15 @@ def beyond(triangle, s, t):
 
 @innermost_kernel
 def _off(triangle, s, t):
-    """Return the sum of the overhangs beyond all edges, which beside an edge is smaller than that of the next facets.
+    """Return `beyond`, and where it ties the smaller value for the facet whose other reference coordinates are inside.
 
     Beyond the end of the surface, the largest overhangs of a facet and of the next one along this end are equal.
     """
     if triangle:
-        return max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
-    return 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
+        total = max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
+    else:
+        total = 0.5 * (max(abs(s) - 1.0, 0.0) + max(abs(t) - 1.0, 0.0))
+    return beyond(triangle, s, t) + 1e-3 * total
 
 
 @innermost_kernel

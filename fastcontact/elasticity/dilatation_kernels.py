@@ -1,14 +1,15 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Element loops of the projected dilatation: stiffness, and pressure at quadrature points.
+"""Element loops of the projected dilatation: its stiffness, and its mean stress at points of the cells.
 
 Shared arguments: ``points`` (n_points, dim) [length]; ``cells`` (n_cells, n_nodes); ``N`` (n_q, n_nodes), ``dN`` (n_q,
 n_nodes, dim), ``weights`` (n_q,) of the reference element; ``basis`` (n_q, m), the polynomials at the same points, the
 constant first; ``bulk`` (n_materials, 2) [pressure], the moduli of the mean dilatation and of the other polynomials, zero
 for materials without projection; ``material`` (n_cells,). dim is 2 or 3.
 
-With the dilatation t = d.u, the weights w of the quadrature and the polynomials p, M = sum w p p^T = L L^T is their mass
-matrix and g = sum w p d^T. L^-1 p are orthonormal polynomials, the projection is p^T M^-1 g u, and its stiffness
-(L^-1 g)^T B (L^-1 g) with the diagonal matrix B of the moduli (Hughes, Int. J. Numer. Meth. Engng 15, 1980).
+Let t = d.u be the dilatation of the nodal displacements u, w the quadrature weights, and p the polynomials. Their mass
+matrix is M = sum w p p^T = L L^T, and g = sum w p d^T. The projected dilatation is p^T M^-1 g u. The polynomials L^-1 p are
+orthonormal, and the first of them is constant, so that the stiffness is (L^-1 g)^T B (L^-1 g) with the diagonal matrix B
+of the moduli (Hughes, Int. J. Numer. Meth. Engng 15, 1980).
 """
 
 import numpy as np
@@ -22,7 +23,7 @@ from fastcontact.mesh.jacobian_kernels import at_nodes, gradients, inverse_jacob
 def _measure(x, N, dN, q, axisymmetric, J, inverse, gradient):
     """Fill `gradient` (n_nodes, dim) with the dilatation of unit displacements of the nodes `x` (n_nodes, dim).
 
-    Returns the measure of the point; `J` and `inverse` (dim, dim) are overwritten.
+    Returns det J, in axisymmetry times the circumference 2 pi r; `J` and `inverse` (dim, dim) are overwritten.
     """
     measure = inverse_jacobian(x, dN, q, J, inverse)
     gradients(dN, q, inverse, gradient)
@@ -55,7 +56,7 @@ def _integrate(x, N, dN, weights, basis, axisymmetric, J, inverse, gradient, mas
 
 @kernel
 def reduce(mass, g):
-    """Replace the lower half of `mass` (m, m) by its Cholesky factor L, and `g` (m, n) by L^-1 g."""
+    """Replace the lower triangle of `mass` (m, m) by its Cholesky factor L, and `g` (m, n) by L^-1 g."""
     for m in range(mass.shape[0]):
         for n in range(m + 1):
             value = mass[m, n]
@@ -80,9 +81,10 @@ def back_substitute(L, y):
 
 @kernel
 def add_products(factors, g, slots, c, inside, row, data):
-    """Add ``g^T diag(factors) g`` of a cell, `g` (m, n_nodes * dim), to the rows of the nodes that are `inside` in `data`.
+    """Add ``g^T diag(factors) g`` of cell `c`, with `g` (m, n_nodes * dim), to `data` (n_blocks, dim, dim).
 
-    `row` (n_nodes * dim,) is overwritten.
+    Only rows of nodes with `inside` (n_nodes,) are added to. `slots` (n_cells, n_nodes, n_nodes) are the numbers of the
+    blocks of `data`, and `row` (n_nodes * dim,) is overwritten.
     """
     n_nodes, dim = len(inside), data.shape[1]
     for a in range(n_nodes):
@@ -100,9 +102,10 @@ def add_products(factors, g, slots, c, inside, row, data):
 
 @kernel
 def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, slots, owner, part, data):
-    """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), in the rows of a part's nodes.
+    """Add the stiffness of the projected dilatation to `data` (n_blocks, dim, dim), for nodes with ``owner[node] == part``.
 
-    Arguments are as for the element loops of the stiffness; Jacobians are known to be positive.
+    `slots`, `owner`, `part` and `data` are those of `element_2d_kernels.add_stiffness`, which checks that Jacobians are
+    positive.
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
@@ -124,16 +127,17 @@ def add_stiffness(points, cells, N, dN, weights, basis, bulk, material, axisymme
 def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmetric, displacement, at, out):
     """Add the moduli times the projected dilatation to the normal stresses in `out` (n_cells, n_out, n_components).
 
-    `displacement` (n_points, dim) are the displacements, and `at` (n_out, m) the polynomials at the points of `out`.
+    `displacement` (n_points, dim) [length] are the displacements, `at` (n_out, m) [-] the polynomials at the points of
+    `out`, whose unit is [pressure].
     """
     n_cells, n_nodes = cells.shape
     dim, size = points.shape[1], basis.shape[1]
     x, u, gradient = np.empty((n_nodes, dim)), np.empty((n_nodes, dim)), np.empty((n_nodes, dim))
     J, inverse = np.empty((dim, dim)), np.empty((dim, dim))
-    mass, g, value = np.empty((size, size)), np.empty((size, 1)), np.empty(size)
+    mass, g, coefficient = np.empty((size, size)), np.empty((size, 1)), np.empty(size)
     for c in range(n_cells):
-        mean, rest = bulk[material[c], 0], bulk[material[c], 1]
-        if mean == 0.0:
+        bulk_mean, bulk_rest = bulk[material[c], 0], bulk[material[c], 1]
+        if bulk_mean == 0.0:
             continue
         at_nodes(points, cells, c, x)
         at_nodes(displacement, cells, c, u)
@@ -152,11 +156,11 @@ def add_pressure(points, cells, N, dN, weights, basis, bulk, material, axisymmet
                 g[m, 0] += factor * dilatation
         reduce(mass, g)
         for m in range(size):
-            value[m] = g[m, 0] * (mean if m == 0 else rest)
-        back_substitute(mass, value)
+            coefficient[m] = g[m, 0] * (bulk_mean if m == 0 else bulk_rest)
+        back_substitute(mass, coefficient)
         for k in range(at.shape[0]):
-            pressure = 0.0
+            mean_stress = 0.0
             for m in range(size):
-                pressure += at[k, m] * value[m]
+                mean_stress += at[k, m] * coefficient[m]
             for i in range(3):
-                out[c, k, i] += pressure
+                out[c, k, i] += mean_stress

@@ -71,8 +71,10 @@ class Material:
     def contact_modulus(self) -> float:
         """Smallest plane-strain modulus E / (1 - nu^2) along the axes, a measure of the contact stiffness [pressure]."""
         D = np.moveaxis(np.linalg.inv(self._all_compliances()), 0, -1)
-        free = [D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))]
-        return float(np.min(free))
+        plane_strain = [
+            D[i, i] - D[i, j] * D[j, i] / D[j, j] for i, j in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1))
+        ]
+        return float(np.min(plane_strain))
 
     def _all_compliances(self) -> Array:
         """Return the compliances (n, 6, 6) [1 / pressure] in material axes, at all sampling points if constants vary."""
@@ -116,16 +118,17 @@ class Material:
     def check_thermal_and_density(self, most: int) -> None:
         """Raise ModelError if the density is negative, or a thermal constant is neither a number nor `most` numbers.
 
-        Constants that vary are checked when the cells of the material are known.
+        `most` is 3 for materials with axes, otherwise 1. Constants that vary are checked when the cells of the material are
+        known.
         """
         density = self.density
         if not isinstance(density, Varying) and density is not None and not 0.0 <= _real(density) < math.inf:
-            raise ModelError(f"the density = {density} must be a number, zero or more")
+            raise ModelError(f"the density = {density} must be a non-negative number")
         check_expansion(self.expansion, most)
         check_conductivity(self.conductivity, most)
 
     def bound(self: AnyMaterial, cells: Cells) -> AnyMaterial:
-        """Return the material together with its cells, at which varying constants can be evaluated.
+        """Return a copy of the material with its cells, in which varying constants can be evaluated.
 
         ModelError if a varying constant is not admissible somewhere in these cells.
         """
@@ -133,7 +136,7 @@ class Material:
         if not names:
             return self
 
-        def known(name: str) -> Any:
+        def with_cells(name: str) -> Any:
             label = f"the constant {name} of the material"
             return mapped(
                 getattr(self, name), lambda v: type(v)(v.given, cells, label) if isinstance(v, Varying) else v
@@ -141,7 +144,7 @@ class Material:
 
         bound_material = copy.copy(self)
         for name in names:
-            object.__setattr__(bound_material, name, known(name))
+            object.__setattr__(bound_material, name, with_cells(name))
         for sample in cells.samples():
             bound_material._check_at([name for name in names if name != "axes"], *sample)
         return bound_material
@@ -171,9 +174,7 @@ class Material:
         """Return the cells of the material; ModelError if the material has not been assigned to cells."""
         varying_constants = [v for name in CONSTANTS for v in varying(getattr(self, name, None))]
         if not varying_constants or varying_constants[0].cells is None:
-            raise ModelError(
-                "constants of the material depend on the position: use the material in the `materials` of a model"
-            )
+            raise ModelError("constants of the material depend on the position: add the material to a model first")
         return varying_constants[0].cells
 
     def _check_at(self, names: Sequence[str], element: str, rows: Indices, N: Array) -> None:
@@ -202,10 +203,12 @@ class Material:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
         In axisymmetry x, y and z denote the radial, axial and circumferential directions. In plane stress the rows and
-        columns of zz are zero. ModelError if the material axes depend on position.
+        columns of zz are zero. ModelError if material axes, moduli or thermal expansion depend on position.
         """
         if self.varies:
-            raise ModelError("the axes of the material depend on the position: call moduli_at(points, kinematics)")
+            raise ModelError(
+                "axes or constants of the material depend on the position: call moduli_at(points, kinematics, constants)"
+            )
         return np.asarray(self.moduli_at(np.zeros((1, 3 if kinematics == "3d" else 2)), kinematics)[0])
 
     def moduli_at(self, points: Array, kinematics: str, constants: Any = None) -> Array:
@@ -246,8 +249,8 @@ class Material:
         strain = np.stack([tensor[:, i, j] * (1.0 if i == j else 2.0) for i, j in PAIRS], axis=1)
         if np.abs(strain[:, size:]).max(initial=0.0) > ROUND_OFF * np.abs(along).max(initial=0.0):
             raise ModelError(
-                f"the expansion of the material with {self.described} shears it out of the plane: turn one axis along z, or "
-                "use a mesh in 3D"
+                f"the expansion of the material with {self.described} causes out-of-plane shear: align one axis with z, "
+                "or use a 3D mesh"
             )
         return np.asarray(strain[:, :size])
 
@@ -263,8 +266,8 @@ class Material:
         along, tensor = self._along_axes(conductivity, points, kinematics, constants)
         if np.abs(tensor[:, :dim, dim:]).max(initial=0.0) > ROUND_OFF * along.max(initial=0.0):
             raise ModelError(
-                f"the conductivity of the material with {self.described} turns heat out of the plane: turn one axis along z, "
-                "or use a mesh in 3D"
+                f"the conductivity of the material with {self.described} conducts heat out of the plane: align one "
+                "axis with z, or use a 3D mesh"
             )
         return np.asarray(tensor[:, :dim, :dim])
 
@@ -282,7 +285,9 @@ class Material:
         """Return the material axes (n, 3, 3) [-] at `points` (n, dim) [length]; axes given by cell are in `constants`."""
         axes = constants.axes if constants and varying(self.axes) else self.axes
         if varying(axes):
-            raise ModelError("axes by cell need to know the cells: give the `constants_at` of the material of a model")
+            raise ModelError(
+                "axes given by cell need `constants`: pass the result of `constants_at` of a model's material"
+            )
         return frames(axes, points, kinematics)
 
     def _compliance6(self, points: Array, kinematics: str, constants: Any) -> Array:
@@ -291,16 +296,16 @@ class Material:
         ModelError if the material couples in-plane stresses with out-of-plane shear, which plane kinematics exclude.
         """
         check_known("kinematics", kinematics, KINEMATICS, ModelError)
-        of_stress = rotations(self._frames(points, kinematics, constants))
+        stress_rotation = rotations(self._frames(points, kinematics, constants))
         # Engineering strains transform by the inverse transpose of the matrix that transforms stresses.
-        back = np.linalg.inv(of_stress)
+        inverse = np.linalg.inv(stress_rotation)
         local = self.local_compliance if constants is None or not self.graded else self.compliances(constants)
-        compliance = np.asarray(back.transpose(0, 2, 1) @ local @ back)
-        across = np.abs(compliance[:, :4, 4:]).max(initial=0.0)
-        if kinematics != "3d" and across > ROUND_OFF * np.abs(compliance).max(initial=0.0):
+        compliance = np.asarray(inverse.transpose(0, 2, 1) @ local @ inverse)
+        coupling = np.abs(compliance[:, :4, 4:]).max(initial=0.0)
+        if kinematics != "3d" and coupling > ROUND_OFF * np.abs(compliance).max(initial=0.0):
             raise ModelError(
-                f"the material with {self.described} couples strains in the plane with shear out of it, by its constants or "
-                f"by its axes: {kinematics} has no such shear; turn one axis along z, or use a mesh in 3D"
+                f"the material with {self.described} couples in-plane strains with out-of-plane shear, which {kinematics} "
+                "excludes: align one axis with z, or use a 3D mesh"
             )
         if kinematics != "3d":
             compliance[:, :4, 4:] = compliance[:, 4:, :4] = 0.0
@@ -327,8 +332,8 @@ def check_positive(name: str, value: Any, caption: str = "a positive number") ->
 def check_expansion(value: Any, most: int) -> None:
     """Raise ModelError if a coefficient of expansion is given and is neither a finite number nor `most` finite numbers."""
     numbers = [value] if not isinstance(value, (Sequence, np.ndarray)) else list(value)
-    fit = all(isinstance(v, Varying) or math.isfinite(_real(v)) for v in numbers)
-    if value is not None and not (fit and len(numbers) in (1, most)):
+    valid = all(isinstance(v, Varying) or math.isfinite(_real(v)) for v in numbers)
+    if value is not None and not (valid and len(numbers) in (1, most)):
         wanted = "a number" if most == 1 else "a number, or three along the material's axes"
         raise ModelError(f"the coefficient of thermal expansion = {value} must be {wanted}")
 
@@ -343,7 +348,7 @@ def check_conductivity(value: Any, most: int) -> None:
             check_positive("the conductivity", number)
 
 
-# A number, a function of the position, or numbers for each cell or point; for type checkers, a number when read.
+# A number, a function of position, or numbers for each cell or point. Type checkers see Any, since users read numbers.
 if TYPE_CHECKING:
     Constant = Any
 else:
@@ -360,24 +365,25 @@ class LinearElastic(Material):
     E : float, callable or ndarray (n,)
         Young's modulus, greater than 0 [pressure]: a number, a function from positions (n, dim) [length] to numbers (n,),
         such as `Tabulated`, or an array. An array has one number for each solid cell of the groups of the material, for
-        each solid cell of the mesh in the order of ``mesh.solids``, or for each point of the mesh. An array (n, 1) always
-        belongs to cells, also if the mesh has as many points.
+        each solid cell of the mesh in the order of ``mesh.solids``, or for each point of the mesh. An array (n, 1)
+        always belongs to cells, even if the mesh has n points.
     nu : float, callable or ndarray (n,)
         Poisson's ratio, -1 < nu < 0.5 [-], in one of the forms of E.
     volumetric : {"auto", "plain", "mean_dilatation"}
         Treatment of the dilatation. ``"plain"`` uses the dilatation of the displacements. ``"mean_dilatation"`` projects it
-        onto constants in each linear, and onto linear functions in each quadratic quadrangle, hexahedron, wedge and
-        pyramid, so that these cells do not lock if the material is nearly incompressible. ``"auto"`` selects the mean
-        dilatation for nu >= 0.49. The treatment has no effect on linear triangles and tetrahedra, and in plane stress.
+        onto constants in linear cells and onto linear functions in quadratic cells, so that nearly incompressible materials
+        do not lock. In quadratic triangles, tetrahedra, wedges and pyramids only the mean has the full bulk modulus, and the
+        remainder has at most that of nu = 0.3. ``"auto"`` selects the mean dilatation for nu >= 0.49. The treatment has no
+        effect on linear triangles and tetrahedra, and in plane stress.
     density : float, callable or ndarray (n,), optional
         Mass per unit volume, at least 0, in one of the forms of E [mass / length^3]. Gravity, centrifugal loads and
         vibration modes need it.
     expansion : float, callable or ndarray (n,), optional
         Coefficient of thermal expansion, in one of the forms of E [1 / temperature].
     incompatible_modes : bool
-        Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation. They avoid shear
-        locking in bending as well as volumetric locking, at about three times the cost of assembly and ten times the cost
-        of stress recovery. They have no effect on other elements and in axisymmetry.
+        Whether linear quadrangles and hexahedra have incompatible modes instead of a mean dilatation. The modes
+        avoid shear locking in bending as well as volumetric locking, at about three times the cost of assembly and ten times
+        the cost of stress recovery. The option has no effect on other elements and in axisymmetry.
     conductivity : float, callable or ndarray (n,), optional
         Thermal conductivity, greater than 0, in one of the forms of E [power / (length temperature)].
 
@@ -411,8 +417,8 @@ class LinearElastic(Material):
         if not isinstance(self.nu, Varying) and not -1.0 < _real(self.nu) < 0.5:
             raise ModelError(
                 f"Poisson's ratio nu = {self.nu} must lie between -1 and 0.5, both excluded "
-                "(for an incompressible material take nu = 0.4999, in quadrangles or hexahedra: they have a mean dilatation "
-                "then and do not lock)"
+                "(for an incompressible material use nu = 0.4999 with quadrangles or hexahedra, whose mean dilatation avoids "
+                "locking)"
             )
         check_known("volumetric", self.volumetric, VOLUMETRIC, ModelError)
         self.check_thermal_and_density(1)
@@ -470,7 +476,8 @@ class LinearElastic(Material):
     def moduli(self, kinematics: str) -> Array:
         """Return the matrix (4, 4), in 3D (6, 6) [pressure] from strains (xx, yy, zz, 2xy, in 3D 2yz, 2xz) to stresses.
 
-        In plane stress the rows and columns of zz are zero (Timoshenko and Goodier, 1970, section 16).
+        In plane stress the rows and columns of zz are zero (Timoshenko and Goodier, 1970, section 16). ModelError if E or nu
+        depends on position.
         """
         if self.graded:
             raise ModelError(

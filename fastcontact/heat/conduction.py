@@ -44,12 +44,12 @@ class Conduction:
 
     def check(self) -> None:
         """Raise ModelError if the material of a cell has no conductivity."""
-        without = [material.conductivity is None for material in self.materials]
-        missing = sum(int(np.array(without)[numbers].sum()) for numbers in self.number.values())
+        lacks_conductivity = [material.conductivity is None for material in self.materials]
+        missing = sum(int(np.array(lacks_conductivity)[numbers].sum()) for numbers in self.number.values())
         if missing:
             raise ModelError(
-                f"heat is conducted, but the materials of {missing} solid cells have no conductivity: give them "
-                "conductivity=..."
+                f"heat conduction is solved, but {missing} solid cells have a material without conductivity: define it "
+                "with conductivity=..."
             )
 
     def matrix(self) -> csr_array:
@@ -66,13 +66,13 @@ class Conduction:
         return csr_array((values[:, 0], pattern.indices, pattern.indptr), shape=(self.mesh.n_points,) * 2)
 
     def flux(self, temperature: Array) -> Array:
-        """Return the mean heat flux (n_solids, dim) [power / area] of each cell for a `temperature` (n_points,)."""
+        """Return the mean heat flux (n_solids, dim) [power / area] of cells at a `temperature` (n_points,) [temperature]."""
         flux = []
         for name, rows in portions(self.mesh):
             gradient, k, volume = self._at(name, rows)
-            slope = np.einsum("cqai,ca->cqi", gradient, temperature[self.mesh.cells[name][rows]])
-            total = -np.einsum("cq,cqij,cqj->ci", volume, k, slope, optimize=True)
-            flux.append(total / volume.sum(axis=1)[:, None])
+            temperature_gradient = np.einsum("cqai,ca->cqi", gradient, temperature[self.mesh.cells[name][rows]])
+            integral = -np.einsum("cq,cqij,cqj->ci", volume, k, temperature_gradient, optimize=True)
+            flux.append(integral / volume.sum(axis=1)[:, None])
         return np.concatenate(flux)
 
     def _at(self, name: str, rows: Indices) -> tuple[Array, Array, Array]:
@@ -90,6 +90,8 @@ class Conduction:
         for index in np.unique(number):
             cells = np.flatnonzero(number == index)
             constants = self.materials[index].constants_at(name, rows[cells], N)
-            at = self.materials[index].conductivity_at(positions(mesh, nodes[cells], N), self.kinematics, constants)
-            k[cells] = at.reshape(len(cells), *k.shape[1:])
+            k_cells = self.materials[index].conductivity_at(
+                positions(mesh, nodes[cells], N), self.kinematics, constants
+            )
+            k[cells] = k_cells.reshape(len(cells), *k.shape[1:])
         return gradient, k, volume

@@ -1,4 +1,4 @@
-"""Facets and nodes that belong to two contact pairs, between which the split of the force is undetermined."""
+"""Facets and nodes shared by two contact pairs, for which the distribution of the contact force is not unique."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION
 
 
 def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if two pairs have the same facets, in any roles, or press them on the same obstacle.
+    """Raise ContactError if two pairs share facets on both sides, in either role, or press shared facets on one obstacle.
 
-    One side may face several others: each pair then has a different opposite side.
+    A surface may face several other surfaces, because the opposite side of each pair then differs.
     """
     if pair.obstacle is not None or other.obstacle is not None:
         _check_obstacles(mesh, pair, other)
     elif {pair.secondary, pair.primary} == {other.secondary, other.primary}:
         raise ContactError(
-            f"contact '{pair.name}' joins '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' joins "
+            f"contact '{pair.name}' pairs '{pair.secondary}' and '{pair.primary}', which contact '{other.name}' pairs "
             "already: leave out one of the two"
         )
     else:
@@ -37,19 +37,19 @@ def check_repeated(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
 
 
 def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, facing: str, opposite: str) -> None:
-    """Compare the secondary side of `pair` with the side `facing` of `other`, the primary one with `opposite`."""
+    """Raise ContactError if the secondary side of `pair` shares facets with `facing`, the primary side with `opposite`."""
     secondary = shared_facets(mesh, pair.secondary, facing)
     if len(secondary) and len(shared_facets(mesh, pair.primary, opposite)):
         raise ContactError(
-            f"contact '{pair.name}' joins facets of '{pair.secondary}' and '{pair.primary}' that contact '{other.name}' "
-            f"joins already: '{pair.secondary}' and '{facing}' share facets with {len(secondary)} nodes (first: point "
+            f"contact '{pair.name}' pairs facets of '{pair.secondary}' and '{pair.primary}' that contact '{other.name}' "
+            f"pairs already: '{pair.secondary}' and '{facing}' share facets with {len(secondary)} nodes (first: point "
             f"{secondary[0]}), '{pair.primary}' and '{opposite}' share facets, too. Leave out one of the two contacts, or "
             "separate their groups"
         )
 
 
 def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
-    """Return whether a contact with another body has facets of both groups, in any roles."""
+    """Return whether `other` contains facets of both groups `sides`, in either role; False against an obstacle."""
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
@@ -57,20 +57,20 @@ def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bo
 
 
 def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Compare the obstacles where the two sides share facets; two obstacles that form a corner differ."""
+    """Raise ContactError if both obstacles have the same gaps and normals on shared facets, unlike two that form a corner."""
     if pair.obstacle is None or other.obstacle is None or _moved(pair) != _moved(other):
         return
     nodes = shared_facets(mesh, pair.secondary, other.secondary)
     if not len(nodes):
         return
     points = mesh.points[nodes]
-    (gap, normal), (gap_there, normal_there) = pair.obstacle.distance(points), other.obstacle.distance(points)
+    (gap, normal), (other_gap, other_normal) = pair.obstacle.distance(points), other.obstacle.distance(points)
     size = float(np.ptp(mesh.points, axis=0).max())
-    same_gap = np.allclose(gap, gap_there, rtol=0.0, atol=LENGTH_ROUND_OFF * size)
-    if same_gap and np.allclose(normal, normal_there, atol=SINGLE_PRECISION):
+    same_gap = np.allclose(gap, other_gap, rtol=0.0, atol=LENGTH_ROUND_OFF * size)
+    if same_gap and np.allclose(normal, other_normal, atol=SINGLE_PRECISION):
         raise ContactError(
-            f"contact '{pair.name}' presses facets of '{pair.secondary}' on the rigid obstacle on which contact "
-            f"'{other.name}' presses them already, with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the "
+            f"contact '{pair.name}' presses facets of '{pair.secondary}' on the same rigid obstacle as contact "
+            f"'{other.name}', with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the "
             "two"
         )
 
@@ -80,30 +80,31 @@ def _moved(pair: ContactPair) -> tuple[Any, ...]:
 
 
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
-    """Yield a warning for each two pairs whose sides continue each other at common nodes, on both bodies.
+    """Yield a warning for every two pairs whose sides continue each other at common nodes, on both bodies.
 
-    Each pair has its own pressure at such a node, but the gap only determines the sum of both, so that its division, also
-    over the neighbours, is arbitrary. Node-to-segment contact divides the force of a node by areas, which is correct if both
-    pairs have the same primary side. If the primary side is divided as well, each pair faces only a part of it.
+    Each pair has a separate pressure at such a node, but the gap determines only the sum of the two pressures. Their ratio,
+    and with it the pressure at neighbouring nodes, is arbitrary. Node-to-segment contact divides the force of a node in the
+    ratio of the areas, which is correct if both pairs have the same primary side. If the primary side is divided as well,
+    each pair faces only a part of it.
     """
-    for (one, ours), (other, theirs) in combinations(pairs, 2):
-        if not isinstance(ours.primary, Surface) or not isinstance(theirs.primary, Surface):
+    for (pair, sides), (other, other_sides) in combinations(pairs, 2):
+        if not isinstance(sides.primary, Surface) or not isinstance(other_sides.primary, Surface):
             continue
-        if {one.formulation, other.formulation} == {"node_to_segment"} and one.primary == other.primary:
+        if {pair.formulation, other.formulation} == {"node_to_segment"} and pair.primary == other.primary:
             continue
-        roles = ((theirs.secondary, theirs.primary), (theirs.primary, theirs.secondary))
+        roles = ((other_sides.secondary, other_sides.primary), (other_sides.primary, other_sides.secondary))
         for secondary, primary in roles:
-            nodes = _common(ours.points, ours.secondary, secondary)
-            if len(nodes) and len(_common(ours.points, ours.primary, primary)):
+            nodes = _common(sides.points, sides.secondary, secondary)
+            if len(nodes) and len(_common(sides.points, sides.primary, primary)):
                 yield (
-                    f"contacts '{one.name}' and '{other.name}' continue each other at {len(nodes)} common nodes of their "
-                    f"sides (first: point {nodes[0]}): the pressure near these is not unique; make one contact of both, "
+                    f"contacts '{pair.name}' and '{other.name}' continue each other at {len(nodes)} common nodes of their "
+                    f"sides (first: point {nodes[0]}): the pressure near them is not unique; make one contact of both, "
                     "with one group for each side"
                 )
 
 
 def _common(points: Array, side: Surface, other: Surface) -> Numbers:
-    """Return the common nodes of two surfaces with nodes at `points` (n_points, dim) at which their normals agree."""
+    """Return the common nodes of two surfaces at which their normals differ by less than CORNER."""
     nodes = np.intersect1d(side.points, other.points)
     if not len(nodes):
         return nodes
@@ -112,6 +113,6 @@ def _common(points: Array, side: Surface, other: Surface) -> Numbers:
 
 
 def _places(side: Surface, nodes: Numbers) -> Indices:
-    """Return the positions of nodes among the points of a side."""
+    """Return the indices (n,) of `nodes` (n,) in the points of a side."""
     order = np.argsort(side.points)
     return np.asarray(order[np.searchsorted(side.points, nodes, sorter=order)])

@@ -26,9 +26,9 @@ from fastcontact.results.file_lock import is_being_written
 from fastcontact.results.step import ContactResult, MaterialStress, StepResult, StepSequence
 from fastcontact.results.units import units_of_results
 
-# Global heap collections, which contain the strings of variable length (HDF5 File Format Specification 3.0, section III.E):
-# a header of 16 bytes with the size of the collection and a sequence of objects, each with a header of 16 bytes. They are
-# read without HDF5, which does not terminate for some damaged files.
+# HDF5 stores strings of variable length in global heap collections (HDF5 File Format Specification 3.0, section III.E). A
+# collection consists of a header of 16 bytes, which contains its size, and a sequence of objects, each with a header of 16
+# bytes. Strings are read without the HDF5 library, which does not terminate for some damaged files.
 SIGNATURE = b"GCOL\x01\0\0\0"  # with version and reserved bytes
 HEAD = struct.Struct("<8sQ")  # header of a collection: signature, size
 OBJECT = struct.Struct("<H6xQ")  # header of an object: number, size; free space at the end has the number 0
@@ -36,33 +36,34 @@ REFERENCE = struct.Struct("<IQI")  # entry of a data set: length of the string, 
 
 
 def read_text(dataset: Any, raw: Any) -> str:
-    """Return the string in a data set that contains a single string; `raw` is the open file, with addresses of eight bytes.
+    """Return the string of a data set that contains a single string of variable length.
 
-    Raises ValueError if the data set is of another kind or damaged.
+    `raw` is the open file, whose offsets and lengths have eight bytes. Raises ValueError if the data set does not contain
+    such a string or is damaged.
     """
     import h5py
 
-    kind, start = h5py.check_string_dtype(dataset.dtype), dataset.id.get_offset()
-    if dataset.shape != () or start is None or kind is None or kind.length is not None:
+    string_type, start = h5py.check_string_dtype(dataset.dtype), dataset.id.get_offset()
+    if dataset.shape != () or start is None or string_type is None or string_type.length is not None:
         raise ValueError(f"'{dataset.name}' is not a string")
     file_size = raw.seek(0, os.SEEK_END)
-    length, offset, wanted = _unpacked(REFERENCE, raw, start, file_size)
+    length, offset, object_number = _unpacked(REFERENCE, raw, start, file_size)
     signature, size = _unpacked(HEAD, raw, offset, file_size)
-    at, end = offset + HEAD.size, min(offset + size, file_size)
-    while signature == SIGNATURE and at + OBJECT.size <= end:
-        number, size = _unpacked(OBJECT, raw, at, end)
-        at += OBJECT.size
-        if number == wanted and length <= size and at + length <= end:
+    position, end = offset + HEAD.size, min(offset + size, file_size)
+    while signature == SIGNATURE and position + OBJECT.size <= end:
+        number, size = _unpacked(OBJECT, raw, position, end)
+        position += OBJECT.size
+        if number == object_number and length <= size and position + length <= end:
             return raw.read(length).decode("utf-8")
-        if number in (0, wanted):
+        if number in (0, object_number):
             break
-        at += -(-size // 8) * 8
-    raise ValueError(f"its texts are damaged at byte {at}")
+        position += -(-size // 8) * 8
+    raise ValueError(f"its strings are damaged at byte {position}")
 
 
 def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any, ...]:
     if offset + kind.size > end:
-        raise ValueError(f"its texts are damaged: they are at byte {offset} of {end}")
+        raise ValueError(f"its strings are damaged: byte {offset} lies beyond the end at {end}")
     raw.seek(offset)
     return kind.unpack(raw.read(kind.size))
 
@@ -71,7 +72,7 @@ if TYPE_CHECKING:
     import pandas
 
 # Contact resultants for which a NaN in the file represents None.
-OR_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
+NAN_IS_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
 @typed(FileError)
@@ -95,13 +96,23 @@ def open_results(path: PathLike) -> Results:
 
     Examples
     --------
-    >>> last = open_results("punch.vtkhdf")[-1]  # doctest: +SKIP
+    >>> import fastcontact as fc
+    >>> model = fc.Model(fc.generate.block(), "plane_strain")
+    >>> model.add_material(fc.LinearElastic(E=1000.0, nu=0.3))
+    >>> model.fix("BOTTOM", "xy")
+    >>> model.add_pressure("TOP", 2.0)
+    >>> with fc.ResultWriter("block.vtkhdf", model) as out:
+    ...     steps = fc.solve(model, 2, on_step=out.write)
+    >>> with fc.open_results("block.vtkhdf") as results:
+    ...     last = results[-1]
+    >>> last.load_factor
+    1.0
     """
     return Results(path)
 
 
 class Results(StepSequence):
-    """A sequence of the steps of a result file, which are read on access, and further data of the file.
+    """The steps of a result file, each of which is read on access, and data of the mesh and of the run.
 
     Steps contain NumPy arrays and remain valid after the file is closed.
 
@@ -138,14 +149,14 @@ class Results(StepSequence):
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
         """Open the file.
 
-        If `repeat`, writes of the journal that a power loss interrupted are repeated first, which requires that no other
-        program writes to the file.
+        Changes in the journal, which a power loss may have interrupted, are applied to the data read, but not to the file.
+        They are ignored while the file is being written, unless `repeat`, which requires that no other program writes to it.
         """
         import h5py
 
         self.path: Path = existing_file(path)
         if not os.access(path, os.R_OK, effective_ids=os.access in os.supports_effective_ids):
-            raise FileError(f"'{path}' may not be read: ask its owner for the permission")
+            raise FileError(f"'{path}' is not readable: ask its owner for read permission")
         if not h5py.is_hdf5(self.path):
             raise FileError(f"'{path}' is not an HDF5 file: name a result file that fastcontact wrote (.vtkhdf)")
         # Opened by a separate file object, because HDF5 would reuse an open file of the same name with its cached state.
@@ -165,14 +176,14 @@ class Results(StepSequence):
     def _checked(self) -> Any:
         """Return the HDF5 group of fastcontact in the file, after a check of its schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
-            raise ValueError("its addresses are not ours")
+            raise ValueError("its superblock differs from that of result files")
         check_contents(self._file, self.path)
         if "fastcontact" not in self._file:
             raise FileError(f"'{self.path}' has no fastcontact results: name a file that fastcontact wrote (.vtkhdf)")
         self.schema = _integer(self._file["fastcontact"], "schema")
         if self.schema > layout.SCHEMA:
             raise FileError(
-                f"'{self.path}' has schema {self.schema}, this fastcontact reads up to {layout.SCHEMA}: update it"
+                f"'{self.path}' has schema {self.schema}, this fastcontact reads up to {layout.SCHEMA}: update fastcontact"
             )
         return self._file["fastcontact"]
 
@@ -194,12 +205,12 @@ class Results(StepSequence):
         self.complete = run is not None and not self.error
         notes = [self._notes(number) for number in range(self._n_steps)]
         self.case_text = next((note["case"] for note in reversed(notes) if "case" in note), self.case_text)
-        of_steps = [text for note in notes for text in note["warnings"]]
-        named = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
-        if not isinstance(named, dict) or not all(isinstance(text, str) for text in named.values()):
+        step_warnings = [text for note in notes for text in note["warnings"]]
+        unit_names = _read_json(group["units"], self._raw) if "units" in group else self._units_of_case()
+        if not isinstance(unit_names, dict) or not all(isinstance(text, str) for text in unit_names.values()):
             raise ValueError("its units are not names")
-        self.units: dict[str, str] = units_of_results(named, self.kinematics) if named else {}
-        self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *of_steps]))
+        self.units: dict[str, str] = units_of_results(unit_names, self.kinematics) if unit_names else {}
+        self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *step_warnings]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
         """Return the record of the end of the run; None during the run, after a crash, and if steps were added later."""
@@ -221,13 +232,13 @@ class Results(StepSequence):
                 f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}"
             ) from None
         except (TypeError, ValueError) as error:
-            text = f"{number} of '{self.path}' needs whole numbers, and steps that are not 0 ({error})"
+            text = f"a slice of '{self.path}' needs integers and a nonzero increment, not {number} ({error})"
             if not isinstance(number, slice):
-                text = f"a step of '{self.path}' is a whole number, from 0, or a slice, not {number!r}"
+                text = f"a step of '{self.path}' is selected by an integer or a slice, not {number!r}"
             raise FileError(text) from None
 
     def lacks(self, names: Sequence[str]) -> list[str]:
-        """Return the paths of HDF5 objects that are missing in the file."""
+        """Return those of the HDF5 paths `names` that the file does not contain."""
         return [name for name in names if name not in self._file]
 
     def __enter__(self) -> Results:
@@ -301,9 +312,10 @@ class Results(StepSequence):
         """Return the fields of all steps as an ``xarray.Dataset``, which is held in memory.
 
         The dimensions are ``step``, ``point``, ``axis``, ``stress_component`` and ``contact``. The variables at the points
-        are ``displacement`` [length], ``stress``, ``von_mises``, ``contact_pressure`` [pressure] and ``reaction`` [force];
-        the variables of the pairs are ``contact_force`` [force] and ``contact_pressure_max`` [pressure]. The coordinates
-        ``x``, ``y`` and, in 3D, ``z`` are the reference positions [length]. The names of `units` are attributes.
+        are ``displacement`` [length], ``stress``, ``von_mises``, ``von_mises_signed``, ``contact_pressure`` [pressure] and
+        ``reaction`` [force]; the variables of the pairs are ``contact_force`` [force] and ``contact_pressure_max``
+        [pressure]. The coordinates ``x``, ``y`` and, in 3D, ``z`` are the reference positions [length]. The attribute
+        ``units`` of a variable is the name of its unit, if known.
 
         Raises
         ------
@@ -315,10 +327,10 @@ class Results(StepSequence):
     def _units_of_case(self) -> dict[str, str]:
         """Return the names of units in the case text, for files of earlier versions."""
         try:
-            named = toml_text.parsed(self.case_text or "").get("units", {})
+            unit_names = toml_text.parsed(self.case_text or "").get("units", {})
         except ValueError:
             return {}
-        return {key: str(value) for key, value in named.items()} if isinstance(named, dict) else {}
+        return {key: str(value) for key, value in unit_names.items()} if isinstance(unit_names, dict) else {}
 
     def _notes(self, number: int) -> dict[str, Any]:
         row = self._rows[number]
@@ -331,7 +343,7 @@ class Results(StepSequence):
         if not self._file:
             raise FileError(f"'{self.path}' is closed: open it again to read more steps")
         with self._explained():
-            notes, known = self._notes(number), self.point_field_names
+            notes, stored = self._notes(number), self.point_field_names
             return StepResult(
                 index=int(self._rows["index"][number]),
                 load_factor=float(self._rows["load_factor"][number]),
@@ -342,7 +354,7 @@ class Results(StepSequence):
                 restart=self._restart(number) if number == self._n_steps - 1 else None,
                 material_stress=self._material_stress(number),
                 units=self.units,
-                **{k: self._field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in known},
+                **{k: self._field(k, number, v) for k, v in layout.step_shapes(self.mesh).items() if k in stored},
             )
 
     def _restart(self, number: int) -> dict[str, Any] | None:
@@ -368,9 +380,9 @@ class Results(StepSequence):
             return None
         rows = _rows(group["materials/rows"], steps[0], "", "the table of stresses by material")
         if len(cells) != len(self._file["VTKHDF/Types"]):
-            raise ValueError("the table of stresses by material is cut off")
+            raise ValueError("the table of stresses by material is truncated")
         if rows["points"].min() < 0 or rows["points"].max() >= self.mesh.n_points:
-            raise ValueError("the table of stresses by material refers to points that are not there")
+            raise ValueError("the table of stresses by material refers to points that do not exist")
         columns = (np.ascontiguousarray(rows[name]) for name in ("points", "material", "stress"))
         return MaterialStress(cells, *columns)
 
@@ -390,7 +402,7 @@ class Results(StepSequence):
         fields = {name: data[name][number * n : (number + 1) * n] for name in self.cell_field_names}
         for name, values in fields.items():
             if values.shape != (n,) or values.dtype.kind not in "biuf":
-                raise ValueError(f"{name} of step {number} is cut off or of another kind")
+                raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return fields
 
     def _field(self, name: str, number: int, shape: tuple[int, ...]) -> Array:
@@ -398,7 +410,7 @@ class Results(StepSequence):
         rows = slice(number * n, (number + 1) * n)
         values = self._file["VTKHDF/PointData"][name][(rows, *map(slice, shape[1:]))]
         if values.shape != shape or values.dtype.kind != "f":
-            raise ValueError(f"{name} of step {number} is cut off or of another kind")
+            raise ValueError(f"{name} of step {number} is truncated, or has the wrong shape or type")
         return values
 
     def _contact(self, number: int, formulations: Mapping[str, str]) -> dict[str, ContactResult]:
@@ -408,7 +420,7 @@ class Results(StepSequence):
         contacts = {name: _read_contact(pairs[name], number, name, kind) for name, kind in formulations.items()}
         for name, contact in contacts.items():
             if contact.force.shape != (self.mesh.dim,) or contact.points.dtype.kind not in "iu":
-                raise ValueError(f"the contact table of '{name}' is of another kind")
+                raise ValueError(f"the contact table of '{name}' has the wrong shape or type")
             layout.check_contact(f"step {number}, contact '{name}'", contact, self.mesh)
         return contacts
 
@@ -423,7 +435,7 @@ class Results(StepSequence):
             lines = str(error).splitlines()
             reason = lines[0][:200] if lines else type(error).__name__
             raise FileError(
-                f"'{self.path}' is truncated or damaged ({reason}): compute it again or restore a copy"
+                f"'{self.path}' is truncated or damaged ({reason}): repeat the run or restore a copy"
             ) from error
 
 
@@ -457,12 +469,12 @@ def _read_groups(group: Any, raw: Any) -> dict[str, Numbers]:
 def _rows(table: Any, step: Any, prefix: str, name: str) -> Any:
     """Return the rows of table `name` that belong to a step; ValueError if rows are missing.
 
-    The fields ``first`` and ``count`` of the step, with a prefix, contain the number of the first row and of rows.
+    The fields ``first`` and ``count`` of the step, with a prefix, contain the index of the first row and the number of rows.
     """
     first, count = int(step[f"{prefix}first"]), int(step[f"{prefix}count"])
     rows = table[first : first + count]
     if len(rows) != count or first < 0:
-        raise ValueError(f"{name} is cut off")
+        raise ValueError(f"{name} is truncated")
     return rows
 
 
@@ -476,19 +488,21 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.PLACES):
         value = step[column]
-        if column in OR_NONE and not np.isfinite(value).all():
+        if column in NAN_IS_NONE and not np.isfinite(value).all():
             value = None
         resultants[column] = value.item() if isinstance(value, np.generic) else value
     resultants["radius"] = tuple(step["radius"].tolist())
-    faced: dict[str, Any] = {}
+    primary_forces: dict[str, Any] = {}
     if "primary_first" in step.dtype.names:
         table = _rows(pair["primary"], step, "primary_", f"the table of primary forces of '{name}'")
-        faced = {f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")}
-    return ContactResult(name=name, formulation=formulation, **resultants, **faced, **columns)
+        primary_forces = {
+            f"primary_{column}": np.ascontiguousarray(table[column]) for column in ("points", "force_vectors")
+        }
+    return ContactResult(name=name, formulation=formulation, **resultants, **primary_forces, **columns)
 
 
 class StoredSteps(StepSequence):
-    """The steps that a file contains when it is opened, which are read on access.
+    """The steps that a file contains when it is opened; each step is read on access.
 
     The last step, with its `restart`, is kept in memory. `release` must be called before the file is changed, because HDF5
     does not update its view of an open file. Access to another step opens the file again.

@@ -123,7 +123,7 @@ CASES = [
     ("no body is held", '[[support]]\ngroup = "A2B2"\ny = -2.0\n\n[[support]]\ngroup = "A1B1"\ny = 2.0', "",
      r"1 rigid-body motion is not supported: body '\w+': translation along y \(the axis\); body '\w+': translation along y \(the axis\)\. Fix or prescribe a displacement component that stops each, or let a load press the body against a contact"),
     ("one pair twice in a case", "[ramp]", '[contact.again]\nsecondary = "CONT2"\nprimary = "CONT1"\n[ramp]',
-     r"contact 'again' joins 'CONT2' and 'CONT1', which contact 'hertz' joins already: leave out one of the two"),
+     r"contact 'again' pairs 'CONT2' and 'CONT1', which contact 'hertz' pairs already: leave out one of the two"),
     ("key of the convergence criteria misspelled", "[ramp]", "[solve]\nrelativ = 1e-6\n[ramp]",
      r"case\.toml: unknown key 'solve\.relativ': did you mean 'solve\.relative'"),
     ("history that ends too early", 'group = "A2B2"\ny = -2.0', 'group = "A2B2"\ny = -2.0\nramp = [[0.0, 0.0], [0.5, 1.0]]',

@@ -202,7 +202,7 @@ def repeated_equations(patch):
 CALLS = [
     ("values of points beyond the mesh", profile_beyond_the_mesh, fc.errors.FileError, r"profile 'P' refers to point 9 of 4: write the file again"),
     ("parts of a file that do not fit", parts_that_do_not_fit, fc.errors.FileError, r"the parts of '.*a\.vtk' are inconsistent: check the file, or convert it to \.med"),
-    ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' may not be read: ask its owner for the permission"),
+    ("a result that may not be read", unreadable, fc.errors.FileError, r"a\.vtkhdf' is not readable: ask its owner for read permission"),
     ("equations on the same unknown", repeated_equations, pivot_order.RepeatedError, REPEATED),
     ("equations that are equal", lambda: pivot_order.block_inverse(csr_array(np.ones((2, 2)))), pivot_order.RepeatedError, REPEATED),
     ("more equations than unknowns", lambda: pivot_order.assigned(csr_array(np.ones((2, 1)))), pivot_order.RepeatedError, REPEATED),

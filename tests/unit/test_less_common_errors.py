@@ -51,7 +51,7 @@ def numbers(kind):
         ),
         (lambda: fc.recovery.von_mises_signed(1.0), r"but the shape is \(\)"),
         (lambda: fc.recovery.equivalent_strain(np.zeros((3, 5))), r"but the shape is \(3, 5\)"),
-        (lambda: AXES_BY_CELL.moduli_at(np.ones((4, 2)), "plane_strain"), "axes by cell need to know the cells"),
+        (lambda: AXES_BY_CELL.moduli_at(np.ones((4, 2)), "plane_strain"), "axes given by cell need `constants`"),
         (lambda: model().load_vector(5), r"argument load of Model\.load_vector"),
         (lambda: fc.normal_stress(None, 1.0), "argument contact of normal_stress"),
         (lambda: fc.StepResult(1, 1.0, *[np.zeros(1)] * 5, contact=np.zeros), "contact of a StepResult must be a dict"),
@@ -244,8 +244,8 @@ def two_materials(path):
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
-        ("cut", "the table of stresses by material is cut off"),
-        ("far", "refers to points that are not there"),
+        ("cut", "the table of stresses by material is truncated"),
+        ("far", "refers to points that do not exist"),
         ("none", ""),
     ],
 )
@@ -435,7 +435,7 @@ def test_a_slice_of_steps_by_no_whole_numbers(tmp_path):
     block = fc.Model(fc.generate.block((1.0, 1.0), (1, 1), "quad4"), "plane_strain")
     with fc.ResultWriter(tmp_path / "a.vtkhdf", block):
         pass
-    with pytest.raises(fc.FileError, match="needs whole numbers, and steps that are not 0"):
+    with pytest.raises(fc.FileError, match="needs integers and a nonzero increment"):
         fc.open_results(tmp_path / "a.vtkhdf")[0.5:2]
 
 

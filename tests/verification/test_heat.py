@@ -377,7 +377,7 @@ def test_what_cannot_be_is_refused_by_its_name():
     refused = pytest.raises
     model = bar()
     model.fix_temperature("UPPER_TOP", 1.0)
-    with refused(fc.errors.ModelError, match="no conductivity: give them"):
+    with refused(fc.errors.ModelError, match="material without conductivity: define it"):
         model.check()
     model = joined(bar(conductivity=1.0))
     model.fix_temperature("UPPER_TOP", 1.0)

@@ -1,9 +1,9 @@
 """Symmetric low-rank change ``D.T G + G.T D`` of a matrix, and its Galerkin product.
 
-Eliminated equations set ``u[pivots] = weights @ u``. With the matrix D (m, n) of the weights minus the unit rows of the
-pivots, this is the transformation ``T u = u + E.T D u``, where the columns of E.T are the unit vectors of the pivots. The
-matrix ``T.T A T`` differs from A by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs with the
-rows R and the diagonal stiffness S change the matrix by ``R.T S R``, which has the same form.
+The elimination of m equations sets ``u[pivots] = weights @ u``. Let the rows of E (m, n) be the unit vectors of the pivots,
+and ``D = weights - E``. The elimination is then the transformation ``T = I + E.T D``, and ``T.T A T`` differs from a
+symmetric matrix A by ``D.T G + G.T D`` with ``G = A[pivots] + A[pivots][:, pivots] D / 2``. Springs with the rows R and the
+diagonal stiffness S change the matrix by ``R.T S R``, which has this form with ``D = R`` and ``G = S R / 2``.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ class SymmetricChange:
     Attributes
     ----------
     D, G : csr_array (m, n)
+        Factors of the change, for m equations or springs.
     size : int
-        Number of unknowns of a node.
+        Number of unknowns per node.
     """
 
     D: csr_array
@@ -51,17 +52,18 @@ class SymmetricChange:
     def diagonal(self) -> LocalChange:
         """Return the diagonal blocks of the change."""
         D, G = (rows.tobsr((1, self.size)) for rows in (self.D, self.G))
-        of_D, of_G = (self._numbers(rows) for rows in (D, G))
-        _, one, other = np.intersect1d(of_D, of_G, return_indices=True)
-        half = np.einsum("ka,kb->kab", D.data[one, 0], G.data[other, 0])
+        keys_of_D, keys_of_G = (self._numbers(rows) for rows in (D, G))
+        # A diagonal block is a sum over the rows in which both D and G have entries of the node.
+        _, in_D, in_G = np.intersect1d(keys_of_D, keys_of_G, return_indices=True)
+        half = np.einsum("ka,kb->kab", D.data[in_D, 0], G.data[in_G, 0])
         nodes, slot = np.unique(D.indices, return_inverse=True)
         blocks = np.zeros((len(nodes), self.size, self.size))
-        np.add.at(blocks, slot[one], half + half.transpose(0, 2, 1))
+        np.add.at(blocks, slot[in_D], half + half.transpose(0, 2, 1))
         return LocalChange.of_diagonal(nodes, blocks)
 
     @staticmethod
     def _numbers(rows: bsr_array) -> Indices:
-        """Return a number for each stored block of `rows` (m, n), by its row and its column."""
+        """Return keys (k,) of the k stored blocks of `rows` (m, n), which identify their block row and block column."""
         row = np.repeat(np.arange(rows.shape[0]), np.diff(rows.indptr))
         return np.asarray(row * rows.shape[1] + rows.indices, np.intp)
 
@@ -75,8 +77,8 @@ class SymmetricChange:
         nodes = np.unique(np.concatenate([self.D.indices, self.G.indices]) // self.size)
         coarse_nodes, R = restriction(P, nodes)
         dofs = (nodes[:, None] * self.size + np.arange(self.size)).ravel()
-        E, H = (rows[:, dofs].tobsr((1, self.size)) @ R for rows in (self.D, self.G))
-        half = bsr_array(E.T @ H)
+        DP, GP = (rows[:, dofs].tobsr((1, self.size)) @ R for rows in (self.D, self.G))
+        half = bsr_array(DP.T @ GP)
         total = bsr_array(half + half.T)
         total.sort_indices()
         return LocalChange(coarse_nodes, total)

@@ -34,7 +34,7 @@ def half_spheres(
     segments: int | None = None,
     radial_sizes: tuple[float, float] | None = None,
 ) -> Mesh:
-    """Two half-spheres that touch at the origin, each a quarter disc in the (r, y) plane.
+    """Return two half-spheres that touch at the origin, each a quarter disc in the (r, y) plane.
 
     The lower body has its centre at A1 = (0, -R), the end of its flat side at B1 = (R, -R), its pole at C1 = (0, 0), and
     D1 at the middle of its arc. The upper body is the mirror image in y = 0. The poles C1 and C2 are two points at the
@@ -53,15 +53,16 @@ def half_spheres(
     R : float
         Radius [length].
     size : float, optional
-        Only for triangles: largest length of the edges; by default R/25 [length].
+        Only for triangles: largest edge length, at most R; by default R/25 [length].
     contact_size : float, optional
-        Only for triangles: length of the edges at the pole, which increases linearly to `size` at the distance R; by
-        default `size`, so that the mesh is uniform [length].
+        Only for triangles: edge length at the pole, at most `size`. The edge length increases linearly to `size` at the
+        distance R. By default the mesh is uniform [length].
     contact_radius : float, optional
-        Only for triangles: distance from the pole up to which edges have the length `contact_size`; by default 0 [length].
+        Only for triangles: distance from the pole up to which edges have the length `contact_size`, at most R/2; by
+        default 0 [length].
     arc_sizes : (float, float), optional
         Only for quadrangles: lengths of the segments of the arc C-D at C and at D, in geometric progression between these
-        points; by default R/250 and R/25 [length]. Both are reduced by a common factor, so that their number is an integer.
+        points; by default R/250 and R/25 [length]. A common factor reduces both to fill the arc.
     segments : int, optional
         Only for quadrangles: number of segments on the side A-M of the inner square, on the arc D-B, and on the radial
         lines M-C, N-D and P-B; by default 15.
@@ -72,6 +73,11 @@ def half_spheres(
     Returns
     -------
     Mesh
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range, or does not belong to the element type.
 
     Examples
     --------
@@ -99,18 +105,23 @@ def quarter_disc(
     segments: int | None = None,
     radial_sizes: tuple[float, float] | None = None,
 ) -> Mesh:
-    """One of the two bodies of `half_spheres`, with the groups of this body.
+    """Return one of the two bodies of `half_spheres`, with the groups of this body.
 
     Parameters
     ----------
     element, R, size, contact_size, contact_radius, arc_sizes, segments, radial_sizes
-        Described for `half_spheres`.
+        See `half_spheres`.
     body : {"lower", "upper"}
         The body to generate.
 
     Returns
     -------
     Mesh
+
+    Raises
+    ------
+    MeshError
+        If an argument is out of range, or does not belong to the element type.
 
     Examples
     --------
@@ -134,7 +145,7 @@ def quarter_disc(
 
 
 def _corners(R: float) -> dict[str, tuple[float, float]]:
-    """Return the corners of the lower body by name; D follows from the formula of the nodes of the arc."""
+    """Return the corners of the lower body by name; D is bitwise identical to the node of the arc."""
     x, y = arc((0.0, -R), R, np.array([0.25 * math.pi]))[0]
     return {"A1": (0.0, -R), "B1": (R, -R), "C1": (0.0, 0.0), "D1": (float(x), float(y))}
 
@@ -151,11 +162,11 @@ def _spacing(R: float, size: float | None, contact_size: float | None, contact_r
 
 def _of_triangles(R: float, spacing: Spacing) -> Mesh:
     """Return the lower body meshed with tri3 cells."""
-    corners, right, half = _corners(R), 0.5 * math.pi, 0.25 * math.pi
+    corners, angle_B, angle_D = _corners(R), 0.5 * math.pi, 0.25 * math.pi
     sides = [
         ("A1B1", divided(lambda s: straight(corners["A1"], corners["B1"], s), R, spacing)),
-        ("D1B1", divided(lambda s: arc((0.0, -R), R, right - s * half), R * half, spacing)),
-        ("CONT1", divided(lambda s: arc((0.0, -R), R, half - s * half), R * half, spacing)),
+        ("D1B1", divided(lambda s: arc((0.0, -R), R, angle_B - s * angle_D), R * angle_D, spacing)),
+        ("CONT1", divided(lambda s: arc((0.0, -R), R, angle_D - s * angle_D), R * angle_D, spacing)),
         ("A1A2", divided(lambda s: straight(corners["C1"], corners["A1"], s), R, spacing)),
     ]
     return with_points_at(filled("SPHBAS", sides, spacing), corners)
@@ -183,26 +194,26 @@ def _of_quadrangles(
 
 def _three_blocks(R: float, along: Array, outward: Array, equal: Array) -> Mesh:
     """Return the lower body from the relative abscissae of the nodes on C-D, on M-C and on the equally divided sides."""
-    places = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
+    corners = {**_corners(R), "M1": (0.0, -R / 2), "N1": (R / 2, -R / 2), "P1": (R / 2, -R)}
 
     def line(start: str, end: str, relative: Array) -> Array:
-        return straight(places[start], places[end], relative)
+        return straight(corners[start], corners[end], relative)
 
-    half = 0.25 * math.pi
-    contact = arc((0.0, -R), R, half * along)
-    rest = arc((0.0, -R), R, half * (2.0 - equal))
+    angle_D = 0.25 * math.pi
+    contact_arc = arc((0.0, -R), R, angle_D * along)
+    outer_arc = arc((0.0, -R), R, angle_D * (2.0 - equal))
     bottom, across = line("A1", "P1", along), line("M1", "N1", along)
     inner, radial = line("P1", "N1", equal), line("N1", "D1", outward)
-    radial[-1] = contact[-1] = rest[-1]
+    radial[-1] = contact_arc[-1] = outer_arc[-1]  # D is common to three sides, which must agree bitwise
     square = transfinite(bottom, inner, across, line("A1", "M1", equal), along, equal)
-    upper = transfinite(across, radial, contact, line("M1", "C1", outward), along, outward)
-    outer = transfinite(line("P1", "B1", outward), rest, radial, inner, outward, equal)
+    upper = transfinite(across, radial, contact_arc, line("M1", "C1", outward), along, outward)
+    outer = transfinite(line("P1", "B1", outward), outer_arc, radial, inner, outward, equal)
     blocks = [
         structured(square, "SPHBAS", {"BOTTOM": "A1B1", "LEFT": "A1A2"}),
         structured(upper, "SPHBAS", {"TOP": "CONT1", "LEFT": "A1A2"}),
         structured(outer, "SPHBAS", {"BOTTOM": "A1B1", "RIGHT": "D1B1"}),
     ]
-    return with_points_at(merge_points(union(*blocks), 1e-9 * R), places)
+    return with_points_at(merge_points(union(*blocks), 1e-9 * R), corners)
 
 
 @typed(MeshError)
@@ -215,7 +226,7 @@ def rings(
     divisions_inner: tuple[int, int] = (6, 16),
     divisions_outer: tuple[int, int] = (8, 16),
 ) -> Mesh:
-    """Quarter of two concentric rings, the part x >= 0, y >= 0; the rings touch at the interface radius.
+    """Return the quarter x >= 0, y >= 0 of two concentric rings that touch at the interface radius.
 
     The rings fit without clearance. To model an interference, give their contact pair a negative ``clearance``. Groups of
     cells: INNER, OUTER, CONT_INNER, CONT_OUTER (the two sides of the interface), BORE (inner side of the inner ring), RIM
@@ -233,6 +244,11 @@ def rings(
     Returns
     -------
     Mesh
+
+    Raises
+    ------
+    MeshError
+        If the radii do not increase, or another argument is out of range.
 
     Examples
     --------

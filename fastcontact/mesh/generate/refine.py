@@ -1,4 +1,4 @@
-"""Uniform refinement of a 2D mesh: each cell is divided into two or four cells, and new nodes are placed on curves."""
+"""Uniform refinement of a 2D mesh: each cell is divided into two or four cells; new boundary nodes may lie on curves."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _TURN = np.pi / 5
 class _Pattern:
     """The division of a cell of one element type, described by the points of its children.
 
-    The first of the m points are the nodes of the parent. `shape` (m, n_nodes) [-] contains the shape functions of the
+    The first n_nodes points are the nodes of the parent. `shape` (m, n_nodes) [-] contains the shape functions of the
     parent at the points, and `children` (n_children, n_nodes) the points of each child. `on_edge` (m,) is the number of the
     edge of the parent on which a new point lies, -1 for other points, and `along` (m,) its distance from the start of this
     edge in quarters of the length.
@@ -48,10 +48,10 @@ def _pattern(name: str) -> _Pattern:
     points = [tuple(node) for node in element.nodes.tolist()]
     children = []
     for corners in elements.get(_LATTICE[element.linear]).nodes[RED[element.linear]]:
-        places = element.corner_shape(element.nodes) @ corners
+        child_nodes = element.corner_shape(element.nodes) @ corners
         child = []
-        for fraction_of_edge in np.round(places * 8.0).tolist():  # multiples of 1/8 are exact
-            node = tuple(x / 8.0 for x in fraction_of_edge)
+        for eighths in np.round(child_nodes * 8.0).tolist():  # multiples of 1/8 are exact
+            node = tuple(x / 8.0 for x in eighths)
             if node not in points:
                 points.append(node)
             child.append(points.index(node))
@@ -128,7 +128,7 @@ class _NewPoints(NamedTuple):
 
 
 def _new_points(mesh: Mesh) -> _NewPoints:
-    codes, places, inside = [np.empty(0, np.int64)], [], 4 * mesh.n_points**2
+    codes, origins, next_key = [np.empty(0, np.int64)], [], 4 * mesh.n_points**2  # keys of edges are smaller
     lattices = {}
     for name, block in mesh.cells.items():
         pattern, ends = _pattern(name), block[:, elements.get(name).edges].astype(np.int64)
@@ -139,12 +139,12 @@ def _new_points(mesh: Mesh) -> _NewPoints:
             if edge >= 0:
                 codes.append(_keys(ends[:, edge, 0], ends[:, edge, 1], int(pattern.along[point]), mesh.n_points))
             else:  # one for each cell
-                codes.append(inside + np.arange(len(block)))
-                inside += len(block)
-            places.append((name, point))
+                codes.append(next_key + np.arange(len(block)))
+                next_key += len(block)
+            origins.append((name, point))
     keys, first, rank = np.unique(np.concatenate(codes), return_index=True, return_inverse=True)
     sources, start = [], 0
-    for name, point in places:
+    for name, point in origins:
         numbers = mesh.n_points + rank[start : start + len(lattices[name])]
         lattices[name][:, point] = numbers
         cells = np.sort(first[(first >= start) & (first < start + len(numbers))]) - start
@@ -155,8 +155,8 @@ def _new_points(mesh: Mesh) -> _NewPoints:
 
 def _keys(a: AnyArray, b: AnyArray, quarters: int, n_points: int) -> AnyArray:
     """Return a key of the point at `quarters` of the edge from a to b, independent of the direction of the edge."""
-    from_least = np.where(a < b, quarters, 4 - quarters)
-    return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_least
+    from_smaller = np.where(a < b, quarters, 4 - quarters)
+    return (np.minimum(a, b) * n_points + np.maximum(a, b)) * 4 + from_smaller
 
 
 def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
@@ -171,13 +171,13 @@ def _facets_on(mesh: Mesh, curve: Curve) -> list[AnyArray]:
 def _on_curve(mesh: Mesh, curve: Curve, keys: AnyArray) -> AnyArray:
     """Return the numbers of the new points of the facets that lie on a curve."""
     ends = np.concatenate([block[:, :2] for block in _facets_on(mesh, curve)]).astype(np.int64)
-    wanted = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
-    return mesh.n_points + np.flatnonzero(np.isin(keys, wanted))
+    curve_keys = np.unique(np.concatenate([_keys(ends[:, 0], ends[:, 1], q, mesh.n_points) for q in (1, 2, 3)]))
+    return mesh.n_points + np.flatnonzero(np.isin(keys, curve_keys))
 
 
 def _cell_groups(mesh: Mesh) -> dict[str, AnyArray]:
     """Return the cell groups of the refined mesh; the children of a cell have consecutive numbers."""
-    pieces, start = {}, 0
+    pieces, start = {}, 0  # first cell, first child and children per cell, by element type
     for name, first in mesh.offsets.items():
         pieces[name] = (first, start, len(_pattern(name).children))
         start += pieces[name][2] * len(mesh.cells[name])
@@ -209,7 +209,7 @@ def _point_groups(mesh: Mesh, new: _NewPoints) -> dict[str, AnyArray]:
 def linearised(mesh: Mesh) -> Mesh:
     """Return the mesh with linear instead of quadratic cells: tri3 for tri6, quad4 for quad8 and quad9, line2 for line3.
 
-    Points that no cell uses any more are removed; the other points keep their order.
+    Points that become unused are removed; the other points keep their order.
 
     Examples
     --------
@@ -223,28 +223,29 @@ def linearised(mesh: Mesh) -> Mesh:
         used[block[:, elements.get(name).n_corners :]] = False
     for block in cells.values():
         used[block] = True
-    number = np.cumsum(used) - 1
+    new_point = np.cumsum(used) - 1
     merged: dict[str, AnyArray] = {}
     order: list[Indices] = []
     for linear in dict.fromkeys(elements.get(name).linear for name in cells):
         names = [name for name in cells if elements.get(name).linear == linear]
-        merged[linear] = number[np.concatenate([cells[name] for name in names])]
+        merged[linear] = new_point[np.concatenate([cells[name] for name in names])]
         order += [mesh.offsets[name] + np.arange(len(cells[name])) for name in names]
-    order_of_cells = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
+    new_cell = np.argsort(np.concatenate(order)) if order else np.empty(0, np.int64)
     return Mesh(
         mesh.points[used],
         merged,
-        {group: order_of_cells[members] for group, members in mesh.cell_groups.items()},
-        {group: number[members[used[members]]] for group, members in mesh.point_groups.items()},
+        {group: new_cell[members] for group, members in mesh.cell_groups.items()},
+        {group: new_point[members[used[members]]] for group, members in mesh.point_groups.items()},
     )
 
 
 @typed(MeshError)
 def circles(mesh: Mesh) -> list[Circle]:
-    """Return the circles on which groups of outer facets lie, at most one for each group, for use in `refined`.
+    """Return the circles on which groups of facets lie, at most one for each group, for use in `refined`.
 
-    A circle is fitted to the nodes of a group by least squares. It is accepted if more than three nodes lie on it up to
-    round-off and the facets do not meet at sharp corners, because the corners of a square also lie on a circle.
+    A circle is fitted to the nodes of a group by least squares. It is accepted if the group has at least four nodes, all of
+    them lie on the circle within 1e-6 of the length of the longest facet, and no facet subtends more than 36 degrees. The
+    last condition excludes polygons such as a square, whose corners also lie on a circle.
 
     Examples
     --------
@@ -252,23 +253,23 @@ def circles(mesh: Mesh) -> list[Circle]:
     >>> {round(circle.radius, 9) for circle in generate.circles(generate.half_spheres(size=10.0))}
     {50.0}
     """
-    circles_of_curves = []
+    fitted = []
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=1)
-        solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
-        if blocks and not solids:
+        has_solids = any(elements.get(name).dim == 2 for name in mesh.split(mesh.cell_groups[group]))
+        if blocks and not has_solids:
             circle = _circle(mesh, group, list(blocks.values()))
             if circle is not None:
-                circles_of_curves.append(circle)
-    return circles_of_curves
+                fitted.append(circle)
+    return fitted
 
 
 def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:
     points = mesh.points[np.unique(np.concatenate([block.ravel() for block in blocks]))]
     if len(points) < 4:
         return None
-    middle, size = points.mean(axis=0), np.ptp(points, axis=0).max()
-    x = (points - middle) / size
+    centroid, size = points.mean(axis=0), np.ptp(points, axis=0).max()
+    x = (points - centroid) / size
     # x^2 + y^2 = 2 a x + 2 b y + c is linear in the centre (a, b).
     system = np.column_stack([2 * x, np.ones(len(x))])
     if np.linalg.cond(system) > 1e8:
@@ -276,7 +277,7 @@ def _circle(mesh: Mesh, group: str, blocks: list[AnyArray]) -> Circle | None:
     (a, b, c), *_ = np.linalg.lstsq(system, (x**2).sum(axis=1), rcond=None)
     radius = np.sqrt(max(c + a * a + b * b, 0.0))
     longest = max(np.linalg.norm(np.diff(mesh.points[block[:, :2]], axis=1), axis=2).max() for block in blocks) / size
-    off = np.abs(np.hypot(x[:, 0] - a, x[:, 1] - b) - radius).max()
-    if off > ON_CURVE * longest or longest > 2 * radius * np.sin(_TURN / 2):
+    deviation = np.abs(np.hypot(x[:, 0] - a, x[:, 1] - b) - radius).max()
+    if deviation > ON_CURVE * longest or longest > 2 * radius * np.sin(_TURN / 2):
         return None
-    return Circle((float(middle[0] + size * a), float(middle[1] + size * b)), float(radius * size), group)
+    return Circle((float(centroid[0] + size * a), float(centroid[1] + size * b)), float(radius * size), group)

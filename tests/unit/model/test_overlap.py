@@ -374,7 +374,7 @@ def test_facets_of_an_earlier_pair_are_refused(mesh, first, second, formulation)
     model = elastic_model(mesh)
     model.add_contact("first", secondary=first[0], primary=first[1], formulation=formulation)
     with pytest.raises(
-        fc.ContactError, match=r"contact 'second' joins .* that contact 'first' joins already: .*point \d+"
+        fc.ContactError, match=r"contact 'second' pairs .* that contact 'first' pairs already: .*point \d+"
     ):
         model.add_contact("second", secondary=second[0], primary=second[1], formulation=formulation)
     assert len(model.contact) == 1
@@ -385,7 +385,7 @@ def test_both_groups_are_the_same(mesh, swapped):
     model = elastic_model(mesh)
     sides = ("CONT_UPPER", "CONT_LOWER")
     model.add_contact("first", secondary=sides[0], primary=sides[1])
-    with pytest.raises(fc.ContactError, match="which contact 'first' joins already"):
+    with pytest.raises(fc.ContactError, match="which contact 'first' pairs already"):
         model.add_contact("second", secondary=sides[swapped], primary=sides[not swapped])
 
 
@@ -398,7 +398,7 @@ def test_facets_that_stand_in_the_mesh_twice_are_the_same(mesh):
     copied = copied.with_groups(cells={"COPY": range(before, before + len(mesh.cell_groups["CONT_UPPER"]))})
     model = elastic_model(copied)
     model.add_contact("first", secondary="CONT_UPPER", primary="CONT_LOWER")
-    with pytest.raises(fc.ContactError, match="contact 'second' joins"):
+    with pytest.raises(fc.ContactError, match="contact 'second' pairs"):
         model.add_contact("second", secondary="COPY", primary="CONT_LOWER")
 
 

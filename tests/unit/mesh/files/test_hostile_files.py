@@ -76,7 +76,7 @@ def test_a_text_of_another_size_is_refused_at_once(results, size):
     for at in objects(data, data.find(HEAP))[:-1]:
         struct.pack_into("<Q", data, at + 8, size)
     results.write_bytes(data)
-    with pytest.raises(FileError, match=r"its texts are damaged at byte|Expecting|Extra data"):
+    with pytest.raises(FileError, match=r"its strings are damaged at byte|Expecting|Extra data"):
         fc.open_results(results)
 
 
@@ -90,7 +90,7 @@ def test_a_text_that_stands_elsewhere_is_refused(results, place):
     else:
         struct.pack_into("<Q", data, at + 4, place)
     results.write_bytes(data)
-    with pytest.raises(FileError, match="its texts are damaged"):
+    with pytest.raises(FileError, match="its strings are damaged"):
         fc.open_results(results)
 
 
@@ -144,7 +144,7 @@ def test_a_schema_that_is_no_whole_number(results, value):
 
 def test_a_result_file_behind_a_block_of_others_is_refused(results):
     results.write_bytes(bytes(512) + results.read_bytes())
-    with pytest.raises(FileError, match="its addresses are not ours"):
+    with pytest.raises(FileError, match="its superblock differs from that of result files"):
         fc.open_results(results)
 
 
