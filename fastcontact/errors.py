@@ -119,13 +119,14 @@ OTHER_WORDS = {
 
 def nearest(name: str, known: Iterable[str], cutoff: float) -> list[str]:
     """Return the known names that a name may stand for: those in `OTHER_WORDS`, or up to three with similar spelling."""
-    names = {candidate.casefold().lstrip("-"): candidate for candidate in reversed([*known])}
+    exact = {candidate.lstrip("-"): candidate for candidate in reversed([*known])}
+    folded = {key.casefold(): candidate for key, candidate in exact.items()}
+    name = name.lstrip("-")
     meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
-    plainest = {key.replace("_", ""): text for key, text in reversed(names.items())}
-    near = [text for key, text in plainest.items() if key.rpartition(".")[2] in meant]
-    near = near or difflib.get_close_matches(name, names.values(), n=3, cutoff=cutoff)
-    plain = name.casefold().lstrip("-")
-    return near or [names[key] for key in difflib.get_close_matches(plain, names, n=3, cutoff=cutoff)]
+    plainest = {key.replace("_", ""): candidate for key, candidate in reversed(folded.items())}
+    near = [candidate for key, candidate in plainest.items() if key.rpartition(".")[2] in meant]
+    near = near or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=cutoff)]
+    return near or [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=cutoff)]
 
 
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:

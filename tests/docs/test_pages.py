@@ -71,9 +71,8 @@ def test_every_machine_part_makes_its_picture_and_asserts_a_number():
     sections = page.read_text(encoding="utf-8").split("\n## ")[1:]
     assert 6 <= len(sections) == len(pages.pictures(page))
     for section in sections:
-        assert section.count("![") == section.count("```python") == section.count("\nassert ") == 1, (
-            section.splitlines()[0]
-        )
+        programs, asserted = section.count("```python"), section.count("\nassert ")
+        assert section.count("![") == 1 <= programs == asserted, section.splitlines()[0]
 
 
 def test_pictures_are_small():
