@@ -44,8 +44,8 @@ LOOSE = 1e-4
 # Fraction of the largest energy or work that the energy balance may lack.
 IMBALANCE = 0.02
 # A warning is given if more than the first fraction of the frictional work is dissipated at nodes in the step in which they
-# close, and the frictional work exceeds the second fraction of the strain energy. Under a sphere that sticks, with a
-# coefficient of 0.6, the latter is 2e-4 in long steps, and 1e-5 if slip counts from first contact.
+# close, and this part exceeds the second fraction of the strain energy. Under a sphere that sticks, with a coefficient of
+# 0.6, the frictional work is 2e-4 of the strain energy in long steps, and 1e-5 if slip counts from first contact.
 WHILE_TOUCHING, NOTABLE_WORK = 0.1, 1e-4
 # Median difference of a nodal pressure from the mean of its neighbours, over the mean pressure, above which a warning is
 # given. On rings of tri3 cells 4.6 times as deep as wide it is 0.30, with pressure errors of 0.16 to 0.27; on wider ones
@@ -148,8 +148,9 @@ def _slipping_before(state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work."""
     work = state.work
     if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE_WORK * work.strain_energy):
+        share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         yield (
-            f"{work.touching / work.friction:.0%} of the work of friction is done at nodes in the load step in which they "
+            f"{share:.0%} of the work of friction is done at nodes in the load step in which they "
             "close, where slip counts from the beginning of the step instead of first contact: the work is too large and "
             "the shear inaccurate. Use more load steps, or Criteria(friction_while_touching=0.01)"
         )

@@ -269,8 +269,8 @@ def supports_apart(K: bsr_array, fixed: Mask) -> tuple[bsr_array, csr_array]:
     K.data[near[block], i, j] = remaining[moves]
     rows = size * row[block] + i
     order = np.argsort(rows, kind="stable")
-    start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=K.shape[0]))])
-    columns, removed = size * column[block] + j, (blocks - remaining)[moves]
+    start = np.concatenate([[0], np.cumsum(np.bincount(rows, minlength=K.shape[0]))]).astype(np.int32)
+    columns, removed = (size * column[block] + j).astype(np.int32), (blocks - remaining)[moves]
     return K, csr_array((removed[order], columns[order], start), shape=K.shape)
 
 

@@ -68,8 +68,9 @@ def sparsity(mesh: Mesh) -> Sparsity:
     sizes = np.concatenate(
         [[0], *(np.full(len(block), block.shape[1]) for block in blocks.values()), np.ones_like(lone)]
     )
-    nodes = np.concatenate([nodes, lone])
-    of_cells = csr_array((np.ones(len(nodes), bool), nodes, np.cumsum(sizes)), shape=(len(sizes) - 1, mesh.n_points))
+    # SciPy keeps the integers of the indices, so that all later matrices have those of the nodes.
+    nodes, first = np.concatenate([nodes, lone.astype(np.int32)]), np.cumsum(sizes, dtype=np.int32)
+    of_cells = csr_array((np.ones(len(nodes), bool), nodes, first), shape=(len(sizes) - 1, mesh.n_points))
     pattern = csr_array(of_cells.T @ of_cells)
     pattern.sort_indices()
     indptr, indices = pattern.indptr, pattern.indices

@@ -263,7 +263,7 @@ def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array,
     coefficients of friction.
     """
     rows, gap0 = _edges(constraints, factor)
-    backwards = np.flatnonzero(np.tile(constraints.equality, len(gap0) // len(constraints.equality)))
+    backwards = np.flatnonzero(np.resize(constraints.equality, len(gap0)))
     both = csr_array(vstack([rows, -rows[backwards]], format="csr"))
     return both, np.concatenate([gap0, -gap0[backwards]])
 

@@ -6,6 +6,9 @@ from models import elastic_model, supported
 from stepping import Stepping
 
 import fastcontact as fc
+from fastcontact.analysis.result_warnings import _slipping_before
+from fastcontact.analysis.state import State
+from fastcontact.analysis.work import Work
 from fastcontact.mesh.generate import box, renamed, union
 
 pytestmark = pytest.mark.each_value
@@ -270,6 +273,13 @@ def test_a_ball_that_a_force_drives_has_the_work_of_friction_of_many_steps():
     options = {"formulation": "mortar", "motion": None, "force": {"y": -60.0}}
     fine, few = (pressed_ball(steps=n, **options)[-1] for n in (12, 4))
     assert few.work["friction_work"] == pytest.approx(fine.work["friction_work"], rel=0.05)
+
+
+@pytest.mark.parametrize("friction", [0.5, 0.0, -0.5])
+def test_the_share_of_work_while_touching_is_at_most_all_of_it(friction):
+    """Elastic slip that recovers may leave less work in total than was done while nodes touched."""
+    (text,) = _slipping_before(State(np.zeros(2), 0.0, work=Work(1.0, friction, 1.0)))
+    assert text.startswith("100% of the work of friction")
 
 
 def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():

@@ -10,6 +10,7 @@ from test_temperature import ALPHA, E, free, plane
 import fastcontact as fc
 from fastcontact.cases.case import read_case
 from fastcontact.mesh import elements
+from fastcontact.mesh.files import mesh_fields
 from fastcontact.mesh.files.med import add_field, add_mesh, new_file
 from fastcontact.model.fingerprint import fingerprint
 
@@ -134,6 +135,11 @@ def test_points_that_touch_may_not_have_two_temperatures_in_another_order(tmp_pa
     path = vtu(tmp_path / "turned.vtu", mesh, body, np.arange(mesh.n_points)[::-1])
     with pytest.raises(fc.MeshError, match=r"has 2 different values at .*, where bodies touch"):
         model.add_temperature_file(path, "TEMP")
+
+
+def test_no_points_have_no_values_of_two_bodies():
+    field = mesh_fields.FileField(None, np.zeros((1, 3)), np.zeros((3, 2)))
+    mesh_fields._refuse_two(field, np.empty((0, 2)), 1.0, "the field")
 
 
 def test_a_part_of_the_mesh_suffices_for_a_group(tmp_path):

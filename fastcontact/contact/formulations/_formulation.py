@@ -296,7 +296,7 @@ class Formulation(ABC):
 
     def never_opening(self, positions: Array, at: Configuration) -> Mask:
         """Return which constraints (m,) cannot open, given their reference positions (m, dim) [length]."""
-        if at.never_opening is None:
+        if self.options.always_closed or at.never_opening is None:
             return np.full(len(positions), self.options.always_closed)
         return np.asarray(_at_places(at.never_opening, positions))
 

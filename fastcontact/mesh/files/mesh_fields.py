@@ -181,7 +181,9 @@ def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> Non
     """Raise MeshError if coincident points of the file have different values."""
     assert field.places is not None
     near, at = pairs_within(_in_space(field.places), _in_space(wanted), np.full(len(wanted), reach))
-    for point, members in zip(wanted, np.split(near, np.searchsorted(at, np.arange(1, len(wanted)))), strict=True):
+    ends = np.searchsorted(at, np.arange(len(wanted) + 1))
+    for point, first, end in zip(wanted, ends[:-1], ends[1:], strict=True):
+        members = near[first:end]
         if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
             raise MeshError(
                 f"{name} has {len(members)} different values at {_in_space(point[None])[0]}, where bodies touch: write it on "

@@ -13,6 +13,7 @@ from fastcontact.contact.pairing import Candidates, Pairing, gap_rows, rows_alon
 from fastcontact.contact.projection import places
 from fastcontact.contact.surface import surface
 from fastcontact.mesh import elements
+from fastcontact.model.rigid_motions import resisting
 
 N_DOFS = 7
 
@@ -233,3 +234,9 @@ def test_what_nodes_move_apart_along_is_not_held():
     left = without(np.array([np.eye(3)] * 3), moved, 1e-9)
     assert left[0] == pytest.approx(on([1, -1, 0], [0, 0, 1]), abs=1e-12)
     assert left[1:] == pytest.approx(np.array([np.eye(3)] * 2), abs=1e-12)
+
+
+def test_no_constraints_resist_no_motion():
+    rows, gap0 = resisting(part(0, 0, tangents=2))
+    assert rows.shape == (0, N_DOFS)
+    assert not len(gap0)

@@ -296,6 +296,8 @@ def test_the_sparsity_couples_exactly_the_nodes_of_common_cells():
     pattern = sparsity(mesh)
     rows = [pattern.indices[a:b].tolist() for a, b in zip(pattern.indptr[:-1], pattern.indptr[1:])]
     assert rows == [[0, 1, 2, 3], [0, 1, 2], [0, 1, 2, 3], [0, 2, 3], [4]]
+    assert {pattern.indptr.dtype, pattern.indices.dtype} == {np.dtype(np.int32)}  # 64 bits would take twice the memory
+    assert assembled(patch("hex8")).indices.dtype == np.int32
 
 
 def test_von_mises_of_simple_states():

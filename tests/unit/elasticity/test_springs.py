@@ -301,5 +301,6 @@ def test_the_parts_make_the_whole(size, seed, n, share):
     np.testing.assert_allclose(taken.toarray(), full - expected, rtol=0, atol=1e-15 * np.abs(full).max(initial=1.0))
     assert np.count_nonzero(taken.data) == taken.nnz
     assert taken.has_canonical_format
+    assert {taken.indices.dtype, taken.indptr.dtype} == {np.dtype(np.int32)}
     rows = np.repeat(np.arange(n), np.diff(left.indptr))
     assert np.count_nonzero(rows == left.indices) == n
