@@ -188,8 +188,10 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
 
 def equal_rows(rows: Indices | Numbers) -> tuple[Indices, Indices]:
     """Return the pairs (n_pairs,), (n_pairs,) of equal `rows` (n, k): m equal rows are in m - 1 pairs, which connect them."""
-    order = np.lexsort(rows.T)
-    same = (rows[order[1:]] == rows[order[:-1]]).all(axis=1)
+    columns = np.ascontiguousarray(rows.T)  # rows of few numbers are slow to compare
+    order = np.lexsort(columns)
+    columns = columns[:, order]
+    same = (columns[:, 1:] == columns[:, :-1]).all(axis=0)
     return order[:-1][same], order[1:][same]
 
 
