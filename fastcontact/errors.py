@@ -106,8 +106,8 @@ OTHER_WORDS = {
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
     "fix": "support", "prescribe": "support", "relate": "relation", "relate_groups": "group_relation",
     "alpha": "expansion", "rho": "density", "sigma_y": "yield_stress", "nlgeom": "strain", "large": "finite",
-    "2d": "plane_strain plane_stress axisymmetric", "steps": "ramp", "n_steps": "ramp", "load_steps": "ramp", "hertz": "hertz_point",
-    "hertz_sphere": "hertz_point", "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders",
+    "2d": "plane_strain plane_stress axisymmetric", "steps": "ramp", "n_steps": "ramp", "load_steps": "ramp",
+    "hertz": "hertz_point", "hertz_sphere": "hertz_point", "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders",
     "material": "linear_elastic", "steel": "linear_elastic", "young": "E", "poisson": "nu", "rectangle": "block",
     "youngs_modulus": "E", "poisson_ratio": "nu", "friction_coefficient": "friction",
     "cylinder": "rings", "rotate": "transformed", "rotated": "transformed", "scale": "transformed", "scaled": "transformed",
@@ -119,8 +119,8 @@ OTHER_WORDS = {
     "loads": "pressure force traction", "solve": "run", "study": "converge sweep", "convert": "export",
     "show": "info plot", "view": "plot", "examples": "cases", "list": "cases", "restart": "resume", "cores": "threads",
     "nproc": "threads", "constraint": "support", "displacement": "support", "boundary_condition": "support",
-    "interaction": "contact", "friction": "contact", "preload": "pretension", "bolt": "pretension", "tangential_force": "force_parts",
-    "add_support": "fix prescribe", "add_mpc": "relate",
+    "interaction": "contact", "friction": "contact", "preload": "pretension", "bolt": "pretension",
+    "tangential_force": "force_parts", "add_support": "fix prescribe", "add_mpc": "relate",
 }  # fmt: skip
 
 
