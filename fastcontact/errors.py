@@ -97,15 +97,19 @@ def warn(text: str) -> None:
 
 LONGEST_NAME = 120  # largest number of characters of an unknown name in a message
 SHOWN = 20  # largest number of known names in the message about an unknown one
+SIMILAR = (
+    0.65  # smallest ratio of matching characters of a name that is suggested (difflib): "loads" for "nodes" has 0.6
+)
 # Names of fastcontact, separated by spaces, by the names that other programs or other parts of fastcontact use.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",
     "h": "coefficient", "k": "coefficient", "plane": "half_space", "circle": "sphere", "ball": "sphere",
     "fix": "support", "prescribe": "support", "relate": "relation", "relate_groups": "group_relation",
     "alpha": "expansion", "rho": "density", "sigma_y": "yield_stress", "nlgeom": "strain", "large": "finite",
-    "2d": "plane_strain plane_stress axisymmetric", "steps": "ramp", "n_steps": "ramp", "hertz": "hertz_point",
-    "hertz_sphere": "hertz_point", "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders",
+    "2d": "plane_strain plane_stress axisymmetric", "steps": "ramp", "n_steps": "ramp", "load_steps": "ramp",
+    "hertz": "hertz_point", "hertz_sphere": "hertz_point", "hertz_cylinder": "hertz_line", "lame": "press_fit_cylinders",
     "material": "linear_elastic", "steel": "linear_elastic", "young": "E", "poisson": "nu", "rectangle": "block",
+    "youngs_modulus": "E", "poisson_ratio": "nu", "friction_coefficient": "friction",
     "cylinder": "rings", "rotate": "transformed", "rotated": "transformed", "scale": "transformed", "scaled": "transformed",
     "u": "displacement", "time": "load_factor", "forces": "reaction", "traction": "shear", "nodes": "points",
     "elements": "cells", "groups": "group_names", "status": "active", "add_load": "add_force", "add_bolt": "add_pretension",
@@ -113,33 +117,39 @@ OTHER_WORDS = {
     "archard": "wear", "add_preload": "add_pretension", "add_displacement": "prescribe", "add_symmetry": "fix",
     "add_friction": "add_contact", "boundary": "support", "load": "pressure force traction",
     "loads": "pressure force traction", "solve": "run", "study": "converge sweep", "convert": "export",
-    "show": "info plot", "view": "plot",
+    "show": "info plot", "view": "plot", "examples": "cases", "list": "cases", "restart": "resume", "cores": "threads",
+    "nproc": "threads", "constraint": "support", "displacement": "support", "boundary_condition": "support",
+    "interaction": "contact", "friction": "contact", "preload": "pretension", "bolt": "pretension",
+    "tangential_force": "force_parts", "add_support": "fix prescribe", "add_mpc": "relate",
 }  # fmt: skip
 
 
-def nearest(name: str, known: Iterable[str], cutoff: float) -> list[str]:
-    """Return the known names that a name may stand for: those in `OTHER_WORDS`, or up to three with similar spelling."""
-    exact = {candidate.lstrip("-"): candidate for candidate in reversed([*known])}
+def nearest(name: str, known: Collection[str]) -> list[str]:
+    """Return the known names that a name may stand for: see `OTHER_WORDS`, or up to three that resemble it.
+
+    A table that all names have in common, such as "support[1].", does not count.
+    """
+    table = name[: name.rfind(".") + 1]
+    shared = len(table) if all(candidate.startswith(table) for candidate in known) else 0
+    exact = {candidate[shared:].lstrip("-"): candidate for candidate in reversed([*known])}
     folded = {key.casefold(): candidate for key, candidate in exact.items()}
-    name = name.lstrip("-")
+    name = name[shared:].lstrip("-")
     meant = OTHER_WORDS.get(name.rpartition(".")[2].casefold(), "").casefold().replace("_", "").split()
     plainest = {key.replace("_", ""): candidate for key, candidate in reversed(folded.items())}
     near = [candidate for key, candidate in plainest.items() if key.rpartition(".")[2] in meant]
-    near = near or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=cutoff)]
-    return near or [folded[key] for key in difflib.get_close_matches(name.casefold(), folded, n=3, cutoff=cutoff)]
+    near = near or [exact[key] for key in difflib.get_close_matches(name, exact, n=3, cutoff=SIMILAR)]
+    name = name.casefold()
+    near = near or [folded[key] for key in difflib.get_close_matches(name, folded, n=3, cutoff=SIMILAR)]
+    return near or [folded[key] for key in reversed(folded) if len(name) > 2 and name in key][:3]
 
 
 def no_attribute(owner: str, name: str, known: Collection[str]) -> AttributeError:
     """Return the AttributeError for a name that an `owner`, such as "module 'x'", lacks, with the nearest known names."""
     text = f"{owner} has no attribute '{name}'"
-    near = (
-        nearest(name, known, 0.6)
-        or [each for each in known if len(name) > 2 and name.casefold() in each.casefold()][:3]
-    )
-    if near:
+    if name in getattr(sys.modules["fastcontact"], "__all__", ()):
+        text += f": use fastcontact.{name}"
+    elif near := nearest(name, known):
         text += ": did you mean " + " or ".join(map(repr, near)) + "?"
-    elif name in getattr(sys.modules["fastcontact"], "__all__", ()):
-        text += f": it is the function fastcontact.{name}"
     return AttributeError(text, name=name, obj=text)  # a string as `obj` prevents suggestions by Python
 
 
@@ -149,8 +159,9 @@ class Suggesting:
     if not TYPE_CHECKING:  # hidden from type checkers, which report unknown names themselves
 
         def __getattr__(self, name: str) -> object:
-            if name.startswith("_"):  # tools such as IPython look up private names
-                raise AttributeError(name)
+            # Tools such as IPython look up private names; and an error inside a property is not a missing attribute.
+            if name.startswith("_") or hasattr(type(self), name):
+                return object.__getattribute__(self, name)
             known = [each for each in dir(self) if not each.startswith("_")]
             raise no_attribute(f"'{type(self).__name__}' object", name, known)
 
@@ -178,7 +189,7 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     name = name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}..."
     if not names:
         return f"unknown {kind} '{name}': there is none here"
-    if near := nearest(name, names, 0.6 if name.startswith("-") else 0.5):  # options are many and often similar
+    if near := nearest(name, names):
         return f"unknown {kind} '{name}': did you mean " + " or ".join(f"'{candidate}'" for candidate in near) + "?"
     shown = ", ".join(names[:SHOWN]) + (f", ... ({len(names)} in all)" if len(names) > SHOWN else "")
     return f"unknown {kind} '{name}': expected one of {shown}"

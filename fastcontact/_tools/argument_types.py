@@ -99,9 +99,10 @@ def _refusal(
         call(*args, **kwargs)
     except TypeError as failure:
         text = str(failure).replace(f"{call.__qualname__}()", f"{called}()", 1)
-        if wrong := text.partition("unexpected keyword argument '")[2].rstrip("'"):
+        if wrong := text.partition("unexpected keyword argument '")[2].partition("'")[0]:
+            text = text.partition(". Did you mean")[0]  # Python 3.13 suggests a name, too
             known = [key for key in signature.parameters if key != "self"]
-            near = nearest(wrong, known, 0.6)
+            near = nearest(wrong, known)
             text += (
                 f": did you mean {' or '.join(map(repr, near))}?" if near else f": expected one of {', '.join(known)}"
             )

@@ -22,9 +22,10 @@ ARGUMENTS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print the content of the file."""
-    file, suffix = Path(options.file), Path(options.file).suffix.lower()
-    from fastcontact.cases.case import shipped_cases
+    from fastcontact.cases.case import case_path
 
+    file = case_path(options.file)
+    options.file, suffix = str(file), file.suffix.lower()
     if options.contacts or options.png:
         return _contacts(options)
     if suffix == ".vtkhdf":
@@ -39,7 +40,7 @@ def run(options: argparse.Namespace) -> int:
         factors = ", ".join(f"{t:g}" for t in deck.ramp.instants)
         rows = [f"{deck.path}: {deck.title}", repr(deck.model), f"load factors: {factors}"]
         rows += [*(f"  note: {text}" for text in deck.notes), *_mesh_lines(deck.model.mesh)]
-    elif suffix == ".toml" or (not file.exists() and options.file in shipped_cases()):
+    elif suffix == ".toml":
         from fastcontact.cases.case import read_case
 
         case = read_case(options.file)

@@ -133,7 +133,7 @@ def find_contacts(
 
     Sample points of all outer facets are projected on the closest facet of all other bodies. Two facets face each other
     if the distance along their normals is small enough and the normals are opposed. A surface with edges at which the
-    normals differ by 45 degrees or more is split into one pair for each smooth face, since a side of a pair has one
+    normals differ by 48 degrees or more is split into one pair for each smooth face, since a side of a pair has one
     normal at each node. The secondary side is the one with the finer mesh; between equally fine sides it is that of the
     softer body, otherwise the smaller one.
 

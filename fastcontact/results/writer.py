@@ -129,8 +129,8 @@ class ResultWriter:
         self.path = checked_target(path)
         if self.path.suffix.lower() in OTHER_FORMATS and not self.path.exists():
             raise FileError(
-                f"'{path}': results are written in the format VTKHDF: name it {self.path.stem}.vtkhdf (ParaView opens it), "
-                "and convert it with 'fastcontact export'"
+                f"'{path}': results are written in the format VTKHDF: name it {self.path.stem}.vtkhdf (ParaView opens it); "
+                "'fastcontact export' makes a MED or XDMF file from it"
             )
         self.n_steps = 0
         self.done: Sequence[StepResult] = []

@@ -43,7 +43,7 @@ KEYS = {
     *("file", "group", "flip", "crease"),
 }
 # Version of the results in a store, incremented when the quantities or their form change.
-SCHEMA = 3
+SCHEMA = 4
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -152,8 +152,10 @@ def _of_function(
     function: Function, sizes: int | Sequence[float], wanted: Quantities, theory: Mapping[str, float], options: Any
 ) -> Study:
     """Return the study of a function that returns models; `options` are passed to `run_functions`."""
-    for quantity in theory:
+    for quantity, value in theory.items():
         check_known("quantity", quantity, [*LABELS, *wanted], CaseError, "theory: ")
+        if not np.isfinite(value):
+            raise CaseError(f"theory: the value {value} of '{quantity}' is not a finite number: leave it out")
     if isinstance(sizes, int | np.integer):
         raise CaseError(f"a study of a function needs its mesh sizes, such as [4.0, 2.0, 1.0], not {sizes} levels")
     descending = sorted(map(float, sizes), reverse=True)

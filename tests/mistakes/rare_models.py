@@ -126,7 +126,7 @@ MISTAKES = [
     Mistake("a spring along a line of no length", spring_without_length, fc.ModelError,
             r"the spring between 'A' and 'B': points 0 and 9 coincide, and have no line between them: give x, y or z"),
     Mistake("moduli of unknown kinematics", lambda: fc.LinearElastic(E=1.0, nu=0.3).moduli("4d"), fc.ModelError,
-            r"unknown kinematics '4d': did you mean '3d'\?"),
+            r"unknown kinematics '4d': expected one of 3d, "),
     Mistake("cells of broken numbers", lambda: Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 1.5]]}), fc.MeshError,
             r"must be whole numbers, counted from 0, not float64 values"),
     Mistake("cells of numbers beyond 32 bits", lambda: Mesh([[0, 0], [1, 0], [0, 1]], {"tri3": [[0, 1, 2**40]]}),

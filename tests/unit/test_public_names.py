@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import fastcontact as fc
+from fastcontact.errors import Suggesting
 
 FOLDER = Path(fc.__file__).parent
 
@@ -47,7 +48,9 @@ def test_an_unknown_name_is_no_attribute():
         (fc.generate.block(), "nodes", "did you mean 'points'?"),
         (fc.generate.block(), "group_nams", "did you mean 'group_names'?"),
         (fc.Model(fc.generate.block(), "plane_strain"), "add_bolt", "did you mean 'add_pretension'?"),
-        (fc.Model(fc.generate.block(), "plane_strain"), "solve", "it is the function fastcontact.solve"),
+        (fc.Model(fc.generate.block(), "plane_strain"), "solve", "use fastcontact.solve"),
+        (fc.Model(fc.generate.block(), "plane_strain"), "plot", "use fastcontact.plot"),
+        (fc.Model(fc.generate.block(), "plane_strain"), "nodes", "no attribute 'nodes'"),  # not 'loads'
         (fc.obstacles, "Plane", "did you mean 'HalfSpace'?"),
         (fc.generate, "rotated", "did you mean 'transformed'?"),
         (fc.analytic, "hertz_sphere", "did you mean 'hertz_point'?"),
@@ -68,12 +71,14 @@ def test_an_unknown_name_suggests_the_nearest_one(owner, name, told):
         (lambda: fc.LinearElastic(E=1.0, nu=0.3, alpha=1e-5), "'alpha': did you mean 'expansion'?"),
         (lambda: fc.solve(None, steps=4), "'steps': did you mean 'ramp'?"),
         (lambda: fc.linear_ramp(4, q=1), "'q': expected one of steps, end"),
+        (lambda: fc.linear_ramp(step=4), "'step': did you mean 'steps'?"),
     ],
 )
 def test_an_unknown_argument_suggests_the_nearest_one(call, told):
     with pytest.raises(TypeError) as caught:
         call()
     assert str(caught.value).endswith(told)
+    assert str(caught.value).lower().count("did you mean") <= 1  # Python 3.13 suggests names, too
 
 
 def test_objects_are_copied_and_pickled_with_their_suggestions():
@@ -81,3 +86,14 @@ def test_objects_are_copied_and_pickled_with_their_suggestions():
     for again in (copy.deepcopy(mesh), pickle.loads(pickle.dumps(mesh))):
         assert again.group_names == mesh.group_names
         assert not hasattr(again, "_nothing")
+
+
+class Broken(Suggesting):
+    @property
+    def total(self):
+        return self._parts.sum
+
+
+def test_the_error_inside_a_property_is_not_hidden():
+    with pytest.raises(AttributeError, match="'Broken' object has no attribute '_parts'"):
+        Broken().total  # noqa: B018

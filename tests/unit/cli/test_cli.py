@@ -438,6 +438,10 @@ def test_info_of_a_ready_made_case(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["info", "forma04a"]) == 0
     assert "3168 tri3" in capsys.readouterr().out
+    assert main(["info", "forma04a", "--contacts"]) == 0
+    assert "SPHBAS on SPHHAU" in capsys.readouterr().out
+    assert main(["info", "forma4a"]) == 1
+    assert "did you mean 'forma04a'" in capsys.readouterr().err
 
 
 def test_results_are_not_written_under_the_name_of_another_format(tmp_path, capsys, monkeypatch):

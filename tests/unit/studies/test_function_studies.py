@@ -119,6 +119,7 @@ def test_a_sweep_calls_the_function_with_all_choices():
         ((tube, [1.0], ["tri3"]), "leave out 'elements', which is only for case files"),
         (("forma04a", [1.0, 0.5]), "give a case its number of levels"),
         (("forma04a", 3, None, None, {"force": 1.0}), "its theory in the table .theory.PAIR."),
+        ((tube, [1.0], None, None, {"force": math.nan}), "theory: the value nan of 'force' is not a finite number"),
         ((tube, [1.0], None, None, {"force_": 1.0}), "theory: unknown quantity 'force_': did you mean 'force'"),
         ((lambda size: None, [1.0]), "size = 1: the function <lambda> must return a Model, or what fc.solve returns"),
         ((lambda size: 1 / 0, [1.0]), "the function <lambda> failed at line .*: ZeroDivisionError"),
