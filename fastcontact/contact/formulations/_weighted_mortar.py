@@ -223,7 +223,7 @@ class WeightedMortar(Formulation):
         return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
 
     def _points_of(self, block: FacetBlock, overlap: Overlap) -> OverlapPoints:
-        """Return Gauss points of whole facets, and the centres of the segments of linear facets less than half covered.
+        """Return Gauss points of facets, and the centres of segments for linear facets less than a quarter covered.
 
         The dual functions of a narrow segment are large outside it.
         """
@@ -233,7 +233,7 @@ class WeightedMortar(Formulation):
         for coupling in overlap.couplings:
             if coupling.secondary is block and self.secondary.order == 1:
                 covered = overlap.mass[self.secondary.blocks.index(block)].sum(axis=(1, 2))
-                whole = covered >= 0.5 * area.sum(axis=1)
+                whole = covered >= 0.25 * area.sum(axis=1)
                 facet, shape = coupling.pairs[:, 0], coupling.integrals.sum(axis=2)
                 size = shape.sum(axis=1)
                 cut = ~whole[facet] & (size > 0.0)
