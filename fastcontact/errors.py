@@ -97,9 +97,8 @@ def warn(text: str) -> None:
 
 LONGEST_NAME = 120  # largest number of characters of an unknown name in a message
 SHOWN = 20  # largest number of known names in the message about an unknown one
-SIMILAR = (
-    0.65  # smallest ratio of matching characters of a name that is suggested (difflib): "loads" for "nodes" has 0.6
-)
+# Smallest ratio of matching characters (difflib) of a name that is suggested; "loads" for "nodes" has 0.6.
+SIMILAR = 0.65
 # Names of fastcontact, separated by spaces, by the names that other programs or other parts of fastcontact use.
 OTHER_WORDS = {
     "slave": "secondary", "master": "primary", "mu": "friction", "interference": "clearance", "gap": "clearance",

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from fastcontact.cli._files import check_outputs, write_json
+from fastcontact.cli._outputs import check_outputs, write_json
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import FastcontactError, FileError
 

@@ -304,14 +304,10 @@ class _Newton:
             u0, bodies = self._iterate.u, problem.floating_bodies
             lift = load.lift if bodies is None else load.lift + bodies.rigid(u0[bodies.dofs])
             dofs = problem.dofs.for_step(u0, lift)
-            reduced = loaded.condensed() if dofs.condensed else None
+            reduced = loaded.condensed() if dofs.condensed else loaded
+            assert reduced is not None  # a solver that condenses has chosen these degrees of freedom
             step = replace(
-                self._begin,
-                problem=problem,
-                load=load,
-                loaded=reduced or loaded,
-                dofs=dofs,
-                extrapolation=extrapolation,
+                self._begin, problem=problem, load=load, loaded=reduced, dofs=dofs, extrapolation=extrapolation
             )
             settled = settle_geometry(step, self._iterate)
             self._iterate = settled.iterate

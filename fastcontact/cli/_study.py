@@ -10,8 +10,8 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from fastcontact.cli._files import check_outputs, save, write_json, write_text
 from fastcontact.cli._interrupts import to_main_thread
+from fastcontact.cli._outputs import check_outputs, save, write_json, write_text
 from fastcontact.cli._terminal import say, somebody_watches
 from fastcontact.errors import CaseError, FastcontactError
 

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._files import say_written
+from fastcontact.cli._outputs import say_written
 from fastcontact.cli._terminal import say
 from fastcontact.errors import FastcontactError, FileError
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from fastcontact.cli._files import check_outputs, say_written
+from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.errors import CaseError
 
 HELP = "export a result file: MED with fields (Salome, ParaVis) or an XDMF sidecar (old ParaView)"

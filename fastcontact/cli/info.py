@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from fastcontact.cli._files import check_outputs, save
+from fastcontact.cli._outputs import check_outputs, save
 from fastcontact.cli._terminal import say
 
 HELP = "show the content of a mesh, case, deck or result file: groups, sizes, steps, iterations, versions"

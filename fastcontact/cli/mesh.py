@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fastcontact.cli._arguments import add_loudness, declare
-from fastcontact.cli._files import check_outputs, say_written
+from fastcontact.cli._outputs import check_outputs, say_written
 from fastcontact.cli._terminal import say
 
 HELP = "generate a mesh with named groups and report its quality"

@@ -5,15 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from fastcontact.cli import _files
-from fastcontact.cli._files import check_outputs, save, say_written
+from fastcontact.cli import _results
+from fastcontact.cli._outputs import check_outputs, save, say_written
 from fastcontact.errors import CaseError
 
 HELP = "plot the deformed mesh with a field, a section, the contact, or its history over the load steps"
 # Options that draw a contact pair.
 OF_CONTACT = ("history", "axis", "zones", "map")
 ARGUMENTS = {
-    **_files.ARGUMENTS,
+    **_results.ARGUMENTS,
     "--png FILE": "write the picture to this file",
     "": {
         "--history": "force and contact radius over the load steps instead",
@@ -52,8 +52,8 @@ def run(options: argparse.Namespace) -> int:
         raise CaseError("--animate FILE names the file to write: leave out --png")
     plane = _plane(options.section) if options.section else None
     with open_results(options.file) as results:
-        step = _files.chosen_step(results, options.step)
-        case = _files.case_data(results)
+        step = _results.chosen_step(results, options.step)
+        case = _results.case_data(results)
         if options.view:
             plot.view(results, step, scale=options.scale, title=case["title"], screenshot=options.png)
             return 0
@@ -110,7 +110,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
     from fastcontact.results import plot
 
     labels = {"title": case["title"]}
-    name = _files.chosen_contact(options, step)
+    name = _results.chosen_contact(options, step)
     theories = case["theories"].get(name, {})
     if options.map:
         labels["title"] = f"{case['title']}\ncontact '{name}', {step.instant}".strip()
@@ -120,7 +120,7 @@ def _of_contact(options: argparse.Namespace, results: Any, step: Any, case: dict
         return plot.contact_zones(list(results), name, **labels)
     if options.history:
         given = {"approach": case["approach"].get(name), "share": theories.get("share", 1.0)}
-        return plot.history(list(results), name, law=_files.law(theories), **given, **labels)[0]
+        return plot.history(list(results), name, law=_results.law(theories), **given, **labels)[0]
     labels["title"] = f"{case['title']}\nstresses on the axis, {step.instant}".strip()
     return plot.axis_stress(results.mesh, step, name, _axis_curves(theories, step, name, case), **labels)
 
@@ -131,5 +131,5 @@ def _axis_curves(theories: dict[str, Any], step: Any, name: str, case: dict[str,
     theory = getattr(theory, "hertz", theory)
     if theory is None or not hasattr(theory, "stress_on_axis"):
         return {}
-    given = {"approach": case["approach"].get(name), "load": _files.load_multiplier(case["ramp"], step)}
-    return _files.compared("theory", theory, step.contact[name], theories["share"], **given) or {"theory": theory}
+    given = {"approach": case["approach"].get(name), "load": _results.load_multiplier(case["ramp"], step)}
+    return _results.compared("theory", theory, step.contact[name], theories["share"], **given) or {"theory": theory}

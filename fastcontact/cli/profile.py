@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from fastcontact.cli import _files
-from fastcontact.cli._files import check_outputs, draw_profile, drawn, load_multiplier, pressure_curves, say_written
+from fastcontact.cli import _results
+from fastcontact.cli._outputs import check_outputs, draw_profile, say_written
+from fastcontact.cli._results import drawn, load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
 
 HELP = "pressure along the contact line against theory: CSV, XMGRACE .agr, PNG"
 ARGUMENTS = {
-    **_files.ARGUMENTS,
+    **_results.ARGUMENTS,
     "--csv FILE": "write the table",
     "--agr FILE": "write an XMGRACE project with the computed and the theoretical pressure",
     "--png FILE": "write a picture",
@@ -27,9 +28,9 @@ def run(options: argparse.Namespace) -> int:
 
     check_outputs([options.file], [options.csv, options.agr], [options.png])
     with open_results(options.file) as results:
-        step = _files.chosen_step(results, options.step)
-        name = _files.chosen_contact(options, step)
-        case = _files.case_data(results)
+        step = _results.chosen_step(results, options.step)
+        name = _results.chosen_contact(options, step)
+        case = _results.case_data(results)
     contact = step.contact[name]
     table = contact_table(contact, step)
     load = load_multiplier(case["ramp"], step)

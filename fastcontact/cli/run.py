@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fastcontact.cli._files import check_outputs, profile_picture, write_json
+from fastcontact.cli._outputs import check_outputs, profile_picture, write_json
 from fastcontact.cli._terminal import say, somebody_watches, warnings_shown
 from fastcontact.errors import CaseError, ConvergenceError, FileError, ModelError, in_file, warn
 

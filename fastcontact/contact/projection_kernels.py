@@ -104,10 +104,10 @@ def beyond(triangle, s, t):
 
 
 @innermost_kernel
-def _off(triangle, s, t):
-    """Return `beyond`, and where it ties the smaller value for the facet whose other reference coordinates are inside.
+def _ranked(triangle, s, t):
+    """Return `beyond` plus a small fraction of the sum of all overhangs, by which neighbouring facets are compared.
 
-    Beyond the end of the surface, the largest overhangs of a facet and of the next one along this end are equal.
+    Beyond the end of a surface, a facet and the next one along it have the same largest overhang; the sum breaks the tie.
     """
     if triangle:
         total = max(-s, 0.0) + max(-t, 0.0) + max(s + t - 1.0, 0.0)
@@ -128,14 +128,14 @@ def inside(triangle, s, t):
 
 @innermost_kernel
 def _beside(point, terms, directions, triangular, neighbours, f, height):
-    """Return the facet next to `f` with the smallest `_off` of the projection, (s, t), and this value or infinity."""
+    """Return the facet next to `f` with the smallest `_ranked` of the projection, (s, t), and this value or infinity."""
     start, numbers = neighbours
     best, best_s, best_t, least = f, 0.0, 0.0, np.inf
     for k in range(start[f], start[f + 1]):
         g = numbers[k]
         middle = 1.0 / 3.0 if triangular[g] else 0.0
         s, t, converged = _newton(point, terms, directions, g, middle, middle, height)
-        out = _off(triangular[g], s, t) if converged else np.inf
+        out = _ranked(triangular[g], s, t) if converged else np.inf
         # Of several equivalent facets, the first one is taken.
         if converged and max(out, LENGTH_ROUND_OFF) < max(least, LENGTH_ROUND_OFF) - ROUND_OFF:
             best, best_s, best_t, least = g, s, t, out
@@ -171,7 +171,7 @@ def along_normals(begin, end, points, heights, terms, directions, triangular, ne
             s, t, over = a, b, out
             if out > LENGTH_ROUND_OFF:
                 other, a, b, off = _beside(point, terms, directions, triangular, neighbours, f, heights[i])
-                if off < _off(triangular[f], s, t):
+                if off < _ranked(triangular[f], s, t):
                     f, s, t, over = other, a, b, beyond(triangular[other], a, b)
         s, t = inside(triangular[f], s, t)
         facet[i], xi[i, 0], xi[i, 1], overhang[i] = f, s, t, over if over > LENGTH_ROUND_OFF else 0.0

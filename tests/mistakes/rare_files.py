@@ -16,8 +16,8 @@ import numpy as np
 import fastcontact as fc
 from fastcontact._tools import hdf5, packing, paths
 from fastcontact.cases import case as cases
-from fastcontact.cli import _files
-from fastcontact.cli._files import write_json
+from fastcontact.cli import _outputs, _results
+from fastcontact.cli._outputs import write_json
 from fastcontact.mesh.files import abaqus
 from fastcontact.mesh.files.meshio_content import build_mesh
 from fastcontact.mesh.generate import block, block_on_block
@@ -146,7 +146,7 @@ def changed_by_others(folder, patch):
 def no_step_yet(folder):
     fc.ResultWriter(folder / "a.vtkhdf", held()).close()
     with fc.open_results(folder / "a.vtkhdf") as results:
-        _files.chosen_step(results, -1)
+        _results.chosen_step(results, -1)
 
 
 def unexpected(patch):
@@ -158,7 +158,7 @@ def unexpected(patch):
 
 
 def picture_on_a_full_disk():
-    _files.save(SimpleNamespace(figure=SimpleNamespace(savefig=refusing(errno.ENOSPC))), "a.png")
+    _outputs.save(SimpleNamespace(figure=SimpleNamespace(savefig=refusing(errno.ENOSPC))), "a.png")
 
 
 def of_ansys(folder):
@@ -176,9 +176,9 @@ CALLS = [
     ("a case with a name beyond all limits", lambda: cases.read_case("a" * 5000 + ".toml"), fc.errors.CaseError, r"cannot look for the case file 'a+' \(File name too long\)"),
     ("a case with a value of another size", unexpected, fc.errors.CaseError, r"a value is of the wrong kind or size \(too large\): see the ready-made cases"),
     ("a picture on a full disk", picture_on_a_full_disk, fc.errors.FileError, r"'a\.png' cannot be written \(No space left on device\)"),
-    ("a picture without contact", lambda: _files.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
+    ("a picture without contact", lambda: _outputs.profile_picture(None, SimpleNamespace(contact={}), "a.png"), fc.errors.FastcontactError, r"there is no contact pair whose pressure could be plotted"),
     ("a step of no steps", no_step_yet, fc.errors.CaseError, r"a\.vtkhdf' contains no finished step yet"),
-    ("a pair of a result without contact", lambda: _files.chosen_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result contains no contact pair"),
+    ("a pair of a result without contact", lambda: _results.chosen_contact(SimpleNamespace(contact=None), SimpleNamespace(contact={})), fc.errors.CaseError, r"this result contains no contact pair"),
     ("figures of benchmarks on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a summary on a full disk", lambda patch: full(patch, write_json), fc.errors.FileError, r"'a\.json' cannot be written \(No space left on device\)"),
     ("a mesh from a pipe", pipe, fc.errors.FileError, r"pipe\.med' is a device or a pipe: name a regular file"),

@@ -22,7 +22,7 @@ from fastcontact.analysis.floating_bodies import FloatingBodies
 from fastcontact.cases.case import read_case
 from fastcontact.cases.keys import called
 from fastcontact.cli import _study, bench, cases
-from fastcontact.cli._files import check_outputs
+from fastcontact.cli._outputs import check_outputs
 from fastcontact.contact.configuration import Configuration
 from fastcontact.contact.formulations import _cut_faces
 from fastcontact.elasticity.constrained_system import System

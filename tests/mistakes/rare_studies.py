@@ -12,8 +12,8 @@ import fastcontact as fc
 from fastcontact.cases.case import build_case, read_case
 from fastcontact.cases.checks import Check, check_target
 from fastcontact.cli import _study
-from fastcontact.cli._files import write_text
 from fastcontact.cli._main import parser
+from fastcontact.cli._outputs import write_text
 from fastcontact.mesh.generate import block, box, half_spheres, merge_points
 from fastcontact.mesh.generate.refine import Circle, refined
 from fastcontact.studies import execute, fit

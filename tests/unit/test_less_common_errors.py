@@ -17,7 +17,7 @@ import fastcontact as fc
 from fastcontact._tools import paths
 from fastcontact._tools.argument_types import check_type, fits, words
 from fastcontact.analytic.pressure_curve import pressure_curve
-from fastcontact.cli import _files, main
+from fastcontact.cli import _outputs, main
 from fastcontact.cli._study import _failing_threads_interrupt
 from fastcontact.results import file_lock
 from fastcontact.round_off import SUM_ROUND_OFF
@@ -154,14 +154,14 @@ def test_a_picture_that_cannot_be_drawn(tmp_path):
         raise ValueError("Image size of 1e9x1e9 pixels is too large.")
 
     with pytest.raises(fc.FileError, match=r"cannot write the picture '.*a\.png': Image size of"):
-        _files.save(types.SimpleNamespace(figure=types.SimpleNamespace(savefig=too_large)), str(tmp_path / "a.png"))
+        _outputs.save(types.SimpleNamespace(figure=types.SimpleNamespace(savefig=too_large)), str(tmp_path / "a.png"))
 
 
 def test_outputs_onto_a_device(capsys):
     """As /dev/null, which takes all."""
     assert main(["cases", "-q"]) == 0
-    _files.write_text("/dev/null", "text")
-    _files.write_json("/dev/null", {"a": 1})
+    _outputs.write_text("/dev/null", "text")
+    _outputs.write_json("/dev/null", {"a": 1})
 
 
 def interrupted_by_a_thread():

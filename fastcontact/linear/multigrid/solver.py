@@ -44,9 +44,9 @@ WATCH_EVERY = 2
 # Number of iterations before the first call of a monitor if `_contrast` is large, because errors of soft parts are not yet
 # known.
 WATCH_CONTRAST_FROM = 6
-# Largest estimated error of displacements, relative to the largest one, over the tolerance of the residual. In one material
-# the error is smaller by itself; forces in a stiff body exceed those in a soft one, whose displacements settle later.
-ERROR = 3e3
+# Largest estimated error of displacements, relative to the largest one, over the tolerance of the residual. It is reached
+# only if bodies differ in stiffness: forces in the stiff body dominate the residual, and the soft body converges later.
+DISPLACEMENT_ERROR = 3e3
 # Cost of a change of the hierarchy, including the elimination of its equations, as a number of iterations; about that of a
 # new hierarchy, too.
 CHANGE = 15
@@ -359,8 +359,7 @@ class Multigrid:
         if begun > STOOD * self._cut_short and self._constrained.stiffening > MILD:
             self._most_warm = min(2 * self._most_warm, LONGEST_WARM)
         self._cut_short = np.inf
-        while iteration.norm > wanted or not self._done(iteration, tolerance, scale):
-            done = self._done(iteration, tolerance, scale)
+        while not (done := self._done(iteration, tolerance, scale)) or iteration.norm > wanted:
             if done and made >= self._most_warm:
                 self._cut_short = begun
                 return
@@ -373,9 +372,9 @@ class Multigrid:
             self._count()
 
     def _done(self, iteration: Iteration, tolerance: float, scale: float) -> bool:
-        """Return whether the residual is at most `tolerance` times `scale`, and displacements of final solutions settled.
+        """Return whether the residual is at most `tolerance` times `scale`, and the displacements of a final solution settle.
 
-        A small residual alone is no such sign: it may exceed all forces in a soft body, relative to those in a stiff one.
+        A small residual does not suffice: relative to forces in a stiff body, it may exceed all forces in a soft one.
         """
         if iteration.norm > tolerance * scale:
             return False
@@ -383,7 +382,7 @@ class Multigrid:
         self._yielding = iteration.change(n) or self._yielding
         if tolerance > self.tolerance or not iteration.norm:
             return True
-        return self._yielding * iteration.norm <= ERROR * self.tolerance * largest(iteration.x[:n])
+        return self._yielding * iteration.norm <= DISPLACEMENT_ERROR * self.tolerance * largest(iteration.x[:n])
 
     def _count(self) -> None:
         """Count one iteration."""

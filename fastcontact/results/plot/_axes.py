@@ -1,148 +1,22 @@
-"""Axes of plots, and the fields that they show, by name."""
+"""Axes of plots."""
 
 from __future__ import annotations
 
 import io
-import operator
 import os
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fastcontact._tools.units import named_units
-from fastcontact.arrays import Array, Numbers
-from fastcontact.elasticity.recovery import principal_stress, tresca, von_mises, von_mises_signed
+from fastcontact.arrays import Array
 from fastcontact.errors import FastcontactError, check_known
-from fastcontact.mesh.mesh import Mesh
-from fastcontact.results.layout import cells_by_element, contact_slip, separated
+from fastcontact.results.plot.fields import Field
 from fastcontact.results.step import ContactResult, StepResult
-from fastcontact.results.tables import AXES, STRESS_COMPONENTS
-from fastcontact.results.units import labelled, valued
-
-
-@dataclass(frozen=True, eq=False)
-class Field:
-    """A scalar field at the points of a mesh, which is cut along material interfaces for stresses.
-
-    Attributes
-    ----------
-    mesh : Mesh
-        Mesh with the points of the values.
-    node : ndarray of int (m,)
-        Node of the original mesh at each of these points.
-    values : ndarray (m,)
-        Values [unit of `quantity`].
-    caption : str
-        Name for labels.
-    quantity : str
-        Kind of unit, ``"pressure"`` or ``"length"``; empty for other fields.
-    """
-
-    mesh: Mesh
-    node: Numbers
-    values: Array
-    caption: str
-    quantity: str
-
-    @property
-    def extreme(self) -> int:
-        """Number of the point with the value of largest magnitude."""
-        return int(np.argmax(np.abs(self.values)))
-
-    @property
-    def range(self) -> tuple[float, float]:
-        """Limits of the colours, which are symmetric about zero if the field is `signed`."""
-        low, high = float(self.values.min()), float(self.values.max())
-        if self.signed:
-            return -max(-low, high), max(-low, high)
-        return low, high
-
-    @property
-    def signed(self) -> bool:
-        """Whether the values have both signs and the smaller extreme is more than a tenth of the larger in magnitude."""
-        low, high = float(self.values.min()), float(self.values.max())
-        return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
-
-    def described(self, value: float, units: Mapping[str, str], where: str = "") -> str:
-        """Return a label for an extreme value of the field."""
-        kind = "maximum" if value >= 0.0 else "minimum"
-        return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"
-
-    @property
-    def colours(self) -> str:
-        """Name of the colour map, which diverges from blue through white to red if the field is `signed`."""
-        return "RdBu_r" if self.signed else "viridis"
-
-
-def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
-    """Return a field of a step by its name; FastcontactError if there is no field with this name."""
-    fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
-    heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
-    check_known("field", name, [*names(mesh), *step.cell_fields, *heat], FastcontactError)
-    if name in OF_STRESS and name not in step.cell_fields:
-        separate_mesh, node, stress = separated(mesh, step)
-        caption, of_stress = OF_STRESS[name]
-        values = step.von_mises if name == "von_mises" and separate_mesh is mesh else of_stress(stress)
-        return Field(separate_mesh, node, values, caption, "pressure")
-    caption, quantity = name, ""
-    if name in DISPLACEMENTS:
-        caption, quantity = name.replace(".", " along "), "length"
-        along = AXES.index(name[-1]) if "." in name else None
-        values = np.linalg.norm(step.displacement, axis=1) if along is None else step.displacement[:, along]
-    elif name in SLIPS:
-        caption, quantity = SLIPS[name], "length"
-        values = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
-    elif name == "temperature" and step.temperature is not None:
-        values = step.temperature
-    elif name == "heat_flux":
-        caption, values = "heat flux", _of_cells(mesh, np.linalg.norm(fluxes, axis=0))
-    else:
-        caption, values = CELLS.get(name, name), _of_cells(mesh, step.cell_fields[name])
-    return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)
-
-
-def names(mesh: Mesh) -> list[str]:
-    """Return the names of the fields that each step on a mesh has."""
-    in_space = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
-    return [name for name in (*OF_STRESS, *DISPLACEMENTS, *SLIPS) if name not in in_space]
-
-
-def _of_cells(mesh: Mesh, values: Array) -> Array:
-    """Return the mean (n_points,) of the values (n_solids,) of the solid cells around each point."""
-    total, count, by_element = np.zeros(mesh.n_points), np.zeros(mesh.n_points), cells_by_element(mesh, values)
-    for name, block in mesh.solids.items():
-        np.add.at(total, block, by_element[name][:, None])
-        np.add.at(count, block, 1.0)
-    return total / np.maximum(count, 1.0)
-
-
-# Captions of fields, and functions from stresses (n, 4) or (n, 6) to values (n,) [pressure].
-OF_STRESS: dict[str, tuple[str, Callable[[Array], Array]]] = {
-    "von_mises": ("von Mises stress", von_mises),
-    "von_mises_signed": ("von Mises stress with the sign of the trace", von_mises_signed),
-    "tresca": ("Tresca stress (largest minus smallest principal stress)", tresca),
-    "stress.principal_max": ("largest principal stress", lambda stress: principal_stress(stress)[:, 2]),
-    "stress.principal_mid": ("middle principal stress", lambda stress: principal_stress(stress)[:, 1]),
-    "stress.principal_min": ("smallest principal stress", lambda stress: principal_stress(stress)[:, 0]),
-    **{
-        f"stress.{name}": (f"stress {name}", operator.itemgetter((slice(None), k)))
-        for k, name in enumerate(STRESS_COMPONENTS)
-    },
-}
-CELLS = {
-    "plastic_strain": "equivalent plastic strain",
-    "yield_ratio": "equivalent stress over yield stress",
-    **{f"heat_flux_{axis}": f"heat flux along {axis}" for axis in AXES},
-    "J": "volume over reference volume",
-    "logarithmic_strain": "principal logarithmic strain",
-}
-SLIPS = {"contact_slip": "slip of the step", "contact_slip_total": "total slip"}
-DISPLACEMENTS = ("displacement", "displacement.x", "displacement.y", "displacement.z")
-
+from fastcontact.results.units import labelled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

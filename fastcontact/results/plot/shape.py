@@ -22,7 +22,8 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Field, Units, field_of, new_axes, placed, units_of
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, placed, units_of
+from fastcontact.results.plot.fields import Field, field_of
 from fastcontact.results.plot.patches import fill, outlines, shaded
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, show_box, view_of_extreme
 from fastcontact.results.step import StepResult

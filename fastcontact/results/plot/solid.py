@@ -11,7 +11,7 @@ from fastcontact.contact.search.facet_tables import flat_triangles
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import Field
+from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.patches import lattice
 
 # Distance behind a triangle, relative to the total size, up to which a point is taken to lie on the triangle.

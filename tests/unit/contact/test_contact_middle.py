@@ -9,7 +9,7 @@ from models import elastic_model, supported
 import fastcontact as fc
 from fastcontact.analytic.pressure_curve import pressure_curve
 from fastcontact.cli import main
-from fastcontact.cli._files import pressure_curves
+from fastcontact.cli._results import pressure_curves
 from fastcontact.contact.contact_middle import unrolled
 from fastcontact.contact.surface import surface
 from fastcontact.results.step import half_width

@@ -19,7 +19,7 @@ from fastcontact.cli import main
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.generate import block, box, union
-from fastcontact.results.plot._axes import field_of, names
+from fastcontact.results.plot.fields import field_of, names
 from fastcontact.results.plot.patches import fill, outlines
 from fastcontact.results.plot.shape import _cut_tetrahedra
 from fastcontact.results.plot.solid import Screen

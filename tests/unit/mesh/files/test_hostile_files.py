@@ -20,7 +20,7 @@ from test_result_files import MESH, step_result, write
 
 import fastcontact as fc
 from fastcontact.cases.case import read_case
-from fastcontact.cli._files import case_data
+from fastcontact.cli._results import case_data
 from fastcontact.errors import FileError, MeshError
 from fastcontact.mesh.files import meshio_process
 from fastcontact.mesh.files.med import add_field, write_med_mesh

@@ -1,139 +1,17 @@
-"""Files of commands: results that they read, with the choice of step and contact pair, and outputs, including pictures."""
+"""Output files of commands, including pictures: checks before a computation, and writing after it."""
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from fastcontact._tools import toml_text
-from fastcontact.analytic.pressure_curve import PressureCurve, pressure_curve
+from fastcontact.cli._results import load_multiplier, pressure_curves
 from fastcontact.cli._terminal import say
-from fastcontact.errors import CaseError, FastcontactError, FileError, check_known
-
-# Arguments that choose a step and a contact pair.
-ARGUMENTS = {
-    "file": "result file (.vtkhdf)",
-    "--step STEP": (-1, "number of the step, from 1; by default the last"),
-    "--contact NAME": "contact pair; by default the first",
-}
-
-
-def chosen_step(results: Any, number: int) -> Any:
-    """Return the step with a number counted from 1, or the last step for -1; CaseError if it does not exist."""
-    if not len(results):
-        raise CaseError(f"'{results.path}' contains no finished step yet")
-    if number == -1:
-        return results[-1]
-    if not 1 <= number <= len(results):
-        raise CaseError(f"there is no step {number} in '{results.path}': it contains steps 1 to {len(results)}")
-    return results[number - 1]
-
-
-def chosen_contact(options: argparse.Namespace, step: Any) -> str:
-    """Return the name of the contact pair in the options, by default the first pair.
-
-    If the first of several pairs is chosen by default, the names of the others are printed. Raises CaseError if there is no
-    contact pair, or none with the name.
-    """
-    if not step.contact:
-        raise CaseError("this result contains no contact pair")
-    if options.contact is not None:
-        check_known("contact pair", options.contact, step.contact, CaseError)
-        return str(options.contact)
-    name, *others = step.contact
-    if others and not options.quiet:
-        listed = ", ".join(f"'{other}'" for other in others)
-        text = f"contact '{name}', the first of {len(step.contact)}; others: {listed} (choose with --contact NAME)"
-        say(text, error=True)
-    return str(name)
-
-
-def case_data(results: Any) -> dict[str, Any]:
-    """Return title, theories, approaches and ramp of the case stored in the file; defaults if there is no case."""
-    from fastcontact.cases.case import described
-
-    try:
-        data = toml_text.parsed(results.case_text or "")
-    except ValueError:
-        data = {}
-    return described(data)
-
-
-def load_multiplier(table: Sequence[tuple[float, float]], step: Any) -> float:
-    """Return the load multiplier at a step from the table of the ramp."""
-    return float(np.interp(step.load_factor, *np.transpose(table)))
-
-
-def pressure_curves(
-    theories: Mapping[str, Any], contact: Any, *, approach: float | None = None, load: float = 1.0
-) -> dict[str, Any]:
-    """Return theories at equal approach and at equal force, for comparison with the pressure of a contact.
-
-    Parameters
-    ----------
-    theories : mapping
-        Theories of the pair in the form of `Case.theories`.
-    contact : ContactResult
-        Contact to compare with.
-    approach : float, optional
-        Approach of the case at load multiplier 1 [length]; None if the theory is given by a force or has no load.
-    load : float
-        Load multiplier of the step [-].
-
-    Returns
-    -------
-    dict
-        Theories by label of the legend; empty if the pressure of the theory cannot be drawn. For finite half-spheres it
-        contains Hertz's theory.
-    """
-    theory: Any = theories.get("theory")
-    theory = theory if pressure_curve(theory) is not None else getattr(theory, "hertz", None)
-    curve = pressure_curve(theory)
-    if curve is None:
-        return {}
-    if approach is None and not hasattr(theory, "at_force"):
-        return {curve.name: theory}
-    return compared(curve.name, theory, contact, theories["share"], approach=approach, load=load)
-
-
-def drawn(theory: Any) -> PressureCurve:
-    """Return the pressure curve of a theory from `pressure_curves`."""
-    curve = pressure_curve(theory)
-    assert curve is not None
-    return curve
-
-
-def compared(
-    name: str, theory: Any, contact: Any, share: float, *, approach: float | None, load: float
-) -> dict[str, Any]:
-    """Return a theory at the approach and at the force of a contact, where these are known, by label of the legend.
-
-    `share` is the fraction of the contact that the model represents [-]. The `approach` [length] is reached at load
-    multiplier 1, and `load` is the multiplier of the step [-].
-    """
-    curves, force = {}, float(np.linalg.norm(contact.force)) / share
-    if approach is not None and load == 1.0:
-        curves[f"{name}, equal approach"] = theory
-    elif approach is not None and load > 0 and hasattr(theory, "at_approach"):
-        curves[f"{name}, equal approach"] = theory.at_approach(approach * load)
-    if force > 0 and hasattr(theory, "at_force"):
-        curves[f"{name}, equal force"] = theory.at_force(force)
-    return curves
-
-
-def law(theories: Mapping[str, Any]) -> Any:
-    """Return the theory if it provides force and radius as functions of the approach; otherwise None."""
-    theory = theories.get("theory")
-    theory = getattr(theory, "hertz", theory)
-    return theory if hasattr(theory, "at_approach") else None
-
+from fastcontact.errors import FastcontactError, FileError
 
 if TYPE_CHECKING:
     from fastcontact.results.step import ContactResult, StepResult
