@@ -147,7 +147,7 @@ def _unbalanced(state: State) -> Iterator[str]:
 def _slipping_before(state: State) -> Iterator[str]:
     """Yield a warning where nodes that close and slide in one step do much of the frictional work."""
     work = state.work
-    if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE_WORK * work.strain_energy):
+    if work is not None and work.touching > max(WHILE_TOUCHING * work.friction, NOTABLE_WORK * work.strain_energy, 0.0):
         share = work.touching / max(work.friction, work.touching)  # elastic slip may take some of the work back
         yield (
             f"{share:.0%} of the work of friction is done at nodes in the load step in which they "

@@ -282,6 +282,10 @@ def test_the_share_of_work_while_touching_is_at_most_all_of_it(friction):
     assert text.startswith("100% of the work of friction")
 
 
+def test_no_work_of_friction_is_not_told_where_the_strain_energy_is_round_off():
+    assert not [*_slipping_before(State(np.zeros(2), 0.0, work=Work(-1e-30, 0.0, 0.0)))]
+
+
 def test_steps_as_a_whole_have_the_work_of_slip_before_nodes_touch():
     few = pressed_ball()
     with pytest.warns(

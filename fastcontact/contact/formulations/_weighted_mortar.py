@@ -47,10 +47,6 @@ from fastcontact.round_off import LENGTH_ROUND_OFF, SINGLE_PRECISION, TINY
 MULTIPLIERS = ("standard", "dual")
 # Smallest fraction of the squared length of a tangent, not held by supports, at which slip along the tangent is computed.
 FREE = 0.1
-# Smallest covered fraction of a linear facet whose forces are linearised at Gauss points. Below it the dual functions are
-# large outside the covered part, and the centres of the segments are used. Of the random models, 300028 does not converge
-# without this limit, and 101378 does not converge if it is a half.
-NARROW = 0.25
 
 
 class Coverage(NamedTuple):
@@ -226,21 +222,28 @@ class WeightedMortar(Formulation):
         return Linearised(self.secondary, points, weighted, normal, multiplier, mean, own_normals, slips)
 
     def _points_of(self, number: int, overlap: Overlap) -> OverlapPoints:
-        """Return Gauss points of the facets of a block, and centres of segments where facets are hardly covered."""
-        block = self.secondary.blocks[number]
-        N, area = areas_of_rule(block, self.points, self.axisymmetric)
-        linear, covered = self.secondary.order == 1, np.ones(len(area), bool)
-        if linear:
-            covered = overlap.mass[number].sum(axis=(1, 2)) >= NARROW * area.sum(axis=1)
-        facets = np.flatnonzero(covered)
-        points = [OverlapPoints(np.repeat(facets, len(N)), np.tile(N, (len(facets), 1)), area[facets].ravel())]
-        for coupling in overlap.couplings:
-            if linear and coupling.secondary is block:
-                facet, weights = coupling.pairs[:, 0], coupling.integrals.sum(axis=2)
-                size = weights.sum(axis=1)
-                narrow = ~covered[facet] & (size > 0.0)
-                points.append(OverlapPoints(facet[narrow], weights[narrow] / size[narrow, None], size[narrow]))
-        return OverlapPoints(*map(np.concatenate, zip(*points, strict=True)))
+        """Return integration points of the facets of a block, on the parts that face the other side.
+
+        They are Gauss points, except on linear facets that are partly covered. There they are at the mean of the shape
+        functions over the covered part, plus and minus displacements along the principal axes of their covariance (Julier and
+        Uhlmann, 1997), so that products of two shape functions are integrated exactly, as dual functions require.
+        """
+        N, area = areas_of_rule(self.secondary.blocks[number], self.points, self.axisymmetric)
+        mass = overlap.mass[number]
+        size = mass.sum(axis=(1, 2))
+        whole = (size >= (1.0 - SINGLE_PRECISION) * area.sum(axis=1)) | (self.secondary.order > 1)
+        facets, cut = np.flatnonzero(whole), np.flatnonzero(~whole & (size > 0.0))
+        mean = mass[cut].sum(axis=2) / size[cut, None]
+        covariance = mass[cut] / size[cut, None, None] - mean[:, :, None] * mean[:, None, :]
+        variance, axes = np.linalg.eigh(covariance)  # the first variance is zero: the functions sum to one
+        count = 2 * (N.shape[1] - 1)
+        along = np.sqrt(0.5 * count * np.maximum(variance, 0.0))[:, None, 1:] * axes[:, :, 1:]
+        shapes = mean[:, None] + np.concatenate([along, -along], axis=2).transpose(0, 2, 1)
+        return OverlapPoints(
+            np.concatenate([np.repeat(facets, len(N)), np.repeat(cut, count)]),
+            np.concatenate([np.tile(N, (len(facets), 1)), shapes.reshape(-1, N.shape[1])]),
+            np.concatenate([area[facets].ravel(), np.repeat(size[cut] / count, count)]),
+        )
 
     def _slip0(self, mean: csr_array, closing: Array, directions: tuple[Array, ...], at: Configuration) -> Array:
         """Return the slip (k, m) not due to displacements: that of a rigid obstacle, or minus that of `closing`."""
