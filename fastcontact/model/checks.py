@@ -1,4 +1,4 @@
-"""Checks of a model before it is solved: supports, loads, overlapping bodies."""
+"""Checks of a model before the solution: rigid-body motions, supports, loads, initial penetration and overlapping bodies."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def check_motions(mesh: Mesh, motions: FreeMotions) -> None:
-    """Raise ModelError, with names of bodies and motions, if bodies or their parts at hinges have rigid-body motions."""
+    """Raise ModelError with the names of bodies and motions if there are any rigid-body motions."""
     if not len(motions):
         return
     total, hinges = len(motions), ""
@@ -52,14 +52,14 @@ def check_ramps(ramped: Iterable[tuple[str, Table | None]], instants: Iterable[f
 
 
 def check_forces(mesh: Mesh, forces: Array, related: Mask, name: str) -> None:
-    """Raise ModelError if `forces` (n_points, dim) [force] act on points without solid cell.
+    """Raise ModelError if `forces` (n_points, dim) [force] of load `name` act on points without solid cell.
 
     Points with multi-point constraints, `related` (n_points,) of bool, are exempt.
     """
-    lost = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
-    if len(lost):
+    loose = np.flatnonzero(forces.any(axis=1) & ~_carried(mesh, related))
+    if len(loose):
         raise ModelError(
-            f"{name} acts on {len(lost)} points that belong to no solid cell (first: point {lost[0]}): "
+            f"{name} acts on {len(loose)} points that belong to no solid cell (first: point {loose[0]}): "
             "name a group of the body, or tie the points to it with couple or relate"
         )
 
@@ -88,7 +88,7 @@ def check_supports(mesh: Mesh, supports: Iterable[tuple[str, str]], related: Mas
 
 
 def check_penetration(name: str, pair: Formulation) -> None:
-    """Raise ContactError if the sides of contact pair `name` penetrate by more than an element before any load.
+    """Raise ContactError if the initial penetration of contact pair `name` exceeds the facet length at a node.
 
     An intended interference is smaller, or is given by the option `clearance`.
     """
@@ -105,18 +105,19 @@ def check_penetration(name: str, pair: Formulation) -> None:
 
 
 def facet_lengths(pair: Formulation) -> Array:
-    """Return the length of the longest facet at each secondary node (n_nodes,) [length]."""
-    size = np.zeros(len(pair.secondary.points))
+    """Return the diagonal of the bounding box of the largest facet at each secondary node (n_nodes,) [length]."""
+    longest = np.zeros(len(pair.secondary.points))
     for block in pair.secondary.blocks:
-        long = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
-        np.maximum.at(size, block.local, long[:, None])
-    return size
+        diagonal = np.linalg.norm(np.ptp(pair.points[block.facets], axis=1), axis=1)
+        np.maximum.at(longest, block.local, diagonal[:, None])
+    return longest
 
 
 def initial_gaps(pair: Formulation) -> tuple[Array, Array]:
-    """Return gaps (n_nodes,) before any load, with clearances that increase them [length], and normals (n_nodes, dim).
+    """Return the gaps (n_nodes,) of the secondary nodes before any load [length], and the normals (n_nodes, dim).
 
-    Gaps are infinite at nodes that are unpaired or excluded, and in pairs that admit penetration: tied and gap_only.
+    Clearances are included where they increase the gap. Gaps are infinite at nodes that are unpaired or excluded, and in
+    pairs of the kinds that admit penetration, tied and gap_only.
     """
     if pair.options.tied or pair.options.gap_only:
         shape = len(pair.secondary.points), pair.points.shape[1]
@@ -133,13 +134,12 @@ def check_overlap(mesh: Mesh, kinematics: str, paired: Iterable[tuple[str, str]]
 
     `paired` are the (secondary, primary) groups of the contact pairs.
     """
-    _, body = bodies(mesh)
-    joined = {frozenset((int(body[mesh.points_of(a)[0]]), int(body[mesh.points_of(b)[0]]))) for a, b in paired}
+    _, body_of = bodies(mesh)
+    joined = {frozenset((int(body_of[mesh.points_of(a)[0]]), int(body_of[mesh.points_of(b)[0]]))) for a, b in paired}
     size = float(np.ptp(mesh.points, axis=0).max())
-    for number, other, depth, where in penetration(mesh, kinematics, mesh.points):
-        if depth > SINGLE_PRECISION * size and frozenset((number, other)) not in joined:
-            names = body_name(mesh, body, number), body_name(mesh, body, other)
+    for body, other, depth, position in penetration(mesh, kinematics, mesh.points):
+        if depth > SINGLE_PRECISION * size and frozenset((body, other)) not in joined:
             raise ModelError(
-                f"body {names[0]} overlaps body {names[1]} by {depth:.3g} near {where} before any load, "
-                "and no contact pair joins them: add the contact or move one of them"
+                f"body {body_name(mesh, body_of, body)} overlaps body {body_name(mesh, body_of, other)} by {depth:.3g} near "
+                f"{position} before any load, and no contact pair joins them: add the contact or move one of them"
             )

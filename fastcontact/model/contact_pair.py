@@ -1,4 +1,4 @@
-"""The user's description of a contact pair, and rotations of rigid obstacles and supports: checks and ramps."""
+"""Contact pairs as the user describes them, and the rotations of rigid obstacles and supports."""
 
 from __future__ import annotations
 
@@ -15,13 +15,16 @@ from fastcontact.elasticity.loads import check_number
 from fastcontact.errors import ModelError, check_known
 from fastcontact.model.ramp import Ramp, Table, multiplier, table_of
 
-# Force on an obstacle by component, None for prescribed components; empty without any force.
+# Components of the force on an obstacle [force]; None for components that are prescribed. Empty if no force is given.
 Driving = tuple[float | None, ...]
 
 
 @dataclass(frozen=True)
 class FluidPressure:
-    """Fluid of a `pressure` at multiplier 1 [pressure] from the group `source`, with its ramp or None."""
+    """Fluid that enters a contact from the group `source`.
+
+    `pressure` is that at multiplier 1 [pressure], and `ramp` its history, or None for the history of the analysis.
+    """
 
     pressure: float
     source: str
@@ -32,10 +35,10 @@ class FluidPressure:
 class ContactPair:
     """Two groups of facets that may touch, or a group and a rigid obstacle, with a formulation and its options.
 
-    With an `obstacle`, `primary` is empty; `motion` is the obstacle's displacement at multiplier 1 [length], and `ramp` its
-    ramp or None. Components of `force` that are not None drive the obstacle at multiplier 1 [force]. The obstacle rotates by
-    `rotation` along `rotation_ramp`, by default `ramp`. For automatically detected pairs, `found_gap` is the smallest gap at
-    detection [length].
+    With an `obstacle`, `primary` is empty. The obstacle has the displacement `motion` at multiplier 1 [length], with the
+    history `ramp`, or that of the analysis if None. Components in which `force` is not None are driven by this force at
+    multiplier 1 [force] instead. The obstacle rotates by `rotation` with the history `rotation_ramp`, by default `ramp`. For
+    automatically detected pairs, `found_gap` is the smallest gap at detection [length].
     """
 
     name: str
@@ -54,7 +57,7 @@ class ContactPair:
 
     @property
     def method(self) -> str:
-        """The formulation and the kind of its multipliers, if the pair specifies one, for messages."""
+        """Formulation and, if the pair specifies it, the kind of its multipliers, for messages."""
         return method(self.formulation, self.options)
 
     @cached_property
@@ -79,14 +82,14 @@ def method(formulation: str, options: Mapping[str, Any]) -> str:
 
 
 KEYS = ("angle", "centre", "axis", "ramp")
-# Largest rotation in a step with sliding, in which the path of a point is approximated by an arc [radian].
+# Largest rotation of an obstacle with friction in a load step [radian].
 LARGEST_TURN = 1.0
 
 
 def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) -> tuple[Rotation | None, Table | None]:
-    """Return a rotation, called `caption` in messages, and its ramp; None without a rotation or without a separate ramp.
+    """Return a rotation, called `caption` in messages, and its ramp; each is None if it is not given.
 
-    Raises ModelError if they are not admissible.
+    Raises ModelError if the rotation or the ramp is not admissible.
     """
     if given is None:
         return None, None
@@ -94,7 +97,7 @@ def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) 
         check_known(f"key of {caption}", key, KEYS, ModelError)
     if kinematics == "axisymmetric":
         raise ModelError(
-            f"{caption}: an axisymmetric model has no displacement round its axis, and tilting is not axisymmetric: use a "
+            f"{caption}: an axisymmetric model has no displacement around its axis, and tilting is not axisymmetric: use a "
             "three-dimensional model"
         )
     dim = 3 if kinematics == "3d" else 2
@@ -102,7 +105,7 @@ def rotation_of(caption: str, given: Mapping[str, Any] | None, kinematics: str) 
         if key not in given:
             raise ModelError(f"{caption} needs '{key}'")
     if dim == 2 and given.get("axis") is not None:
-        raise ModelError(f"{caption}: in the plane it is about z, counter-clockwise: leave out the axis")
+        raise ModelError(f"{caption}: in 2D rotations are about z, counter-clockwise: leave out the axis")
     check_number(f"the angle of {caption}", given["angle"])
     axis = _vector(f"the axis of {caption}", given["axis"], 3) if dim == 3 else (0.0, 0.0, 1.0)
     if not any(axis):
@@ -127,7 +130,10 @@ def angle_at(pair: ContactPair, ramp: Ramp, instant: float) -> float:
 
 
 def check_turns(pairs: Iterable[ContactPair], ramp: Ramp) -> None:
-    """Raise ModelError if an obstacle with friction rotates too far in a load step for the path of slip to be known."""
+    """Raise ModelError if an obstacle with friction rotates by more than LARGEST_TURN in a load step.
+
+    The slip of a step is computed from its end points, and does not follow longer arcs.
+    """
     for pair in pairs:
         if pair.rotation is None or not pair.options.get("friction"):
             continue

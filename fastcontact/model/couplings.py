@@ -40,7 +40,7 @@ class Spread:
     Attributes
     ----------
     place : tuple of float (dim,)
-        Point from which distances are measured [length].
+        Position of the point from which distances are measured [length].
     weighting : str
         ``"uniform"``, ``"linear"``, ``"quadratic"`` or ``"cubic"``.
     radius : float or None
@@ -58,28 +58,17 @@ class Spread:
                 f"{name}: the point {self.place} from which distances are measured must have {dim} coordinates"
             )
         for number in self.place:
-            check_number(f"a coordinate of the place of {name}", number)
+            check_number(f"a coordinate of the point of {name}", number)
         check_known("weighting", self.weighting, WEIGHTINGS, ModelError, f"{name}: ")
         if self.radius is not None:
             check_number(f"the radius of {name}", self.radius)
             if not self.radius > 0.0:
                 raise ModelError(f"the radius of {name} = {self.radius:g} must be positive")
 
-    def weights(self, places: Array, radius: float) -> Array:
-        """Return the weights (n,) [-] at `places` (n, dim) [length], zero beyond the radius."""
-        s = np.linalg.norm(places - np.array(self.place), axis=1) / radius
+    def weights(self, positions: Array, radius: float) -> Array:
+        """Return the weights (n,) [-] at `positions` (n, dim) [length], zero beyond the radius."""
+        s = np.linalg.norm(positions - np.array(self.place), axis=1) / radius
         return np.where(s <= 1.0, WEIGHTINGS[self.weighting](np.minimum(s, 1.0)), 0.0)
-
-
-def spread_of(name: str, point: Sequence[float] | None, weighting: str, radius: float | None) -> Spread | None:
-    """Return the weighting about a point, or None without one; ModelError if other arguments are given without a point."""
-    if point is None:
-        if weighting != "uniform" or radius is not None:
-            raise ModelError(
-                f"{name} has a weighting or a radius, but no point from which distances are measured: give at=..."
-            )
-        return None
-    return Spread(tuple(float(v) for v in point), weighting, radius)
 
 
 def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = None) -> tuple[Indices, Array]:
@@ -93,8 +82,8 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
         farthest = float(np.linalg.norm(mesh.points[points] - np.array(spread.place), axis=1).max())
         radius = farthest if spread.radius is None else spread.radius
 
-    def weigh(places: Array) -> Array:
-        return np.ones(len(places)) if spread is None or not radius else spread.weights(places, radius)
+    def weigh(positions: Array) -> Array:
+        return np.ones(len(positions)) if spread is None or not radius else spread.weights(positions, radius)
 
     if group in mesh.cell_groups and mesh.cells_of(group, dim=mesh.dim - 1):
         shares = Traction(group, {0: weigh}, None).vector(mesh, kinematics)[points, 0]
@@ -108,18 +97,19 @@ def shares_of(mesh: Mesh, kinematics: str, group: str, spread: Spread | None = N
     return points, shares / total if len(points) else shares
 
 
-def mean_rotation(weight: Array, arms: Array) -> Array:
+def mean_rotation(weight: Array, arms: Array, caption: str = "") -> Array:
     """Return the coefficients (n_rotations, n, dim) of the displacements of n points in their mean rotation [1 / length].
 
     The points have `weight` (n,) [-] and `arms` (n, dim) from their weighted centroid [length]. The coefficients times a
-    moment are forces at the points that have this moment and a zero resultant. Raises ModelError if the points coincide or,
-    in 3D, are collinear.
+    moment are forces at the points that have this moment and a zero resultant. Raises ModelError, with a message that
+    begins with `caption`, if the points coincide or, in 3D, are collinear.
     """
     motion = by_rotation(arms)
     inertia = np.einsum("n,ndk,ndl->kl", weight, motion, motion)
     if np.linalg.matrix_rank(inertia, tol=ROUND_OFF * np.abs(inertia).max(initial=TINY)) < len(inertia):
         raise ModelError(
-            "the points are collinear or coincide, so that their mean rotation is undetermined: use a group of larger extent"
+            f"{caption}the points are collinear or coincide, so that their mean rotation is undetermined: use a group of "
+            "larger extent"
         )
     return np.einsum("kl,ndl,n->knd", np.linalg.inv(inertia), motion, weight)
 
@@ -131,12 +121,12 @@ def by_rotation(arms: Array) -> Array:
     return np.cross(arms[..., None, :], np.eye(3))
 
 
-def forces_of_moment(weight: Array, places: Array, moment: Array) -> Array:
+def forces_of_moment(weight: Array, positions: Array, moment: Array, caption: str) -> Array:
     """Return nodal forces (n, dim) [force] that have the `moment` (1,) or (3,) [force times length] and a zero resultant.
 
-    They are proportional to `weight` (n,) [-] and to the arms of `places` (n, dim) [length]; see `mean_rotation`.
+    They are proportional to `weight` (n,) [-] and to the arms of `positions` (n, dim) [length]; see `mean_rotation`.
     """
-    return np.asarray(np.einsum("k,knd->nd", moment, mean_rotation(weight, places - weight @ places)))
+    return np.asarray(np.einsum("k,knd->nd", moment, mean_rotation(weight, positions - weight @ positions, caption)))
 
 
 @dataclass(frozen=True)
@@ -162,16 +152,13 @@ class SpreadForce(Load):
         for axis, value in self.components.items():
             force[axis] = value
         points, weight = shares_of(mesh, kinematics, self.group, self.spread)
-        places = mesh.points[points]
+        positions = mesh.points[points]
         nodal = weight[:, None] * force
-        arm = np.array(self.spread.place) - weight @ places
+        arm = np.array(self.spread.place) - weight @ positions
         moment = force @ by_rotation(arm)
         size = float(np.ptp(mesh.points, axis=0).max())
         if np.abs(moment).max() > ROUND_OFF * np.abs(force).max() * size:
-            try:
-                nodal = nodal + forces_of_moment(weight, places, moment)
-            except ModelError as error:
-                raise ModelError(f"{self.name}: {error}") from error
+            nodal = nodal + forces_of_moment(weight, positions, moment, f"{self.name}: ")
         forces[points] += nodal
 
 
@@ -198,10 +185,7 @@ class Moment(Load):
             forces[mesh.point(self.group + ROTATION), : len(moment)] += moment
             return
         points, weight = shares_of(mesh, kinematics, self.group)
-        try:
-            forces[points] += forces_of_moment(weight, mesh.points[points], moment)
-        except ModelError as error:
-            raise ModelError(f"{self.name}: {error}") from error
+        forces[points] += forces_of_moment(weight, mesh.points[points], moment, f"{self.name}: ")
 
 
 @dataclass(frozen=True)
@@ -229,7 +213,7 @@ def relation(
 ) -> MultiPointConstraint:
     """Return linear equations as a multi-point constraint of a mesh with points of `shape` (n_points, dim).
 
-    Each of the `rows` is the list of terms of an equation; their sum is `value` times the `ramp`.
+    Each of the `rows` is the list of terms of an equation, whose sum is `value` times the multiplier of `ramp`.
     """
     n_points, dim = shape
     row = [i for i, terms in enumerate(rows) for _ in terms]
@@ -241,14 +225,16 @@ def relation(
     return MultiPointConstraint(name, matrix, value, ramp)
 
 
-def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, directions: Array, n_dofs: int) -> csr_array:
+def rigid_rows(
+    reference: ReferencePoint, points: Indices, positions: Array, directions: Array, n_dofs: int
+) -> csr_array:
     """Return the rows (n k, n_dofs) of a rigid coupling: points follow the translation and rotation of a reference point.
 
     Parameters
     ----------
     reference : ReferencePoint
     points : ndarray of int (n,)
-    places : ndarray (n, dim)
+    positions : ndarray (n, dim)
         Reference coordinates of the points [length].
     directions : ndarray (n, k, dim)
         Unit vectors of the components that are coupled at each point [-].
@@ -256,15 +242,16 @@ def rigid_rows(reference: ReferencePoint, points: Indices, places: Array, direct
     """
     n, k, dim = directions.shape
     nodes = np.column_stack([points, np.tile([reference.point, reference.rotation], (n, 1))])
-    turns = directions @ by_rotation(places - np.array(reference.place))
-    turns = np.pad(turns, ((0, 0), (0, 0), (0, dim - turns.shape[2])))
-    values = np.stack([directions, -directions, -turns], axis=2)
+    arms = directions @ by_rotation(positions - np.array(reference.place))
+    arms = np.pad(arms, ((0, 0), (0, 0), (0, dim - arms.shape[2])))
+    values = np.stack([directions, -directions, -arms], axis=2)
     return nodal_rows(np.repeat(nodes, k, axis=0), values.reshape(n * k, 3, dim), n_dofs)
 
 
 def distributing_rows(
-    reference: ReferencePoint, points: Indices, places: Array, weight: Array, directions: Array, n_dofs: int
-) -> csr_array:
+    reference: ReferencePoint, points: Indices, positions: Array, weight: Array, directions: Array, n_dofs: int,
+    caption: str = "",
+) -> csr_array:  # fmt: skip
     """Return the rows (m, n_dofs) of a distributing coupling: a reference point follows the mean motion of points.
 
     The rotation theta is determined by least squares, ``J theta = sum of w r x u``, where r is the arm from the weighted
@@ -274,22 +261,28 @@ def distributing_rows(
     ----------
     reference : ReferencePoint
     points : ndarray of int (n,)
-    places : ndarray (n, dim)
+    positions : ndarray (n, dim)
         Reference coordinates of the points [length].
     weight : ndarray (n,)
         Weights of sum 1 [-].
     directions : ndarray (k, dim)
         Unit vectors of the components that are coupled [-].
     n_dofs : int
+    caption : str
+        Beginning of the message of an error.
+
+    Raises
+    ------
+    ModelError
+        If the points coincide or, in 3D, are collinear.
     """
-    centroid, dim = weight @ places, places.shape[1]
-    rotation = mean_rotation(weight, places - centroid)
-    turns = directions @ by_rotation(np.array(reference.place) - centroid)
-    of_reference = np.zeros(
-        (len(rotation) + len(directions), 2, dim)
-    )  # translation and rotation of the reference point
+    centroid, dim = weight @ positions, positions.shape[1]
+    rotation = mean_rotation(weight, positions - centroid, caption)
+    arms = directions @ by_rotation(np.array(reference.place) - centroid)
+    # The coefficients of the translation and of the rotation of the reference point.
+    of_reference = np.zeros((len(rotation) + len(directions), 2, dim))
     of_reference[: len(rotation), 1] = np.eye(len(rotation), dim)
-    of_reference[len(rotation) :, 0], of_reference[len(rotation) :, 1, : len(rotation)] = directions, -turns
+    of_reference[len(rotation) :, 0], of_reference[len(rotation) :, 1, : len(rotation)] = directions, -arms
     means = np.concatenate([rotation, directions[:, None] * weight[:, None]])
     nodes = np.tile([reference.point, reference.rotation, *points], (len(of_reference), 1))
     return nodal_rows(nodes, np.concatenate([of_reference, -means], axis=1), n_dofs)
@@ -311,7 +304,7 @@ def coupling(
     axes : sequence of int
         Coupled components; all for a distributing coupling.
     weighting : (str, float or None)
-        Weighting of a distributing coupling by the distance from the reference point; see `Spread`.
+        Weighting and radius of a distributing coupling, by the distance from the reference point; see `Spread`.
 
     Raises
     ------
@@ -337,11 +330,9 @@ def coupling(
     reference_nodes = np.isin(points, (reference.point, reference.rotation))
     if reference_nodes.any() or not len(points):
         raise ModelError(f"{name}: the group must have points and must not contain the reference point")
-    places, directions, n_dofs = mesh.points[points], np.eye(mesh.dim)[list(axes)], mesh.points.size
+    positions, directions, n_dofs = mesh.points[points], np.eye(mesh.dim)[list(axes)], mesh.points.size
     if kind == "rigid":
         at_points = np.tile(directions, (len(points), 1, 1))
-        return MultiPointConstraint(name, rigid_rows(reference, points, places, at_points, n_dofs))
-    try:
-        return MultiPointConstraint(name, distributing_rows(reference, points, places, weight, directions, n_dofs))
-    except ModelError as error:
-        raise ModelError(f"{name}: {error}") from error
+        return MultiPointConstraint(name, rigid_rows(reference, points, positions, at_points, n_dofs))
+    rows = distributing_rows(reference, points, positions, weight, directions, n_dofs, f"{name}: ")
+    return MultiPointConstraint(name, rows)

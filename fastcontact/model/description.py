@@ -1,4 +1,4 @@
-"""Textual description of a model."""
+"""Description of a model in sentences."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS = {
 
 
 def sentences(model: Any) -> Iterator[str]:
-    """Yield lines that describe a `Model`: kinematics and mesh, materials, supports, loads, contact, solution."""
+    """Yield the lines that describe a `Model`: kinematics, mesh, materials, supports, loads, contact and solution."""
     mesh = model.mesh
     cells = " and ".join(f"{len(block)} {name}" for name, block in mesh.solids.items())
     article = "An" if model.kinematics == "axisymmetric" else "A"
@@ -43,11 +43,11 @@ def sentences(model: Any) -> Iterator[str]:
         if temperature.place:  # another instant of the previous one
             continue
         value = "a number for each point" if isinstance(temperature.value, np.ndarray) else _value(temperature.value)
-        where = temperature.name.removeprefix("the temperature of ")
+        groups = temperature.name.removeprefix("the temperature of ")
         when, times = _history(temperature.ramp), temperature.times
         if times:
             when = f", at {len(times)} instants from {times[0]:g} to {times[-1]:g}"
-        yield f"Temperature: {value} over {temperature.reference:g} in {where}{when}."
+        yield f"Temperature: {value} over {temperature.reference:g} in {groups}{when}."
     for load in model.heat_loads:
         history = _history(load.ramp)
         if isinstance(load, TemporaryHeat) and load.temporary:
@@ -55,8 +55,8 @@ def sentences(model: Any) -> Iterator[str]:
         yield f"Heat: {load.name.removeprefix('the ')}: {', '.join(map(_value, load.values))}{history}."
     for state in model.initial_states:
         parts = [f"{COMPONENTS[number]} = {value:g}" for number, value in state.components.items()]
-        kind, where = state.name.removeprefix("the initial ").split(" of ", 1)
-        yield f"Initial {kind}: {', '.join(parts)} in {where}{_history(None if state.ramp == ALWAYS else state.ramp)}."
+        kind, groups = state.name.removeprefix("the initial ").split(" of ", 1)
+        yield f"Initial {kind}: {', '.join(parts)} in {groups}{_history(None if state.ramp == ALWAYS else state.ramp)}."
     for relation in model.relations:
         yield f"Relation: {relation.name}{_history(relation.ramp)}."
     for spring in model.springs:

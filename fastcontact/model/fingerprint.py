@@ -1,8 +1,8 @@
-"""Fingerprints of models: short digests of each part. Models with equal fingerprints have equal results.
+"""Fingerprints of models, which consist of a short digest of each part. Models with equal fingerprints have equal results.
 
-Numbers must be bitwise identical; functions are compared by their values at the points on which they act. Names of groups
-are included. The order in which loads and supports were added is not included, nor is anything that may change when an
-analysis is resumed: titles, the linear solver, tolerances and limits.
+Numbers must be bitwise identical. Functions are compared by their values at the points on which they act. Names of groups
+are included. The order in which loads and supports were added is not included, and neither are settings that may change when
+an analysis is resumed: titles, the linear solver, tolerances and limits.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from fastcontact.model.contact_pair import ContactPair
 from fastcontact.model.model import Model
 from fastcontact.model.parts.base import Support
 
+# Number of hexadecimal digits of a digest.
 LENGTH = 16
 SMOOTHING = "surface_smoothing of contact"
 
@@ -36,7 +37,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     Keys are the names of the parts in messages: "the mesh", "the materials", "contact 'hertz'", ...
     """
     mesh = model.mesh
-    bends = model.bending()
+    modes = model.bending()
     inputs: dict[str, Any] = {
         "the kinematics": model.kinematics,
         **({"the strain": model.strain} if model.strain != "small" else {}),
@@ -47,7 +48,7 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
         **({"the initial states": _unordered(model.initial_states, mesh)} if model.initial_states else {}),
         **({"the heat": [model.reference_temperature, _unordered(model.heat_loads, mesh)]} if model.conducts else {}),
         **{f"the conductance of contact '{name}'": law.sampled for name, law in model.conductances().items()},
-        **({"the incompatible modes": bends} if any(bends) else {}),
+        **({"the incompatible modes": modes} if any(modes) else {}),
         "the relations": _unordered(model.relations, mesh),
         "the springs": _unordered(model.springs, mesh),
         **({"the pretension sections": _unordered(model.pretensions, mesh)} if model.pretensions else {}),
@@ -59,39 +60,34 @@ def fingerprint(model: Model, options: Mapping[str, Any] | None = None) -> dict[
     return {"the mesh": digest_of_mesh(mesh), **{name: _digest(entry, mesh) for name, entry in inputs.items()}}
 
 
-def different(one: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
+def different(first: Mapping[str, str], second: Mapping[str, str]) -> list[str]:
     """Return the names of the parts in which two fingerprints differ."""
-    return [name for name in {**one, **other} if one.get(name) != other.get(name)]
+    return [name for name in {**first, **second} if first.get(name) != second.get(name)]
 
 
 def formulation_behind(model: Model, name: str, digest: str | None) -> str | None:
-    """Return the formulation with which a pair has an earlier `digest`; None if the pair differs in anything else.
+    """Return the formulation, with its options, for which pair `name` has the `digest`; None if there is no such formulation.
 
-    Pairs without a formulation had other defaults in earlier versions.
+    Earlier versions chose other default formulations for pairs whose formulation is not given.
     """
     (pair,) = (candidate for candidate in model.contact if candidate.name == name)
-    plain = _without(pair, "surface_smoothing", "multipliers")
-    for formulation, options in _choices():
-        other = dataclasses.replace(plain, formulation=formulation, options={**plain.options, **options})
-        if _digest(other, model.mesh) == digest:
+    bare = _without(pair, "surface_smoothing", "multipliers")
+    choices: list[tuple[str, dict[str, str]]] = [(formulation, {}) for formulation in FORMULATIONS]
+    choices += [("mortar", {"multipliers": multipliers}) for multipliers in ("standard", "dual")]
+    for formulation, options in choices:
+        candidate = dataclasses.replace(bare, formulation=formulation, options={**bare.options, **options})
+        if _digest(candidate, model.mesh) == digest:
             return ", ".join(f"{key}='{value}'" for key, value in {"formulation": formulation, **options}.items())
     return None
 
 
 def _without(pair: ContactPair, *options: str) -> ContactPair:
-    """Return a pair without an option."""
+    """Return a pair without some of its options."""
     return dataclasses.replace(pair, options={key: value for key, value in pair.options.items() if key not in options})
 
 
-def _choices() -> Iterable[tuple[str, dict[str, str]]]:
-    """Return formulations with options that they may need."""
-    for formulation in FORMULATIONS:
-        yield formulation, {}
-    for multipliers in ("standard", "dual"):
-        yield "mortar", {"multipliers": multipliers}
-
-
 def _unordered(items: Iterable[Any], mesh: Mesh) -> list[str]:
+    """Return the sorted digests of items whose order has no effect."""
     return sorted(_digest(item, mesh) for item in items)
 
 
@@ -102,13 +98,13 @@ def digest_of_mesh(mesh: Mesh) -> str:
 
 
 def _digest(value: Any, mesh: Mesh) -> str:
-    hashed = hashlib.sha256()
-    _take(value, hashed.update, mesh, mesh.points)
-    return hashed.hexdigest()[:LENGTH]
+    digest = hashlib.sha256()
+    _update(value, digest.update, mesh, mesh.points)
+    return digest.hexdigest()[:LENGTH]
 
 
-def _take(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
-    """Add a value to a digest; functions by their values at `points` (n, dim)."""
+def _update(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
+    """Add a value to a digest by the function `add`. A function is represented by its values at `points` (n, dim)."""
     if isinstance(value, Mesh):
         value = [value.points, value.cells, value.cell_groups, value.point_groups]
     if isinstance(value, Varying):
@@ -123,56 +119,57 @@ def _take(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -
     elif isinstance(value, (int, float, np.number)):
         add(f"number {float(value)!r}".encode())
     elif isinstance(value, Mapping):
-        _take(sorted(map(str, value)), add, mesh, points)
+        _update(sorted(map(str, value)), add, mesh, points)
         for key in sorted(value, key=str):
-            _take(value[key], add, mesh, points)
+            _update(value[key], add, mesh, points)
     elif isinstance(value, (list, tuple, range)):
         add(f"sequence {len(value)}".encode())
         for entry in value:
-            _take(entry, add, mesh, points)
+            _update(entry, add, mesh, points)
     else:
-        _take_object(value, add, mesh, points)
+        _update_object(value, add, mesh, points)
 
 
-def _take_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
-    """Add a description with fields, an obstacle or a function."""
+def _update_object(value: Any, add: Callable[[bytes], None], mesh: Mesh, points: Array) -> None:
+    """Add a dataclass by its fields, an obstacle also by its distances, and a function by its values."""
     add(type(value).__qualname__.encode())
     points = _points_of(value, mesh, points)
     is_material = isinstance(value, Material)
     fields = list(dataclasses.fields(value)) if dataclasses.is_dataclass(value) else []
     fields = [field for field in fields if field.init or is_material]
     if hasattr(value, "distance"):
-        _take(list(value.distance(points)), add, mesh, points)
+        _update(list(value.distance(points)), add, mesh, points)
         fields = [field for field in fields if not callable(getattr(value, field.name))]
     elif not fields and callable(value):
-        _take(_called(value, points), add, mesh, points)
-    if is_material:  # constants that are not given do not count, as in older files
+        _update(_called(value, points), add, mesh, points)
+    # Some fields with default values are left out, so that digests agree with those in files of earlier versions.
+    if is_material:
         fields = [field for field in fields if getattr(value, field.name) is not None]
         fields = [field for field in fields if field.name != "incompatible_modes"]
-    if isinstance(value, (ContactPair, Support)) and value.rotation is None:  # as in older files
+    if isinstance(value, (ContactPair, Support)) and value.rotation is None:
         fields = [field for field in fields if not field.name.startswith("rotation")]
     if isinstance(value, TemporaryHeat):
         fields = [field for field in fields if field.name not in ("begins", "ends", "reached") or value.temporary]
     if isinstance(value, ContactPair):
         fields = [f for f in fields if f.name != "found_gap" and (f.name != "fluid" or value.fluid is not None)]
-    if isinstance(value, LinearElastic):  # the effective choice, and nothing for "plain", as in older files
+    if isinstance(value, LinearElastic):  # the volumetric option that takes effect
         fields = [field for field in fields if field.name != "volumetric"]
         add(b"mean dilatation" if value.averaged else b"")
     for field in fields:
         add(field.name.encode())
-        _take(getattr(value, field.name), add, mesh, points)
+        _update(getattr(value, field.name), add, mesh, points)
 
 
 def _called(function: Callable[[Array], Any], points: Array) -> Any:
-    """Return the values (n,) of a function of position; its name if it fails at these points."""
+    """Return the values (n,) of a function of position, or its name if it raises an error at these points."""
     try:
         return np.asarray(function(points), float)
-    except Exception:  # the check of the model reports errors in a user's function
+    except Exception:  # `Model.check` reports the errors of a user's function
         return getattr(function, "__qualname__", "function")
 
 
 def _points_of(value: Any, mesh: Mesh, points: Array) -> Array:
-    """Return the positions at which the functions of a load, support or contact pair are evaluated."""
+    """Return the positions of the group on which a load, support or contact pair acts; without a group, `points`."""
     group = value.secondary if isinstance(value, ContactPair) else getattr(value, "group", None)
     if isinstance(group, str) and group in mesh.group_names:
         return np.asarray(mesh.points[mesh.points_of(group)])

@@ -462,7 +462,7 @@ def test_an_analysis_goes_on_from_its_file_in_the_middle_of_a_turn(tmp_path):
 REFUSED = {
     "needs 'centre'": {"angle": 1.0},
     "needs 'angle'": {"centre": (0.0, 0.0)},
-    "in the plane it is about z": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)},
+    "in 2D rotations are about z": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)},
     "did you mean 'centre'": {"angle": 1.0, "center": (0.0, 0.0)},
     "not a finite number": {"angle": float("nan"), "centre": (0.0, 0.0)},
 }
@@ -479,7 +479,7 @@ def test_a_rotation_that_makes_no_sense_is_refused(message):
 def test_axisymmetric_models_have_no_turning_obstacles():
     model = fc.Model(block(), "axisymmetric")
     ball = fc.obstacles.Sphere((0.0, 3.0), 2.0)
-    with pytest.raises(fc.ModelError, match="no displacement round its axis"):
+    with pytest.raises(fc.ModelError, match="no displacement around its axis"):
         model.add_obstacle("ball", secondary="TOP", obstacle=ball, rotation={"angle": 1.0, "centre": (0.0, 0.0)})
 
 

@@ -156,7 +156,7 @@ def test_supports_are_described_with_their_rotation() -> None:
 
 REFUSED = {
     "needs 'centre'": {"rotation": {"angle": 1.0}},
-    "in the plane it is about z": {"rotation": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)}},
+    "in 2D rotations are about z": {"rotation": {"angle": 1.0, "centre": (0.0, 0.0), "axis": (0, 0, 1)}},
     "did you mean 'centre'": {"rotation": {"angle": 1.0, "center": (0.0, 0.0)}},
     "give the displacement of its axis": {"rotation": {"angle": 1.0, "centre": (0.0, 0.0)}, "normal": 1.0},
 }
@@ -171,7 +171,7 @@ def test_a_rotation_that_makes_no_sense_is_refused(message: str) -> None:
 
 def test_rings_do_not_turn() -> None:
     model = fc.Model(fc.generate.block(), "axisymmetric", strain="finite")
-    with pytest.raises(fc.ModelError, match="no displacement round its axis"):
+    with pytest.raises(fc.ModelError, match="no displacement around its axis"):
         model.prescribe("TOP", rotation={"angle": 1.0, "centre": (0.0, 0.0)})
 
 

@@ -25,7 +25,7 @@ from fastcontact.elasticity.loads import (
 )
 from fastcontact.errors import ModelError
 from fastcontact.model.checks import check_forces
-from fastcontact.model.couplings import Moment, SpreadForce, spread_of
+from fastcontact.model.couplings import Moment, Spread, SpreadForce
 from fastcontact.model.parts.base import group_names
 from fastcontact.model.parts.heat import ModelHeat
 from fastcontact.model.ramp import History, Table, table_of
@@ -257,13 +257,17 @@ class ModelLoads(ModelHeat):
         self.mesh.points_of(group)
         table = table_of(ramp, f"the ramp of the force on '{group}'")
         axes = axes_of(f"the force on '{group}'", components, self.mesh.dim)
-        spread = spread_of(f"the force on '{group}'", at, weighting, radius)
-        if spread is not None:
+        if at is None and (weighting != "uniform" or radius is not None):
+            raise ModelError(
+                f"the force on '{group}' has a weighting or a radius, but no point from which distances are measured: give "
+                "at=..."
+            )
+        if at is not None:
             if distribute is False:
                 raise ModelError(
                     f"the force on '{group}' acts through a point or on every node: leave out 'at' or 'distribute'"
                 )
-            self._add(SpreadForce(group, axes, spread, table))
+            self._add(SpreadForce(group, axes, Spread(tuple(float(v) for v in at), weighting, radius), table))
             return
         if distribute is None and group in self.mesh.cell_groups and self.mesh.cells_of(group, dim=self.mesh.dim):
             raise ModelError(
