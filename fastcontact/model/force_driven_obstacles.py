@@ -1,9 +1,9 @@
-"""Rigid obstacles moved by forces: each is an additional point without stiffness that is held only by contact.
+"""Rigid obstacles moved by forces. Each adds one point without stiffness, which only contact holds.
 
-The points of the mesh are followed by one point for each such obstacle, whose displacement is that of the obstacle.
-Components under a force are rigid-body motions like those of a floating body, and are regularised by the same weak springs
-(see `analysis.floating_bodies`); the other components are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``,
-with q the displacement of the obstacle, so that the entries of the obstacle are minus the sum of the gap's row over all
+The additional points follow those of the mesh, and their displacements are those of the obstacles. Components under a force
+are rigid-body motions like those of a floating body, and are regularised by the same weak springs (see
+`analysis.floating_bodies`); the other components are prescribed. A gap to a rigid obstacle changes by ``n . (u - q)``, where
+q is the displacement of the obstacle. In the row of a gap, the entries of q are therefore minus the sum of the entries of all
 points.
 """
 
@@ -28,7 +28,7 @@ from fastcontact.model.rigid_motions import FreeMotions, Label
 
 @dataclass(frozen=True, eq=False)
 class ForceDrivenObstacles:
-    """The force-driven obstacles of a model; without any, all methods but `constraints` return their arguments.
+    """The force-driven obstacles of a model.
 
     Parameters
     ----------
@@ -51,66 +51,68 @@ class ForceDrivenObstacles:
 
     @property
     def without_stiffness(self) -> Mask:
-        """Which displacement components (n_dofs,) are free but have no stiffness: those under a force."""
+        """Mask (n_dofs,) of the displacement components under a force, which are free but have no stiffness."""
         mask = np.zeros(self.n_dofs, bool)
         for number, pair in enumerate(self.pairs):
             mask[self.dofs(number)] = [force is not None for force in pair.force]
         return mask
 
     def dofs(self, number: int) -> Indices:
-        """Return the displacement components of an obstacle."""
+        """Return the numbers (dim,) of the displacement components of an obstacle."""
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
 
     def positions(self, u: Array) -> dict[str, Array]:
-        """Return the displacement (dim,) of the obstacle of each pair, from all displacements u (n_dofs,) [length]."""
+        """Return the displacement (dim,) of each obstacle from all displacements u (n_dofs,), by name of the pair [length]."""
         return {pair.name: u[self.dofs(number)] for number, pair in enumerate(self.pairs)}
 
     def number(self, name: str) -> int | None:
-        """Return the number of the obstacle of contact pair `name`, None if it is not force-driven."""
+        """Return the number of the obstacle of contact pair `name`; None if the pair has no force-driven obstacle."""
         return next((i for i, pair in enumerate(self.pairs) if pair.name == name), None)
 
     def stiffness(self, K: bsr_array) -> bsr_array:
-        """Return K with empty rows and columns for the obstacles."""
+        """Return the stiffness matrix with empty rows and columns for the obstacles."""
         if not self.pairs:
             return K
         indptr = np.r_[K.indptr, np.full(len(self), K.indptr[-1])].astype(K.indptr.dtype)
         return bsr_array((K.data, K.indices, indptr), shape=(self.n_dofs, self.n_dofs))
 
     def relations(self, relations: Sequence[MultiPointConstraint]) -> list[MultiPointConstraint]:
-        """Return constraints with additional columns for the obstacles."""
+        """Return multi-point constraints with additional columns for the obstacles."""
         if not self.pairs:
             return list(relations)
-        return [dataclasses.replace(relation, rows=self._wider(relation.rows)) for relation in relations]
+        return [dataclasses.replace(relation, rows=self._padded(relation.rows)) for relation in relations]
 
-    def _wider(self, rows: csr_array) -> csr_array:
+    def _padded(self, rows: csr_array) -> csr_array:
+        """Return rows with additional empty columns for the obstacles."""
         return csr_array((rows.data, rows.indices, rows.indptr), shape=(rows.shape[0], self.n_dofs))
 
     def supported(self, fixed: Mask) -> Mask:
-        """Return the supported components (n_points + n, dim) of points and obstacles."""
-        held = [[force is None for force in pair.force] for pair in self.pairs]
-        return np.vstack([fixed, np.array(held, bool).reshape(-1, self.shape[1])])
+        """Return the mask (n_points + n, dim) of supported components of points and obstacles, from that of points."""
+        prescribed = [[force is None for force in pair.force] for pair in self.pairs]
+        return np.vstack([fixed, np.array(prescribed, bool).reshape(-1, self.shape[1])])
 
     def prescribed(self, by_ramp: dict[PartHistory, Array]) -> dict[PartHistory, Array]:
         """Return the displacements (n_points + n, dim) at multiplier 1 by ramp, including those of the obstacles [length]."""
-        return self._with(by_ramp, [pair.motion for pair in self.pairs])
+        return self._extended(by_ramp, [pair.motion for pair in self.pairs])
 
     def forces(self, by_ramp: Mapping[Table | None, Array]) -> dict[PartHistory, Array]:
         """Return the forces (n_points + n, dim) at multiplier 1 by ramp, including those on the obstacles [force]."""
-        return self._with(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
+        return self._extended(by_ramp, [tuple(force or 0.0 for force in pair.force) for pair in self.pairs])
 
-    def _with(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
+    def _extended(self, by_ramp: Mapping[Any, Array], values: Sequence[tuple[float, ...]]) -> dict[PartHistory, Array]:
+        """Return nodal values by ramp, extended by the `values` of the obstacles."""
         n, dim = self.shape
-        wider: dict[PartHistory, Array] = {
+        extended: dict[PartHistory, Array] = {
             ramp: np.vstack([rows, np.zeros((len(self), dim))]) for ramp, rows in by_ramp.items()
         }
         for number, (pair, value) in enumerate(zip(self.pairs, values, strict=True)):
             if any(value):
-                rows = wider.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
+                rows = extended.setdefault(pair.ramp, np.zeros((n + len(self), dim)))
                 rows[n + number] = value
-        return wider
+        return extended
 
     def motions(self, motions: FreeMotions) -> FreeMotions:
-        """Return free motions including those of the obstacles, one for each component under a force."""
+        """Return the rigid-body motions including those of the obstacles, one for each component under a force."""
         if not self.pairs:
             return motions
         free = np.flatnonzero(self.without_stiffness)
@@ -133,17 +135,18 @@ class ForceDrivenObstacles:
     def constraints(
         self, name: str, constraints: Constraints, position: Array, moved: Array | None = None
     ) -> Constraints:
-        """Return the constraints of pair `name`, computed with its obstacle at `position` (dim,), with the obstacle free.
+        """Return the constraints of pair `name` with columns for the displacements of all obstacles.
 
-        Rows then have columns for all obstacles, and slip includes the motion of the obstacle. If the obstacle also rotates,
-        `moved` (dim,) is the motion in the step that `constraints` already includes as slip [length].
+        `constraints` were computed with the obstacle of the pair fixed at its displacement `position` (dim,) [length].
+        Slip then includes the motion of the obstacle. If the obstacle also rotates, `moved` (dim,) is the motion in the step
+        that the slip of `constraints` already includes [length].
         """
         number = self.number(name)
         if number is None:
-            wider = tuple(self._wider(tangent) for tangent in constraints.tangents)
-            return dataclasses.replace(constraints, B=self._wider(constraints.B), tangents=wider)
-        B, normal = self._free(constraints.B, number)
-        tangents = tuple(self._free(tangent, number)[0] for tangent in constraints.tangents)
+            padded = tuple(self._padded(tangent) for tangent in constraints.tangents)
+            return dataclasses.replace(constraints, B=self._padded(constraints.B), tangents=padded)
+        B, normal = self._coupled(constraints.B, number)
+        tangents = tuple(self._coupled(tangent, number)[0] for tangent in constraints.tangents)
         slip0 = np.zeros_like(constraints.slip0)
         if moved is not None and constraints.tangents:
             slip0 = constraints.slip0 + np.stack([t @ moved for t in constraints.directions])
@@ -151,10 +154,10 @@ class ForceDrivenObstacles:
             constraints, B=B, gap0=constraints.gap0 + normal @ position, tangents=tangents, slip0=slip0
         )
 
-    def _free(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
-        """Return rows extended by the columns of their obstacle, and their direction (m, dim)."""
+    def _coupled(self, rows: csr_array, number: int) -> tuple[csr_array, Array]:
+        """Return rows (m, n_dofs) that include the motion of an obstacle, and their directions (m, dim)."""
         n, dim = self.shape
         direction = rows @ np.tile(np.eye(dim), (n, 1))
-        directions = np.zeros((rows.shape[0], len(self) * dim))
-        directions[:, number * dim : (number + 1) * dim] = -direction
-        return csr_array(hstack([rows, csr_array(directions)], format="csr")), direction
+        of_obstacles = np.zeros((rows.shape[0], len(self) * dim))
+        of_obstacles[:, number * dim : (number + 1) * dim] = -direction
+        return csr_array(hstack([rows, csr_array(of_obstacles)], format="csr")), direction

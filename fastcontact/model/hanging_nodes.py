@@ -1,6 +1,6 @@
-"""Hanging nodes: nodes that lie on facets of their own body without belonging to them.
+"""Hanging nodes, which lie on facets of their own body without belonging to them.
 
-Where a coarse and a fine mesh meet, only common nodes are connected. The other nodes hang, so that gaps or overlaps arise.
+Where a coarse and a fine mesh meet, only their common nodes are connected. Under load, gaps or overlaps arise at the others.
 """
 
 from __future__ import annotations
@@ -23,8 +23,9 @@ from fastcontact.model.rigid_motions import node_at
 if TYPE_CHECKING:
     from fastcontact.model.model import Model
 
-# Nodes nearer to a facet than this, in facet lengths, lie on it; nodes as near to one of its nodes coincide with that node.
-# Fine facets of an arc deviate more from a coarse facet; there the facets at all corners of the coarse one exclude a slit.
+# Nodes whose distance from a facet is below NEAR, relative to its size, lie on it. Nodes with this distance from a node of
+# the facet coincide with that node. On arcs, the nodes of fine facets may be at a distance of ON_ARC from a coarse facet. A
+# slit is then excluded by the requirement that each corner of the coarse facet has another facet of opposite normal.
 NEAR, ON_ARC = 0.02, 0.1
 
 
@@ -32,9 +33,10 @@ NEAR, ON_ARC = 0.02, 0.1
 class OuterFacets:
     """Outer facets of all bodies, treated as flat.
 
-    `nodes` (n, k) are -1 where there are none, `corners` (n, 2 or 4) repeat the last corner of triangles. `rise` (n,) is the
-    distance of nodes between the corners from the plane, and `size` (n,) the diagonal of the box around the corners [length].
-    `kind` (n,) is the index in `elements`.
+    `nodes` (n, k) are padded with -1, and `corners` (n, 2 or 4) with the last corner of triangles. `centre` (n, dim) is the
+    mean of the corners [length], and `normal` (n, dim) the outward unit normal. `rise` (n,) is the largest distance of the
+    other nodes from the flat facet, and `size` (n,) the diagonal of the bounding box of the corners [length]. The element
+    type is ``elements[kind]``.
     """
 
     nodes: Numbers
@@ -59,16 +61,16 @@ def hanging_nodes_warning(model: Model) -> str:
     if not relevant.any():
         return ""
     node, facet = node[relevant], facet[relevant]
-    where = ", ".join(f"{x:.6g}" for x in outer.centre[facet[0]])
+    centre = ", ".join(f"{x:.6g}" for x in outer.centre[facet[0]])
     return (
         f"{len(np.unique(node))} nodes lie on facets of their own body that they do not belong to (first: "
-        f"{node_at(mesh, node[0])}, on the facet around ({where})): the body is torn there. Let cells share whole facets, or "
-        "leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"
+        f"{node_at(mesh, node[0])}, on the facet around ({centre})): the body is torn there. Let cells share whole facets, "
+        "or leave the two meshes apart and tie them by a contact of kind 'tied'; if a slit is meant, define its contact"
     )
 
 
 def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: Numbers) -> Mask:
-    """Return whether nodes (m,) belong to one side of a contact, and facets (m, n_corners) to the other side."""
+    """Return the mask (m,) of nodes in group `nodes_of` whose facets, with `corners` (m, n_corners), are in `facets_of`."""
     on_side, on_opposite = np.zeros((2, mesh.n_points), bool)
     on_side[mesh.points_of(nodes_of)] = True
     on_opposite[mesh.points_of(facets_of)] = True
@@ -76,8 +78,8 @@ def _joined(mesh: Mesh, nodes_of: str, facets_of: str, node: Indices, corners: N
 
 
 def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
-    """Return nodes (m,) that lie on facets (m,) of their own body without belonging to them, and all outer facets."""
-    outer = _outer(mesh)
+    """Return hanging nodes (m,), the facets (m,) of their own body on which they lie, and all outer facets."""
+    outer = _outer_facets(mesh)
     if not len(outer.size):
         return np.empty(0, np.intp), np.empty(0, np.intp), outer
     outward = np.zeros(mesh.points.shape)
@@ -88,8 +90,8 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     outward /= np.where(length > 0.0, length, 1.0)[:, None]
     reach = ON_ARC * outer.size + outer.rise
     nodes = np.flatnonzero(length > 0.0)
-    spokes = np.linalg.norm(mesh.points[outer.corners] - outer.centre[:, None], axis=2).max(axis=1)
-    near, facet = pairs_within(mesh.points[nodes], outer.centre, spokes + 2.0 * reach)
+    radius = np.linalg.norm(mesh.points[outer.corners] - outer.centre[:, None], axis=2).max(axis=1)
+    near, facet = pairs_within(mesh.points[nodes], outer.centre, radius + 2.0 * reach)
     node = nodes[near]
     height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
     facing = np.einsum("md,md->m", outer.normal[facet], outward[node]) <= -0.5
@@ -100,40 +102,40 @@ def hanging_nodes(mesh: Mesh) -> tuple[Indices, Indices, OuterFacets]:
     _, body = bodies(mesh)
     same_body = body[node] == body[outer.corners[facet, 0]]
     node, facet = node[same_body], facet[same_body]
-    on = _within(mesh.points, node, outer, facet)
-    node, facet = node[on], facet[on]
+    inside = _within(mesh.points, node, outer, facet)
+    node, facet = node[inside], facet[inside]
     height = np.abs(_heights(mesh, node, outer, facet)) / outer.size[facet]
-    on = height <= NEAR
-    loose = ~on & (height <= ON_ARC)
-    on[loose] = _closed_at_corners(outer, facet[loose])
-    node, facet = node[on], facet[on]
-    on = ~_across(mesh, node, outer, facet)
-    return node[on], facet[on], outer
+    hanging = height <= NEAR
+    on_arc = ~hanging & (height <= ON_ARC)
+    hanging[on_arc] = _closed_at_corners(outer, facet[on_arc])
+    node, facet = node[hanging], facet[hanging]
+    hanging = ~_connected(mesh, node, outer, facet)
+    return node[hanging], facet[hanging], outer
 
 
 def _heights(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Array:
-    """Return the heights of nodes (m,) above facets (m,), including the bulge of curved ones [length]."""
+    """Return the signed distances (m,) of nodes (m,) from facets (m,), which may be curved, along their normals [length]."""
     height = np.einsum("md,md->m", outer.normal[facet], mesh.points[node] - outer.centre[facet])
     for kind, name in enumerate(outer.elements):
         element, rows = elements.get(name), np.flatnonzero(outer.kind[facet] == kind)
         if element.order == 1 or not len(rows):
             continue
-        # Reference coordinates of the nodes on the flat facets.
+        # xi are the reference coordinates of the projections of the nodes onto the flat facets.
         x = mesh.points[outer.nodes[facet[rows]][:, : element.n_nodes]]
-        corners, middle = x[:, : element.n_corners], element.nodes[: element.n_corners].mean(axis=0)
-        J = np.einsum("nk,mnd->mdk", elements.get(element.linear).gradient(middle[None])[0], corners)
-        away = np.einsum("mdk,md->mk", J, mesh.points[node[rows]] - corners.mean(axis=1))
-        xi = middle + np.linalg.solve(np.einsum("mdk,mdl->mkl", J, J), away[..., None])[..., 0]
+        corners, centre = x[:, : element.n_corners], element.nodes[: element.n_corners].mean(axis=0)
+        J = np.einsum("nk,mnd->mdk", elements.get(element.linear).gradient(centre[None])[0], corners)
+        offset = np.einsum("mdk,md->mk", J, mesh.points[node[rows]] - corners.mean(axis=1))
+        xi = centre + np.linalg.solve(np.einsum("mdk,mdl->mkl", J, J), offset[..., None])[..., 0]
         curved = np.einsum("mn,mnd->md", element.shape(xi), x)
         height[rows] -= np.einsum("md,md->m", outer.normal[facet[rows]], curved - outer.centre[facet[rows]])
     return np.asarray(height)
 
 
-def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
+def _connected(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
     """Return whether nodes (m,) belong to the cells behind facets (m,), or to their neighbours.
 
-    This is the case on the far side of a thin sheet, but not where meshes meet, whose cells have no common facet except one
-    whose middle nodes belong to only one cell.
+    This holds on the opposite side of a thin sheet. It does not hold where two meshes meet, because there cells share no
+    facet, or only the corners of the given facet.
     """
     corners = outer.corners[facet]
     involved = np.zeros(mesh.n_points, bool)
@@ -144,13 +146,13 @@ def _across(mesh: Mesh, node: Indices, outer: OuterFacets, facet: Indices) -> Ma
             key = frozenset(nodes[: elements.get(name).n_corners]), name
             for number in nodes:
                 cells.setdefault(number, []).append(key)
-    across = np.zeros(len(node), bool)
+    connected = np.zeros(len(node), bool)
     for k, (number, ends) in enumerate(zip(node.tolist(), corners.tolist(), strict=True)):
         kind = outer.elements[outer.kind[facet[k]]]
         behind = [c for c, name in cells[ends[0]] if c.issuperset(ends) and kind in elements.get(name).facet_elements]
         shared = [cell & other for cell in behind for other, _ in cells[number]]
-        across[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
-    return across
+        connected[k] = any(len(common) >= mesh.dim and not common.issubset(ends) for common in shared)
+    return connected
 
 
 def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
@@ -158,29 +160,27 @@ def _closed_at_corners(outer: OuterFacets, facet: Indices) -> Mask:
     if not len(facet):
         return np.empty(0, bool)
     n, width = outer.corners.shape
-    at = csr_array((np.ones(n * width), (outer.corners.ravel(), np.repeat(np.arange(n), width))))
-    # For each pair of a corner and a facet there, whether its normal is opposite to that of the given facet.
-    kinds, which = np.unique(facet, return_inverse=True)
-    closed = np.ones(len(kinds), bool)
-    for corner in outer.corners[kinds].T:
-        rows = at[corner]
-        row = np.repeat(np.arange(len(kinds)), np.diff(rows.indptr))
-        along = np.einsum("kd,kd->k", outer.normal[kinds[row]], outer.normal[rows.indices])
-        opposite = np.zeros(len(kinds), bool)
-        opposite[row[along < -0.5]] = True
+    facets_at = csr_array((np.ones(n * width), (outer.corners.ravel(), np.repeat(np.arange(n), width))))
+    unique, inverse = np.unique(facet, return_inverse=True)
+    closed = np.ones(len(unique), bool)
+    for corner in outer.corners[unique].T:
+        neighbours = facets_at[corner]
+        row = np.repeat(np.arange(len(unique)), np.diff(neighbours.indptr))
+        cosine = np.einsum("kd,kd->k", outer.normal[unique[row]], outer.normal[neighbours.indices])
+        opposite = np.zeros(len(unique), bool)
+        opposite[row[cosine < -0.5]] = True
         closed &= opposite
-    return np.asarray(closed[which.ravel()])
+    return np.asarray(closed[inverse.ravel()])
 
 
-def _outer(mesh: Mesh) -> OuterFacets:
+def _outer_facets(mesh: Mesh) -> OuterFacets:
     facets = outer_facets(mesh)
-    most = max((block.shape[1] for block in facets.values()), default=1)
+    width = max((block.shape[1] for block in facets.values()), default=1)
     n_corners = 2 if mesh.dim == 2 else 4
     nodes, corners, centres, rises = [], [], [], []
     for name, block in facets.items():
         element, x = elements.get(name), mesh.points[block]
-        nodes.append(np.pad(block, ((0, 0), (0, most - block.shape[1])), constant_values=-1))
-        # A triangle repeats its last corner.
+        nodes.append(np.pad(block, ((0, 0), (0, width - block.shape[1])), constant_values=-1))
         corners.append(block[:, np.minimum(np.arange(n_corners), element.n_corners - 1)])
         centres.append(x[:, : element.n_corners].mean(axis=1))
         rises.append(_rise(element, x))
@@ -190,37 +190,37 @@ def _outer(mesh: Mesh) -> OuterFacets:
     length = np.linalg.norm(normal, axis=1)
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
     return OuterFacets(
-        np.concatenate([np.full((0, most), -1, np.int32), *nodes]), corner, np.concatenate([x[:, 0][:0], *centres]),
+        np.concatenate([np.full((0, width), -1, np.int32), *nodes]), corner, np.concatenate([x[:, 0][:0], *centres]),
         normal, np.concatenate([np.zeros(0), *rises]), np.linalg.norm(np.ptp(x, axis=1), axis=1), tuple(facets),
         np.repeat(np.arange(len(facets)), [len(block) for block in facets.values()]),
     )  # fmt: skip
 
 
 def _rise(element: Element, x: Array) -> Array:
-    """Return the largest distances (n,) of the nodes of facets (n, n_nodes, dim) from their flat shapes [length]."""
+    """Return the largest distances (n,) of the nodes of facets `x` (n, n_nodes, dim) from those of flat facets [length]."""
     if element.order == 1:
         return np.zeros(len(x))
-    straight = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
-    return np.asarray(np.linalg.norm(x - straight, axis=2).max(axis=1))
+    flat = elements.get(element.linear).shape(element.nodes) @ x[:, : element.n_corners]
+    return np.asarray(np.linalg.norm(x - flat, axis=2).max(axis=1))
 
 
 def _within(points: Array, node: Indices, outer: OuterFacets, facet: Indices) -> Mask:
-    """Return whether nodes (m,) project on the inside or an edge of facets (m,), away from all of their nodes."""
+    """Return whether nodes (m,) project onto facets (m,) and coincide with none of their nodes."""
     members, size = outer.nodes[facet], outer.size[facet]
     distance = np.linalg.norm(points[members] - points[node][:, None], axis=2)
-    away = (np.where(members >= 0, distance, np.inf) > NEAR * size[:, None]).all(axis=1)
+    distinct = (np.where(members >= 0, distance, np.inf) > NEAR * size[:, None]).all(axis=1)
     x, point = points[outer.corners[facet]], points[node]
     if points.shape[1] == 2:
-        return np.asarray(away & _in_simplex(point, x))
-    return np.asarray(away & (_in_simplex(point, x[:, [0, 1, 2]]) | _in_simplex(point, x[:, [0, 2, 3]])))
+        return np.asarray(distinct & _in_simplex(point, x))
+    return np.asarray(distinct & (_in_simplex(point, x[:, [0, 1, 2]]) | _in_simplex(point, x[:, [0, 2, 3]])))
 
 
 def _in_simplex(point: Array, x: Array) -> Mask:
-    """Return whether the projections of points (m, dim) lie in lines (m, 2, dim) or triangles (m, 3, dim)."""
+    """Return whether the projections of points (m, dim) lie in lines (m, 2, dim) or triangles (m, 3, dim), within NEAR."""
     sides = x[:, 1:] - x[:, :1]
     metric = np.einsum("mid,mjd->mij", sides, sides)
-    flat = np.linalg.det(metric) <= 0.0
-    metric[flat] = np.eye(metric.shape[1])
+    degenerate = np.linalg.det(metric) <= 0.0
+    metric[degenerate] = np.eye(metric.shape[1])
     coordinate = np.linalg.solve(metric, np.einsum("mid,md->mi", sides, point - x[:, 0])[..., None])[..., 0]
     inside = (coordinate >= -NEAR).all(axis=1) & (coordinate.sum(axis=1) <= 1.0 + NEAR)
-    return np.asarray(inside & ~flat)
+    return np.asarray(inside & ~degenerate)

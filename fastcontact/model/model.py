@@ -1,4 +1,4 @@
-"""A contact problem: a mesh with kinematics, materials, supports, loads and contact pairs, and its check as a whole.
+"""The model of a contact problem: a mesh with kinematics, materials, supports, loads and contact pairs.
 
 A `Value` is a number, or a function from reference positions (n, dim) [length] to numbers (n,) [unit of the quantity].
 """
@@ -31,7 +31,7 @@ from fastcontact.model.pretension import check_locks
 from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.model.rigid_motions import MOST_FRICTION, FreeMotions, free_motions, generalised, resisting, unstopped
 
-# Types of items that may act in some load steps only.
+# Types of items that may act in only some of the load steps.
 TEMPORARY = (TemporaryConstraint, TemporaryHeat)
 # Public methods and attributes of a model other than `add_...`; `dir` hides the others, which the analysis uses.
 PUBLIC = (
@@ -100,7 +100,7 @@ class Model(ModelSupports):
         return html_table(rows, caption=head)
 
     def describe(self) -> str:
-        """Return a description of the model with one line for the kinematics and for each material, support, load and pair.
+        """Return a description of the model, with a line for the kinematics and for each material, support, load and pair.
 
         Examples
         --------
@@ -177,7 +177,7 @@ class Model(ModelSupports):
         self._check_changes(lambda acting: acting._check_motions(fixed, driving))
 
     def _check_changes(self, check: Callable[[Model], None]) -> None:
-        """Check the model with the items that act in each part of the load steps."""
+        """Call `check` once for every set of temporary items that act together, with the model that contains only these."""
         for begin in self._changes():
             try:
                 check(self._acting(begin))
@@ -197,7 +197,7 @@ class Model(ModelSupports):
         return acting
 
     def _changes(self) -> list[float]:
-        """Return 0 and the load factors at which temporary constraints, prescribed temperatures or films begin or end."""
+        """Return 0 and the load factors at which temporary constraints and loads of heat begin or end."""
         temporary = [item for item in (*self.relations, *self.heat_loads) if isinstance(item, TEMPORARY)]
         return sorted({0.0, *(t for item in temporary for t in (item.begins, item.ends) if 0.0 < t < np.inf)})
 
@@ -213,24 +213,24 @@ class Model(ModelSupports):
     def _check_motions(self, fixed: Mask, forces: Sequence[Array]) -> None:
         """Raise ModelError if a rigid-body motion is possible.
 
-        Supports, constraints and springs prevent rigid-body motions, and so does contact against which a load acts.
+        Supports, constraints and springs prevent rigid-body motions, and so does contact if a load acts on the motion.
         """
         motions = self.force_driven.motions(free_motions(self.mesh, self.kinematics, fixed, self.holding_rows()))
         if not len(motions):
             return
         works = [generalised(motions, force.ravel()) for force in forces]
-        driven_by = np.vstack([*works, np.empty((0, len(motions)))])
-        # Whether friction suffices depends on the load step, which names the coefficient required.
+        # The load steps check whether friction suffices, and their errors state the coefficient that would.
         gaps = gaps_at_rest(self, motions, MOST_FRICTION)
-        check_motions(self.mesh, motions.combined(unstopped(gaps, driven_by)))
+        check_motions(self.mesh, motions.combined(unstopped(gaps, np.reshape(works, (-1, len(motions))))))
 
 
 def gaps_at_rest(model: Model, motions: FreeMotions, factor: float = 1.0) -> Array:
     """Return the changes (m, k) of the m gaps of the undeformed bodies for each of k rigid-body motions.
 
-    `factor` multiplies all coefficients of friction.
+    With friction these include the edges of the friction cones, see `resisting`; `factor` multiplies all coefficients of
+    friction.
     """
-    driven, at_rest, still = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
-    fixing = [driven.constraints(pair.name, model.bind(pair).constraints(at_rest), still) for pair in model.contact]
-    rows = [resisting(constraints, factor)[0] @ motions.displacement for constraints in fixing]
+    obstacles, at_rest, zero = model.force_driven, Configuration.undeformed(model.mesh.points), np.zeros(model.mesh.dim)
+    contact = [obstacles.constraints(pair.name, model.bind(pair).constraints(at_rest), zero) for pair in model.contact]
+    rows = [resisting(constraints, factor)[0] @ motions.displacement for constraints in contact]
     return np.vstack([*rows, np.empty((0, len(motions)))])

@@ -1,4 +1,4 @@
-"""Periodic cells and cyclic sectors, whose two ends are tied."""
+"""Constraints of periodic cells and of sectors with cyclic symmetry, whose two ends are tied."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ from fastcontact.model.ramp import Table
 from fastcontact.model.relation_rows import less_first, matched
 from fastcontact.round_off import ROUND_OFF, SINGLE_PRECISION
 
-# Largest distance of nodes from the facets of the other end, and beyond their ends, in facet sizes, for the sag of curved
-# ends.
-BESIDE = 0.02
+# Largest distance of the rotated nodes of one end from the facets of the other end, and beyond their edges, in facet sizes.
+# Facets of curved ends with different meshes deviate from each other by less.
+LARGEST_DISTANCE = 0.02
 
 
 class PeriodicInterface(NamedTuple):
     """Coincident nodes of the two ends of a periodic part, `first` (m,) and `second` (m,).
 
-    For a sector of a ring of several `sectors`, vectors at the second node are those at the first node times `turn`
-    (dim, dim), the matrix of a `rotation`, by the constraint `relation`. These are None without a rotation.
+    In a ring of several `sectors`, vectors at a second node are those at the first node times `turn` (dim, dim), the matrix
+    of `rotation`; the constraint `relation` enforces this for displacements. These three are None without a rotation.
     """
 
     first: Indices
@@ -45,7 +45,7 @@ class PeriodicInterface(NamedTuple):
 
 
 def same_place(interfaces: Sequence[PeriodicInterface], n_points: int) -> Indices | None:
-    """Return the first of the coincident nodes for each node (n_points,); None without any."""
+    """Return the smallest number of the nodes that coincide with each node (n_points,); None without interfaces."""
     if not interfaces:
         return None
     ends = tuple(np.concatenate(side) for side in zip(*(interface[:2] for interface in interfaces), strict=True))
@@ -86,10 +86,11 @@ def periodic(
     match = matched(mesh, (ends[0], first), (ends[1], second), translation)
     interface = PeriodicInterface(first, second[match])
     if (common := interface.first[interface.first == interface.second]).size:
-        raise ModelError(f"{name}: both have point {common[0]}: a period has two ends")
+        raise ModelError(f"{name}: both groups contain point {common[0]}: a period has two ends")
     relations = []
     for axis in range(mesh.dim):
-        rows = _differences(interface, np.eye(mesh.dim)[axis][:, None], mesh)
+        unit = np.eye(mesh.dim)[axis]
+        rows = _rows(interface, unit, -unit, mesh)
         if axis in free:
             rows = less_first(rows)
         if rows.shape[0]:
@@ -100,7 +101,7 @@ def periodic(
 def cyclic(
     mesh: Mesh, ends: tuple[str, str], sectors: int, origin: Sequence[float], direction: Sequence[float]
 ) -> tuple[list[MultiPointConstraint], PeriodicInterface | None]:
-    """Return the constraints of the two ends of a sector, and the nodes that they tie; None if nodes are tied to facets.
+    """Return the constraints of the two ends of a sector, and the nodes that they tie, or None if nodes are tied to facets.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def cyclic(
     if not len(first) or not len(second):
         raise ModelError(f"{name}: one of the groups is empty")
     rotation = Rotation(tuple(map(float, origin)), tuple(map(float, direction)), 2.0 * math.pi / sectors)  # type: ignore[arg-type]
-    turns = [_turned(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
+    turns = [_nearest_after(mesh, first, second, rotation, sign) for sign in (1.0, -1.0)]
     distance, match, turn = min(turns, key=lambda candidate: float(candidate[0].max()))
     size = float(np.ptp(mesh.points[first], axis=0).max())
     far = int(np.argmax(distance))
@@ -133,65 +134,62 @@ def cyclic(
     dependent, facets = (ends[0], ends[1]) if len(first) >= len(second) else (ends[1], ends[0])
     if all(mesh.cells_of(end, dim=mesh.dim - 1) for end in ends):
         for sign in (1.0, -1.0):
-            if (rows_of := _following(mesh, dependent, facets, rotation, sign)) is not None:
-                return [MultiPointConstraint(name, _without_zeros(rows_of))], None
+            if (rows := _rows_to_facets(mesh, dependent, facets, rotation, sign)) is not None:
+                return [MultiPointConstraint(name, _without_zeros(rows))], None
     raise ModelError(
         f"{name}: point {first[far]} of '{ends[0]}', turned by 1/{sectors} of a turn, lies {distance[far]:.3g} from the "
-        f"nearest node of '{ends[1]}', and the groups are not facets that coincide then: check axis and sectors"
+        f"nearest node of '{ends[1]}', and the groups do not consist of facets that coincide: check axis and sectors"
     )
 
 
 def turned_rows(interface: PeriodicInterface, phase: complex, mesh: Mesh) -> csr_array:
-    """Return the rows (m, n_dofs) of ``u_second = phase Q u_first`` along the axes of the mesh, Q that of an interface.
+    """Return the rows (m, n_dofs) of ``u_second = phase Q u_first``, where Q is the matrix `turn` of an interface.
 
-    Without a phase, the axial component of points on the axis has no row.
+    Rows of zeros are left out, such as that of the axial component of a point on the axis with a phase of 1.
     """
     assert interface.turn is not None
-    back = -phase * interface.turn.T
-    rows = [_differences(interface, np.column_stack([unit, back @ unit]), mesh) for unit in np.eye(mesh.dim)]
+    Q = interface.turn
+    rows = [_rows(interface, unit, -phase * Q.T @ unit, mesh) for unit in np.eye(mesh.dim)]
     return _without_zeros(csr_array(vstack(rows)))
 
 
-def _following(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign: float) -> csr_array | None:
+def _rows_to_facets(mesh: Mesh, dependent: str, facets: str, rotation: Rotation, sign: float) -> csr_array | None:
     """Return rows that tie the nodes of one end to the rotated displacements of the opposite facets of the other end.
 
-    None if rotated nodes do not lie on these facets. Linear fields satisfy the rows exactly.
+    Returns None if the rotated nodes do not lie on these facets. Linear fields satisfy the rows exactly.
     """
     other, nodes = surface(mesh, facets), mesh.points_of(dependent).astype(np.intp)
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
     corners = other.corners(mesh.points)
-    near = closest_of_kinds((mesh.points[nodes] - centre) @ turn.T + centre, corners)
+    closest = closest_of_kinds((mesh.points[nodes] - centre) @ turn.T + centre, corners)
     sizes = np.concatenate([np.ptp(block, axis=1).max(axis=1) for block in corners])
-    if (near.distance > BESIDE * sizes[near.facet]).any() or (near.overhang > BESIDE).any():
+    if (closest.distance > LARGEST_DISTANCE * sizes[closest.facet]).any() or (
+        closest.overhang > LARGEST_DISTANCE
+    ).any():
         return None
-    on = places(other, near.facet, near.xi)
+    projected = places(other, closest.facet, closest.xi)
     m, dim, n = len(nodes), mesh.dim, mesh.n_points
-    weights, identity = shapes_at(on.shape, on.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
+    weights, identity = shapes_at(projected.shape, projected.nodes, n), shapes_at(np.ones((m, 1)), nodes[:, None], n)
     return csr_array(kron(identity, turn) - kron(weights, np.eye(dim)))
 
 
 def _without_zeros(rows: csr_array) -> csr_array:
-    """Return rows without entries of round-off, and without rows that consist of such entries, as on the axis."""
+    """Return rows without entries below round-off, and without the rows that then are empty."""
     rows.sum_duplicates()
     rows.data[np.abs(rows.data) < ROUND_OFF] = 0.0
     rows.eliminate_zeros()
     return csr_array(rows[np.diff(rows.indptr) > 0])
 
 
-def _turned(
+def _nearest_after(
     mesh: Mesh, first: Indices, second: Indices, rotation: Rotation, sign: float
 ) -> tuple[Array, Indices, Array]:
-    """Return the distances of rotated first nodes to the nearest second nodes [length], these nodes, and the matrix."""
+    """Return the distances of rotated first nodes to the nearest second nodes [length], their indices, and the matrix."""
     turn, centre = rotation.matrix(sign * rotation.angle), np.array(rotation.centre)
     return *nearest(mesh.points[second], (mesh.points[first] - centre) @ turn.T + centre), turn
 
 
-def _differences(interface: PeriodicInterface, directions: Array, mesh: Mesh) -> csr_array:
-    """Return the rows (m, n_dofs) of differences between the displacements of second and first nodes.
-
-    They are the displacements of second nodes along the first column of `directions` (dim, 1 or 2), plus those of first nodes
-    along the second column; with a single column, minus those of first nodes along it.
-    """
-    direction = directions[:, 1] if directions.shape[1] > 1 else -directions[:, 0]
+def _rows(interface: PeriodicInterface, at_second: Array, at_first: Array, mesh: Mesh) -> csr_array:
+    """Return the rows (m, n_dofs) of ``at_second . u_second + at_first . u_first`` for all pairs of coincident nodes."""
     nodes = np.column_stack([interface.second, interface.first])
-    return nodal_rows(nodes, np.tile([directions[:, 0], direction], (len(nodes), 1, 1)), mesh.points.size)
+    return nodal_rows(nodes, np.tile([at_second, at_first], (len(nodes), 1, 1)), mesh.points.size)

@@ -1,4 +1,7 @@
-"""Contact nodes whose prescribed displacements cause penetration, or separation if tied, against which contact cannot act."""
+"""Contact nodes whose prescribed displacements cause penetration or, in tied pairs, relative displacements.
+
+Contact forces cannot change prescribed displacements.
+"""
 
 from __future__ import annotations
 
@@ -19,12 +22,12 @@ from fastcontact.model.ramp import PartHistory, Ramp, combined, multiplier
 from fastcontact.round_off import LENGTH_ROUND_OFF
 
 Pairs = Sequence[tuple[ContactPair, Formulation]]
-# Coefficients of a gap below this are zero [-].
-STILL = 1e-6
-# Depths below this fraction of the largest prescribed displacement are admissible.
-SMALL = 1e-3
-# Number of instants of a ramp that are checked.
-SOME = 20
+# Coefficients of displacements in a gap are regarded as zero below this [-].
+ZERO_COEFFICIENT = 1e-6
+# Depths below this fraction of the largest prescribed displacement are admissible [-].
+ADMISSIBLE_DEPTH = 1e-3
+# Largest number of instants of a ramp that are checked.
+MOST_INSTANTS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +39,9 @@ class Supports:
     ramp: Ramp
 
     def instants(self) -> list[float]:
-        """Return a sample of the instants of the ramp, including the first and the last."""
-        instants = list(self.ramp.instants)
-        return [instants[k] for k in np.unique(np.linspace(0, len(instants) - 1, SOME).round().astype(int))]
+        """Return at most MOST_INSTANTS evenly distributed instants of the ramp, including the first and the last."""
+        instants = self.ramp.instants
+        return [instants[k] for k in np.unique(np.linspace(0, len(instants) - 1, MOST_INSTANTS).round().astype(int))]
 
     def at(self, instant: float) -> Array:
         """Return the displacements (n_points, dim), zero where nothing is prescribed [length]."""
@@ -47,7 +50,11 @@ class Supports:
 
 @dataclass(frozen=True)
 class Overlap:
-    """`count` of the `total` nodes that face the other side of a pair penetrate by up to `depth` [length], at `point`."""
+    """Penetration of a contact pair at an instant.
+
+    Of the `total` secondary nodes that face the other side, `count` penetrate it. The largest `depth` is that of the node
+    `point` [length].
+    """
 
     count: int
     total: int
@@ -77,96 +84,101 @@ def prescribed_overlap_warnings(pairs: Pairs, supports: Supports) -> list[str]:
 
 def _described(contact: ContactPair, formulation: Formulation, overlap: Overlap) -> str:
     position = ", ".join(f"{x:.6g}" for x in formulation.points[overlap.point])
-    how = "off" if formulation.options.always_closed else "into"
+    preposition = "off" if formulation.options.always_closed else "into"
     other = f"'{contact.primary}'" if contact.primary else "the rigid obstacle"
     return (
-        f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {how} {other}, contact "
+        f"supports push {overlap.count} of the {overlap.total} nodes of '{contact.secondary}' {preposition} {other}, contact "
         f"'{contact.name}', by up to {overlap.depth:.4g} (point {overlap.point} at ({position}), instant {overlap.instant:g})"
     )
 
 
 def _overlaps(pairs: Pairs, supports: Supports) -> Iterator[tuple[ContactPair, Formulation, Overlap]]:
-    """Yield the overlap of each pair at the worst instant, if it is inadmissible."""
+    """Yield each pair with inadmissible overlap, its formulation, and its overlap at the instant of the largest depth."""
     for contact, formulation in pairs:
         side = formulation.secondary
         usable = side.points[~formulation.options.excluded_nodes(side)]
         nodes = usable[supports.fixed[usable].any(axis=1)]
         if not len(nodes) or contact.force or formulation.options.penalty is not None:
             continue
-        # Nodes without supports count as facing the other side.
-        others = len(usable) - len(nodes)
+        # Nodes without supports are included in the total, whether they face the other side or not.
+        unsupported = len(usable) - len(nodes)
         candidates = Candidates(nodes[:, None], np.ones((len(nodes), 1)))
-        before, _, _ = _gaps(formulation, candidates, Configuration.undeformed(formulation.points), bare=True)
-        overlaps = [_at(contact, formulation, candidates, before, supports, instant) for instant in supports.instants()]
+        at_rest = Configuration.undeformed(formulation.points)
+        gap0, _, _ = _gaps(formulation, candidates, at_rest, with_clearance=False)
+        overlaps = [_overlap_at(contact, formulation, candidates, gap0, supports, t) for t in supports.instants()]
         worst = max(overlaps, key=lambda overlap: overlap.depth)
         if worst.count:
-            yield contact, formulation, replace(worst, total=worst.total + others)
+            yield contact, formulation, replace(worst, total=worst.total + unsupported)
 
 
-def _at(
-    contact: ContactPair, formulation: Formulation, candidates: Candidates, before: Array, supports: Supports, instant: float
+def _overlap_at(
+    contact: ContactPair, formulation: Formulation, candidates: Candidates, gap0: Array, supports: Supports, instant: float
 ) -> Overlap:  # fmt: skip
-    """Return the overlap of some secondary nodes (m,) at an instant, from their gaps `before` (m,) all displacements."""
+    """Return the overlap at an instant of secondary nodes (m,) with the initial gaps `gap0` (m,)."""
     displacement, ramp = supports.at(instant), supports.ramp
-    obstacle = np.zeros(displacement.shape[1])
+    translation = np.zeros(displacement.shape[1])
     if contact.obstacle is not None:
-        obstacle = multiplier(contact.ramp, ramp, instant) * np.array(contact.motion)
+        translation = multiplier(contact.ramp, ramp, instant) * np.array(contact.motion)
     factor = 1.0 if contact.clearance_ramp is None else multiplier(contact.clearance_ramp, ramp, instant)
-    pose = Pose(obstacle, angle_at(contact, ramp, instant))
-    at = replace(Configuration.displaced(displacement), pose=pose, clearance_factor=factor)
+    pose = Pose(translation, angle_at(contact, ramp, instant))
+    configuration = replace(Configuration.displaced(displacement), pose=pose, clearance_factor=factor)
     if formulation.options.tied:
-        depth, paired = _torn(formulation, candidates, displacement, supports.fixed)
+        depth, paired = _relative_displacements(formulation, candidates, displacement, supports.fixed)
     else:
-        depth, paired = _depth(formulation, candidates, before, at, supports.fixed)
-    small = max(SMALL * np.abs(displacement).max(), LENGTH_ROUND_OFF * np.ptp(formulation.points, axis=0).max())
+        depth, paired = _depths(formulation, candidates, gap0, configuration, supports.fixed)
+    admissible = max(
+        ADMISSIBLE_DEPTH * np.abs(displacement).max(), LENGTH_ROUND_OFF * np.ptp(formulation.points, axis=0).max()
+    )
     row = int(np.argmax(depth))
     return Overlap(
-        int((depth > small).sum()), int(paired.sum()), float(depth[row]), int(candidates.nodes[row, 0]), instant
+        int((depth > admissible).sum()), int(paired.sum()), float(depth[row]), int(candidates.nodes[row, 0]), instant
     )
 
 
-def _depth(
-    formulation: Formulation, candidates: Candidates, before: Array, at: Configuration, fixed: Mask
+def _depths(
+    formulation: Formulation, candidates: Candidates, gap0: Array, configuration: Configuration, fixed: Mask
 ) -> tuple[Array, Mask]:
-    """Return the penetration depths of nodes (m,) due to supports [length], and which nodes face the other side.
+    """Return the penetration depths (m,) of nodes due to supports [length], and the mask (m,) of paired nodes.
 
-    Depths are zero where the gap depends on unsupported components. Initial overlaps, given by the gaps `before` (m,), are
-    subtracted.
+    Depths are zero where the gap depends on unsupported components. Initial penetration, given by the gaps `gap0` (m,), is
+    subtracted. In contact that is always closed the depth is the change of the size of the gap.
     """
-    gap, rows, paired = _gaps(formulation, candidates, at)
+    gap, rows, paired = _gaps(formulation, candidates, configuration)
     if formulation.options.always_closed:
-        depth = np.abs(gap) - np.abs(before)
+        depth = np.abs(gap) - np.abs(gap0)
     else:
-        depth = -gap - np.maximum(-before, 0.0)
-    return np.where(paired & _decided(rows, fixed), np.maximum(depth, 0.0), 0.0), paired
+        depth = -gap - np.maximum(-gap0, 0.0)
+    return np.where(paired & _determined(rows, fixed), np.maximum(depth, 0.0), 0.0), paired
 
 
 def _gaps(
-    formulation: Formulation, candidates: Candidates, at: Configuration, bare: bool = False
+    formulation: Formulation, candidates: Candidates, configuration: Configuration, with_clearance: bool = True
 ) -> tuple[Array, csr_array, Mask]:
-    """Return the gaps (m,) of nodes, without clearances if `bare`, their rows (m, n_dofs), and which face the other side."""
-    pairing = formulation.facing(candidates, at)
+    """Return the gaps (m,) of nodes [length], their rows (m, n_dofs), and the mask (m,) of paired nodes."""
+    pairing = formulation.facing(candidates, configuration)
     rows, gap = gap_rows(candidates, pairing, formulation.primary, formulation.points)
-    gap = gap + rows @ at.displacement.ravel()
-    if not bare:
-        factor, reference = at.clearance_factor, formulation.points
+    gap = gap + rows @ configuration.displacement.ravel()
+    if with_clearance:
+        factor, reference = configuration.clearance_factor, formulation.points
         gap = gap + formulation.options.added_gap(candidates, pairing, formulation.primary, reference, factor)
     return np.where(pairing.paired, gap, 0.0), rows, pairing.paired
 
 
-def _torn(formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask) -> tuple[Array, Mask]:
-    """Return the relative displacements of tied nodes (m,) due to supports [length], and which nodes face the other side."""
+def _relative_displacements(
+    formulation: Formulation, candidates: Candidates, displacement: Array, fixed: Mask
+) -> tuple[Array, Mask]:
+    """Return the relative displacements (m,) of tied nodes due to supports [length], and the mask (m,) of paired nodes."""
     pairing = formulation.facing(candidates, Configuration.undeformed(formulation.points))
     square = np.zeros(len(pairing.paired))
     for axis in np.eye(fixed.shape[1]):
         direction = np.broadcast_to(axis, pairing.normal.shape)
         rows = rows_along(direction, candidates, pairing, formulation.primary, fixed.size)
-        square += np.where(_decided(rows, fixed), rows @ displacement.ravel(), 0.0) ** 2
+        square += np.where(_determined(rows, fixed), rows @ displacement.ravel(), 0.0) ** 2
     return np.sqrt(square), pairing.paired
 
 
-def _decided(rows: csr_array, fixed: Mask) -> Mask:
-    """Return whether each of the rows (m, n_dofs) only depends on supported components."""
-    free = np.abs(rows.data) > STILL
+def _determined(rows: csr_array, fixed: Mask) -> Mask:
+    """Return whether each of the rows (m, n_dofs) depends only on supported components."""
+    free = np.abs(rows.data) > ZERO_COEFFICIENT
     free &= ~fixed.ravel()[rows.indices]
     return np.asarray(np.diff(np.concatenate([[0], np.cumsum(free)])[rows.indptr]) == 0)

@@ -1,4 +1,4 @@
-"""Pretension sections: a force pulls the sides of a cut through a bolt together until the shortening is locked."""
+"""Pretension sections: a force or a shortening pulls the two sides of a cut through a bolt together."""
 
 from __future__ import annotations
 
@@ -70,12 +70,15 @@ class Pretension:
 
     def _approach(self, direction: Array, n_dofs: int) -> csr_array:
         """Return rows (m, n_dofs) of the approach of each node to the opposite one along a unit vector (dim,) [-]."""
-        each = np.tile(direction, (len(self.nodes), 1))
-        return csr_array(along(self.nodes, each, n_dofs) - along(self.opposite, each, n_dofs))
+        directions = np.tile(direction, (len(self.nodes), 1))
+        return csr_array(along(self.nodes, directions, n_dofs) - along(self.opposite, directions, n_dofs))
 
     def relations(self, n_dofs: int) -> list[MultiPointConstraint]:
-        """Return the permanent constraints: no shear, equal shortening of all nodes, the prescribed shortening if any."""
-        rows = [self._approach(direction, n_dofs) for direction in _across(self.normal)]
+        """Return the permanent constraints.
+
+        The sides have no relative shear, and the shortening is equal at all nodes and, if given, prescribed.
+        """
+        rows = [self._approach(direction, n_dofs) for direction in _tangents(self.normal)]
         approach = self._approach(self.normal, n_dofs)
         if len(self.nodes) > 1:
             rows.append(less_first(approach))
@@ -91,7 +94,7 @@ class Pretension:
         return float((self.row(displacement.size) @ displacement.ravel())[0])
 
     def locked(self, n_dofs: int, reached: float) -> MultiPointConstraint:
-        """Return the constraint that keeps a shortening [length]."""
+        """Return the constraint that keeps the shortening `reached` [length]."""
         return MultiPointConstraint(f"the locked length of {self.name}", self.row(n_dofs), reached, ((0.0, 1.0),))
 
 
@@ -136,7 +139,7 @@ def pretension(
     mesh: Mesh, label: str, section: str, opposite: str | None, normal: Sequence[float] | None,
     amounts: tuple[float | None, float | None, float | None], ramp: Table | None,
 ) -> Pretension:  # fmt: skip
-    """Return a pretension section, checked.
+    """Return a pretension section after checking it.
 
     Parameters
     ----------
@@ -144,7 +147,7 @@ def pretension(
     label, section, opposite, normal
         See `Model.add_pretension`.
     amounts : (float or None, float or None, float or None)
-        Force [force], shortening [length], instant from which it is locked.
+        Force [force], shortening [length], and instant from which the shortening is locked.
     ramp : tuple, optional
 
     Raises
@@ -162,12 +165,12 @@ def pretension(
         if value is not None:
             check_number(f"the {name_of_value} of {name}", value)
     nodes, facing = _sides(mesh, name, section, opposite)
-    direction = _outwards(mesh, name, section, _normal(mesh, name, nodes, normal))
+    direction = _outward(mesh, name, section, _normal(mesh, name, nodes, normal))
     return Pretension(label, nodes, facing, direction, force or 0.0, shortening, locked_from, ramp)
 
 
 def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[Indices, Indices]:
-    """Return the coincident points of both sides of a section."""
+    """Return the points (m,) of a section, and the coincident points (m,) of the opposite side."""
     other = section + OPPOSITE if opposite is None else opposite
     nodes = mesh.points_of(section).astype(np.intp)
     if opposite is None and other not in mesh.group_names:
@@ -184,26 +187,29 @@ def _sides(mesh: Mesh, name: str, section: str, opposite: str | None) -> tuple[I
 
 
 def _normal(mesh: Mesh, name: str, nodes: Indices, normal: Sequence[float] | None) -> Array:
-    """Return the unit normal (dim,) of a section, by default that of its plane."""
+    """Return the unit vector (dim,) along `normal`, by default the normal of the plane through the nodes."""
     if normal is not None:
         vector = finite_vector(normal, mesh.dim)
         if vector is None or not vector.any():
             raise ModelError(f"the normal {normal} of {name} must be {mesh.dim} numbers, not all zero")
         return np.asarray(vector / np.linalg.norm(vector))
-    places = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
-    spread, axes = np.linalg.svd(places, full_matrices=True)[1:]
-    if len(nodes) < mesh.dim or (len(spread) >= mesh.dim and spread[-1] > SINGLE_PRECISION * spread[0]):
+    arms = mesh.points[nodes] - mesh.points[nodes].mean(axis=0)
+    extent, axes = np.linalg.svd(arms, full_matrices=True)[1:]
+    if len(nodes) < mesh.dim or (len(extent) >= mesh.dim and extent[-1] > SINGLE_PRECISION * extent[0]):
         raise ModelError(f"the nodes of {name} determine no plane: give its normal, along the bolt")
-    across = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
-    return np.asarray(np.where(np.abs(across) < ROUND_OFF, 0.0, across))
+    vector = axes[-1] * np.sign(axes[-1][np.argmax(np.abs(axes[-1]))])
+    return np.asarray(np.where(np.abs(vector) < ROUND_OFF, 0.0, vector))
 
 
-def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
-    """Return a direction (dim,) along a bolt, oriented out of the body of the section, to the other side."""
+def _outward(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
+    """Return `direction` or its opposite (dim,), whichever points out of the body at the section, to the other side.
+
+    Sections that are not groups of facets keep the direction.
+    """
     if section not in mesh.cell_groups or not mesh.cells_of(section, mesh.dim - 1):
         return direction
-    mean = normals_of(mesh, section)[1].mean(axis=0)
-    cosine = float(direction @ mean / np.linalg.norm(mean))
+    mean_normal = normals_of(mesh, section)[1].mean(axis=0)
+    cosine = float(direction @ mean_normal / np.linalg.norm(mean_normal))
     if abs(cosine) < ALONG:
         angle = np.degrees(np.arccos(min(abs(cosine), 1.0)))
         raise ModelError(
@@ -212,8 +218,8 @@ def _outwards(mesh: Mesh, name: str, section: str, direction: Array) -> Array:
     return direction if cosine > 0.0 else -direction
 
 
-def _across(normal: Array) -> Array:
-    """Return the unit vectors (dim - 1, dim) perpendicular to a normal, parallel to the axes if the normal is."""
+def _tangents(normal: Array) -> Array:
+    """Return orthonormal vectors (dim - 1, dim) perpendicular to a normal, parallel to the axes if the normal is."""
     axis = int(np.argmax(np.abs(normal)))
     directions = [unit for k, unit in enumerate(np.eye(len(normal))) if k != axis]
     basis = np.linalg.qr(np.column_stack([normal, *directions]))[0][:, 1:].T
@@ -221,29 +227,32 @@ def _across(normal: Array) -> Array:
 
 
 def locked_lengths(
-    sections: Sequence[Pretension], begin: float, displacement: Array, kept: Mapping[str, Any]
+    sections: Sequence[Pretension], begin: float, displacement: Array, stored: Mapping[str, Any]
 ) -> dict[str, float]:
-    """Return the shortenings of the sections that are locked at an instant, by name [length].
+    """Return by name the shortenings of the sections that are locked in the load step from the instant `begin` [length].
 
-    Values `kept` from the time of locking are used; those of newly locked sections follow from displacements (n_points, dim)
-    [length]. In later solutions the shortening is only reproduced up to round-off.
+    The shortening of a newly locked section follows from displacements (n_points, dim) [length]. Later steps use the value
+    `stored` at that time, because their displacements reproduce it only up to round-off.
     """
     locked = [bolt for bolt in sections if bolt.locked_from is not None and begin >= bolt.locked_from]
-    return {bolt.label: kept[bolt.label] if bolt.label in kept else bolt.shortened(displacement) for bolt in locked}
+    return {bolt.label: stored[bolt.label] if bolt.label in stored else bolt.shortened(displacement) for bolt in locked}
 
 
 def check_locks(sections: Sequence[Pretension], instants: Sequence[float]) -> None:
-    """Raise ModelError if a section is locked inside a load step, or from the beginning."""
+    """Raise ModelError if a section is locked within a load step, or from the beginning."""
     for bolt in sections:
-        at = bolt.locked_from
-        if at is not None and at <= 0.0:
+        locked_from = bolt.locked_from
+        if locked_from is None:
+            continue
+        if locked_from <= 0.0:
             raise ModelError(
-                f"{bolt.name} is locked from {at:g}, and its force never acts: lock it at the end of a load step"
+                f"{bolt.name} is locked from {locked_from:g}, and its force never acts: lock it at the end of a load step"
             )
-        if at is not None and instants[0] < at < instants[-1] and at not in instants:
+        if instants[0] < locked_from < instants[-1] and locked_from not in instants:
+            nearest = min(instants, key=lambda instant: abs(instant - locked_from))
             raise ModelError(
-                f"{bolt.name} is locked from {at:g}, but no load step ends there: give the ramp that instant, or lock it at "
-                f"the end of a step, such as {min(instants, key=lambda t: abs(t - at)):g}"
+                f"{bolt.name} is locked from {locked_from:g}, but no load step ends there: give the ramp that instant, or "
+                f"lock it at the end of a step, such as {nearest:g}"
             )
 
 
@@ -258,12 +267,10 @@ def section_results(
     displacement, reaction : ndarray (n_points, dim)
         Displacements [length] and reactions [force] of a step; reactions include the forces of constraints.
     factors : sequence of float
-        Factor on the force of each section [-].
+        Multiplier of the force of each section [-].
     """
     results = {}
     for section, factor in zip(sections, factors, strict=True):
-        pulled = float(reaction[section.nodes].sum(axis=0) @ section.normal) + factor * section.force
-        results[section.label] = {
-            "force": pulled, "shortening": section.shortened(displacement)
-        }  # fmt: skip
+        force = float(reaction[section.nodes].sum(axis=0) @ section.normal) + factor * section.force
+        results[section.label] = {"force": force, "shortening": section.shortened(displacement)}
     return results

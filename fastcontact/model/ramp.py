@@ -21,9 +21,9 @@ Table = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class Harmonic:
-    """The history of the sine, or of one minus the cosine, of a rotation angle.
+    """History of the sine of a rotation angle, or of one minus its cosine.
 
-    The displacement of a rigid rotation is a linear combination of these two functions.
+    The displacement of a rigid-body rotation about a fixed axis is a linear combination of these two functions.
 
     Attributes
     ----------
@@ -52,9 +52,10 @@ MOST_STEPS = 1_000_000
 
 
 def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") -> Table:
-    """Return the points (instant, multiplier) of a piecewise linear function of time, called `caption` in messages.
+    """Return the points (instant, multiplier) of a piecewise linear function, called `caption` in messages.
 
-    Raises ModelError if there are fewer than two, their instants do not ascend, or a number is not finite.
+    Raises ModelError if there are fewer than two points, their instants do not ascend, or a number is not finite or exceeds
+    LARGEST in size.
     """
     try:
         table = tuple((float(time), float(value)) for time, value in rows)
@@ -71,7 +72,7 @@ def checked_table(rows: Iterable[Iterable[float]], caption: str = "the ramp") ->
 
 
 def table_of(ramp: History, caption: str) -> Table | None:
-    """Return the table of a history, or None for None; raise the errors of `checked_table`."""
+    """Return the table of a history, and pass None through. Raises the errors of `checked_table`."""
     if ramp is None:
         return None
     return ramp.table if isinstance(ramp, Ramp) else checked_table(ramp, caption)
@@ -183,7 +184,7 @@ RampLike = Ramp | int | Iterable[float] | Iterable[Iterable[float]]
 
 
 def ramp_of(steps: RampLike | None) -> Ramp:
-    """Return the ramp that `steps` describes: a `Ramp`, a number of equal steps, or an array; None means 20 steps.
+    """Return the ramp that `steps` describes: a `Ramp`, a number of equal steps, or an array. None means 20 equal steps.
 
     An array (n,) contains the load factors at the ends of the steps; the multiplier of the loads is equal to the load
     factor, also beyond 1. An array (n, 2) contains the points (load factor, multiplier) of the load function, and each
@@ -211,12 +212,12 @@ def ramp_of(steps: RampLike | None) -> Ramp:
 
 
 def multiplier(table: PartHistory, ramp: Ramp, instant: float) -> float:
-    """Return the multiplier of a load at `instant`, from its history `table` or, if `table` is None, from the ramp."""
+    """Return the multiplier [-] at `instant` of an item with the history `table`, or that of the ramp if `table` is None."""
     if isinstance(table, Harmonic):
         return table.value(multiplier(table.ramp, ramp, instant))
     return ramp.value(instant) if table is None else table_value(table, instant)
 
 
 def combined(by_ramp: Mapping[Any, Array], ramp: Ramp, instant: float, shape: tuple[int, ...]) -> Array:
-    """Return the sum of the arrays in `by_ramp` at `instant`, each times the multiplier of its history."""
+    """Return the sum of the arrays in `by_ramp`, each of `shape`, times the multipliers of their histories at `instant`."""
     return sum((multiplier(table, ramp, instant) * values for table, values in by_ramp.items()), np.zeros(shape))

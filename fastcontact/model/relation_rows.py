@@ -1,4 +1,4 @@
-"""Rows of multi-point constraints: along surface normals, and between the nodes of two groups."""
+"""Rows of multi-point constraints along given directions and surface normals, and the matching of nodes of two groups."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ NORMAL = "normal"
 
 
 def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
-    """Return the nodes (m,) of a group of outer facets, and the means (m, dim) of the facets' unit normals there.
+    """Return the nodes (m,) of a group of outer facets, and their unit normals (m, dim), averaged over adjacent facets.
 
-    Raises the errors of a pressure on the group.
+    Raises the same errors as a pressure on the group.
     """
     facets = {name: outward(mesh, group, name, block) for name, block in facets_of(mesh, group).items()}
     points = np.unique(np.concatenate([block.ravel() for block in facets.values()]))
@@ -37,9 +37,9 @@ def normals_of(mesh: Mesh, group: str) -> tuple[Indices, Array]:
 
 
 def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices, Array]]:
-    """Return the nodes (m,) of a group, and unit vectors (m, dim), for each of the components in a name.
+    """Return the nodes (m,) of a group and unit vectors (m, dim) for each direction that `component` names.
 
-    The name is ``"normal"``, or some of the letters x, y, z.
+    `component` is ``"normal"``, or some of the letters x, y and z.
     """
     if component == NORMAL:
         return [normals_of(mesh, group)]
@@ -48,21 +48,22 @@ def directions_of(mesh: Mesh, group: str, component: str) -> list[tuple[Indices,
 
 
 def along(nodes: Indices, directions: Array, n_dofs: int) -> csr_array:
-    """Return rows (m, n_dofs): the displacement of each node (m,) along its unit vector (m, dim) [-]."""
+    """Return the rows (m, n_dofs) of the displacement of each node (m,) along its unit vector (m, dim) [-]."""
     return nodal_rows(nodes[:, None], directions[:, None], n_dofs)
 
 
 def less_first(rows: csr_array) -> csr_array:
-    """Return the differences (m - 1, n) between the rows (m, n) after the first and the first row."""
+    """Return the rows (m, n) after the first, less the first one, (m - 1, n)."""
     return csr_array(rows[1:] - csr_array(vstack([rows[[0]]] * (rows.shape[0] - 1), format="csr")))
 
 
 def matched(
     mesh: Mesh, first: tuple[str, Indices], second: tuple[str, Indices], translation: Sequence[float] | None
 ) -> Indices:
-    """Return, for each node of the first group, the index of the coincident node of the second after `translation`.
+    """Return, for each node of the first group, the index of the node of the second with which it coincides when moved.
 
-    By default the centre of the bounding box of the first group is moved to that of the second.
+    The first group is moved by `translation` (dim,) [length], by default from the centre of its bounding box to that of the
+    second group. Each group is given as (name, nodes).
 
     Raises
     ------
@@ -74,20 +75,18 @@ def matched(
         raise ModelError(
             f"groups '{name}' and '{other}' have {len(nodes)} and {len(opposite)} nodes: they are joined one by one"
         )
-    ours, theirs = mesh.points[nodes], mesh.points[opposite]
-    low, high = ours.min(axis=0), ours.max(axis=0)
-    shift = 0.5 * (theirs.min(axis=0) + theirs.max(axis=0) - low - high)
+    x, target = mesh.points[nodes], mesh.points[opposite]
+    shift: Array | None = 0.5 * (target.min(axis=0) + target.max(axis=0) - x.min(axis=0) - x.max(axis=0))
     if translation is not None:
-        given = finite_vector(translation, mesh.dim)
-        if given is None:
-            raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
-        shift = given
-    distance, match = nearest(theirs, ours + shift)
-    size = max(float(np.ptp(ours, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
-    far = int(np.argmax(distance))
-    if distance[far] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
+        shift = finite_vector(translation, mesh.dim)
+    if shift is None:
+        raise ModelError(f"the translation {translation} of '{name}' must be {mesh.dim} numbers")
+    distance, match = nearest(target, x + shift)
+    size = max(float(np.ptp(x, axis=0).max()), 1e-3 * float(np.ptp(mesh.points, axis=0).max()))
+    worst = int(np.argmax(distance))
+    if distance[worst] > SINGLE_PRECISION * size or len(np.unique(match)) < len(match):
         raise ModelError(
-            f"point {nodes[far]} of '{name}', moved by {shift}, lies {distance[far]:.3g} from the nearest node of '{other}': "
-            "groups are joined node by node; give the translation between them, or use another mesh"
+            f"point {nodes[worst]} of '{name}', moved by {shift}, lies {distance[worst]:.3g} from the nearest node of "
+            f"'{other}': groups are joined node by node; give the translation between them, or use another mesh"
         )
     return match

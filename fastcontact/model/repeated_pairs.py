@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
-from fastcontact.arrays import Array, Indices, Numbers
+from fastcontact.arrays import Array, Numbers
 from fastcontact.contact.formulations import Formulation
 from fastcontact.contact.projection import CORNER, nodal_normals
 from fastcontact.contact.side_checks import shared_facets
@@ -49,16 +48,21 @@ def _check_sides(mesh: Mesh, pair: ContactPair, other: ContactPair, facing: str,
 
 
 def joined_already(mesh: Mesh, sides: tuple[str, str], other: ContactPair) -> bool:
-    """Return whether `other` contains facets of both groups `sides`, in either role; False against an obstacle."""
+    """Return whether the sides of `other` share facets with both groups `sides`, in either role; False for an obstacle."""
     if other.obstacle is not None:
         return False
     roles = (other.secondary, other.primary), (other.primary, other.secondary)
-    return any(all(len(shared_facets(mesh, *both)) for both in zip(sides, role)) for role in roles)
+    return any(all(len(shared_facets(mesh, *groups)) for groups in zip(sides, role)) for role in roles)
 
 
 def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
-    """Raise ContactError if both obstacles have the same gaps and normals on shared facets, unlike two that form a corner."""
-    if pair.obstacle is None or other.obstacle is None or _moved(pair) != _moved(other):
+    """Raise ContactError if the obstacles of both pairs have equal gaps, normals and motions on shared secondary facets.
+
+    Two obstacles that form a corner differ there.
+    """
+    if pair.obstacle is None or other.obstacle is None:
+        return
+    if any(getattr(pair, key) != getattr(other, key) for key in ("motion", "ramp", "rotation", "rotation_ramp")):
         return
     nodes = shared_facets(mesh, pair.secondary, other.secondary)
     if not len(nodes):
@@ -70,13 +74,8 @@ def _check_obstacles(mesh: Mesh, pair: ContactPair, other: ContactPair) -> None:
     if same_gap and np.allclose(normal, other_normal, atol=SINGLE_PRECISION):
         raise ContactError(
             f"contact '{pair.name}' presses facets of '{pair.secondary}' on the same rigid obstacle as contact "
-            f"'{other.name}', with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the "
-            "two"
+            f"'{other.name}', with {len(nodes)} nodes (first: point {nodes[0]}): leave out one of the two"
         )
-
-
-def _moved(pair: ContactPair) -> tuple[Any, ...]:
-    return pair.motion, pair.ramp, pair.rotation, pair.rotation_ramp
 
 
 def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Iterator[str]:
@@ -105,14 +104,8 @@ def split_side_warnings(pairs: Sequence[tuple[ContactPair, Formulation]]) -> Ite
 
 def _common(points: Array, side: Surface, other: Surface) -> Numbers:
     """Return the common nodes of two surfaces at which their normals differ by less than CORNER."""
-    nodes = np.intersect1d(side.points, other.points)
+    nodes, of_side, of_other = np.intersect1d(side.points, other.points, return_indices=True)
     if not len(nodes):
         return nodes
-    normals = [nodal_normals(s, points)[_places(s, nodes)] for s in (side, other)]
+    normals = [nodal_normals(surface, points)[index] for surface, index in ((side, of_side), (other, of_other))]
     return np.asarray(nodes[np.einsum("nd,nd->n", *normals) > np.cos(np.radians(CORNER))])
-
-
-def _places(side: Surface, nodes: Numbers) -> Indices:
-    """Return the indices (n,) of `nodes` (n,) in the points of a side."""
-    order = np.argsort(side.points)
-    return np.asarray(order[np.searchsorted(side.points, nodes, sorter=order)])

@@ -1,4 +1,4 @@
-"""Rigid-body modes left free by supports and multi-point constraints, and whether contact can stop them.
+"""Rigid-body motions that supports and multi-point constraints allow, and whether contact can stop them.
 
 A body in contact is in equilibrium if the loads do no positive work on motions that open gaps or leave them unchanged. The
 loads then lie inside the cone of the contact forces (Fichera, 1964; Lions and Stampacchia, 1967).
@@ -27,21 +27,21 @@ MODE_NAMES = {
     "plane_stress": ("translation along x", "translation along y", "rotation"),
     "3d": tuple(f"{kind} {axis}" for kind in ("translation along", "rotation about") for axis in "xyz"),
 }
-# Tolerance relative to the motions, whose largest displacement is about 1.
+# Gap changes and singular values are regarded as zero below this, for motions whose largest displacement is about 1.
 ZERO = 1e-8
 # A motion that contact does not stop within this multiple of the size of the model is unbounded.
 FAR = 1e3
-# Number of edges of the pyramid that approximates Coulomb's cone in three dimensions: forces up to 8 % outside the cone are
-# accepted here.
+# Number of edges of the pyramid that is circumscribed to Coulomb's cone in three dimensions. Tangential forces at its edges
+# exceed those of the cone by 8 %.
 EDGES = 8
-# Largest factor on the coefficient of friction that is considered to hold a body.
+# Largest factor on the coefficients of friction with which friction is assumed to hold a body.
 MOST_FRICTION = 100.0
-# Largest number of motions of parts between hinges; a mesh with more is defective.
-MANY = 1500
+# Largest number of motions of parts between hinges. A mesh with more motions is defective.
+MOST_MOTIONS = 1500
 
 
 class Label(NamedTuple):
-    """Name of an elementary motion; for a rotation of a body also its `centre` (dim,) and largest arm [length]."""
+    """Name of an elementary motion, with a point on its axis and the largest arm [length] if it is a rotation of a body."""
 
     body: str
     motion: str
@@ -53,9 +53,9 @@ class Label(NamedTuple):
 class FreeMotions:
     """Independent rigid-body motions that supports and constraints allow.
 
-    The largest entry of each column of the `displacement` (n_dofs, k) of all points is about 1. `parts` (p, k) are the same
-    motions as combinations of elementary ones, and `labels` are the names of the elementary motions. `hinges` (m,) are nodes
-    that connect parts of bodies, single or collinear.
+    Column j of `displacement` (n_dofs, k) contains the displacements of all points in motion j; its largest entry is about 1.
+    `parts` (p, k) are the coefficients of the motions as combinations of elementary ones, and `labels` the names of the p
+    elementary motions. `hinges` (m,) are single or collinear nodes that connect parts of bodies.
     """
 
     displacement: Array
@@ -72,44 +72,48 @@ class FreeMotions:
 
     def names(self) -> list[str]:
         """Return a description of each motion: the bodies and elementary motions that it combines."""
-        return ["; ".join(f"{body}: {motion}" for body, motion in self._mixed(column)) for column in self.parts.T]
+        return ["; ".join(f"{body}: {motion}" for body, motion in self._of_bodies(column)) for column in self.parts.T]
 
     def by_body(self) -> dict[str, list[str]]:
-        """Return the names of the motions of each body, each once, even if joint motions contain it repeatedly."""
+        """Return the names of the motions of each body, without repetition.
+
+        The motions are combined such that each contains as few elementary motions as possible.
+        """
         by_body: dict[str, list[str]] = {}
         for column in _reduced(self.parts).T:
-            for body, motion in self._mixed(column):
+            for body, motion in self._of_bodies(column):
                 by_body.setdefault(body, []).append(motion)
         return {body: list(dict.fromkeys(motions)) for body, motions in by_body.items()}
 
-    def _mixed(self, column: Array) -> list[tuple[str, str]]:
-        mixed: dict[str, list[int]] = {}
+    def _of_bodies(self, column: Array) -> list[tuple[str, str]]:
+        """Return the name of each body that takes part in a motion (p,), with the description of its motion."""
+        rows_of: dict[str, list[int]] = {}
         for i in np.flatnonzero(np.abs(column) > 1e-6 * np.abs(column).max()):
-            mixed.setdefault(self.labels[i].body, []).append(int(i))
-        return [(body, self._described(column, rows)) for body, rows in mixed.items()]
+            rows_of.setdefault(self.labels[i].body, []).append(int(i))
+        return [(body, self._described(column, rows)) for body, rows in rows_of.items()]
 
     def _described(self, column: Array, rows: list[int]) -> str:
-        """Return the name of the motion of a body: a rotation about a point or line, if it is one, or all its parts."""
+        """Return the name of the motion of a body: a rotation about a point or line if possible, otherwise all its parts."""
         labels = [self.labels[i] for i in rows]
-        apart, turn = np.zeros((2, 3))
+        translation, rotation = np.zeros((2, 3))
         for i, label in zip(rows, labels, strict=True):
-            axis = "xyz".find(label.motion[-1])  # "rotation" in the plane: about z
-            (apart if label.centre is None else turn)[axis] += column[i] / label.arm
-        centre, square = next((label.centre for label in labels if label.centre is not None), None), turn @ turn
-        if centre is None or abs(apart @ turn) > 1e-6 * square * max(label.arm for label in labels):
-            return " with ".join(label.motion for label in labels)
-        if len(centre) == 3 and not apart.any() and len(rows) == 1:
-            return labels[0].motion
+            axis = "xyz".find(label.motion[-1])  # in the plane it is -1, and the "rotation" is about z
+            (translation if label.centre is None else rotation)[axis] += column[i] / label.arm
+        centre, square = next((label.centre for label in labels if label.centre is not None), None), rotation @ rotation
         size = max(label.arm for label in labels)
-        at = centre + (np.cross(turn, apart) / square)[: len(centre)]
-        place = _listed(np.where(np.abs(at) > 1e-5 * size, at, 0.0))
-        along = turn / turn[np.argmax(np.abs(turn))]
-        line = f" along {_listed(np.where(np.abs(along) > 1e-6, along, 0.0))}"
-        return f"rotation about {place}" if len(centre) == 2 else f"rotation about the line through {place}{line}"
+        if centre is None or abs(translation @ rotation) > 1e-6 * square * size:
+            return " with ".join(label.motion for label in labels)
+        if len(centre) == 3 and not translation.any() and len(rows) == 1:
+            return labels[0].motion
+        point = centre + (np.cross(rotation, translation) / square)[: len(centre)]
+        position = _listed(np.where(np.abs(point) > 1e-5 * size, point, 0.0))
+        direction = rotation / rotation[np.argmax(np.abs(rotation))]
+        line = f" along {_listed(np.where(np.abs(direction) > 1e-6, direction, 0.0))}"
+        return f"rotation about {position}" if len(centre) == 2 else f"rotation about the line through {position}{line}"
 
 
 def grouped(names: Iterable[str]) -> str:
-    """Return the names of motions, as `FreeMotions.names` returns them, in one string that names each body once."""
+    """Return the `names` of motions, see `FreeMotions.names`, in one string that names each body once."""
     by_body: dict[str, list[str]] = {}
     for body, _, motion in (name.rpartition(": ") for name in names):
         by_body.setdefault(body, []).append(motion)
@@ -118,18 +122,18 @@ def grouped(names: Iterable[str]) -> str:
 
 def _reduced(A: Array) -> Array:
     """Return the reduced column echelon form (p, k) of a matrix A (p, k) of full column rank."""
-    A, done = A.copy(), 0
+    A, column = A.copy(), 0
     for row in A:  # a view, which follows the elimination
-        if done == A.shape[1]:
+        if column == A.shape[1]:
             break
-        pivot = done + int(np.argmax(np.abs(row[done:])))
+        pivot = column + int(np.argmax(np.abs(row[column:])))
         if abs(row[pivot]) <= ZERO * np.abs(A).max():
             continue
-        A[:, [done, pivot]] = A[:, [pivot, done]]
-        A[:, done] /= row[done]
-        others = np.arange(A.shape[1]) != done
-        A[:, others] -= A[:, [done]] * row[others]
-        done += 1
+        A[:, [column, pivot]] = A[:, [pivot, column]]
+        A[:, column] /= row[column]
+        others = np.arange(A.shape[1]) != column
+        A[:, others] -= A[:, [column]] * row[others]
+        column += 1
     return A
 
 
@@ -138,13 +142,16 @@ def _listed(values: Array) -> str:
 
 
 def body_name(mesh: Mesh, body: AnyArray, number: int) -> str:
-    """Return a name for a body, given the `body` of each point: the cell group of exactly its solid cells, or its number."""
+    """Return the name of body `number` for messages, from the `body` (n_points,) of each point.
+
+    It is the name of a cell group that has exactly the nodes of the body, otherwise its number and its centre.
+    """
     members = np.flatnonzero(body == number)
     return _group_of(mesh, members) or f"number {number + 1} (around {mesh.points[members].mean(axis=0)})"
 
 
 def _group_of(mesh: Mesh, members: Indices) -> str:
-    """Return the name of the cell group whose solid cells have exactly the nodes `members`, empty if there is none."""
+    """Return the quoted name of the cell group whose solid cells have exactly the nodes `members`; empty if there is none."""
     for group in mesh.cell_groups:
         blocks = mesh.cells_of(group, dim=mesh.dim)
         if blocks and np.array_equal(np.unique(np.concatenate([block.ravel() for block in blocks.values()])), members):
@@ -155,11 +162,11 @@ def _group_of(mesh: Mesh, members: Indices) -> str:
 def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array | None = None) -> FreeMotions:
     """Return the rigid-body motions that the supports `fixed` (n_points, dim) and the constraints allow.
 
-    Bodies move as a whole; parts of a body that are connected at single nodes rotate about these. `relations` (m, n_dofs) are
-    rows R with ``R u = 0``; points without a body move freely if constraints contain them.
+    Bodies move as a whole, and parts of a body that are connected at single nodes rotate about these. `relations` (m, n_dofs)
+    are the rows R of constraints ``R u = 0``. Points that belong to no body are included if constraints contain them.
     """
     dofs = mesh.n_points * mesh.dim
-    motions = _of_bodies(mesh, kinematics, fixed)
+    motions = _body_motions(mesh, kinematics, fixed)
     columns, matrices, labels = [motions.displacement], [motions.parts], list(motions.labels)
     if relations is not None:
         reference = bodies(mesh)[1][relations.indices // mesh.dim] < 0
@@ -173,7 +180,7 @@ def free_motions(mesh: Mesh, kinematics: str, fixed: Mask, relations: csr_array 
     return motions.combined(_null_space(relations @ motions.displacement))
 
 
-def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
+def _body_motions(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
     """Return the motions of bodies, and of their parts at hinges, that the supports `fixed` (n_points, dim) leave free."""
     rigid = _parts_of(mesh, kinematics)
     moving: list[tuple[Indices, Array]] = []  # nodes (m,) of a part, and its motions (m, dim, k) there
@@ -183,7 +190,7 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
         modes = rigid_modes(mesh.points[members], kinematics)
         arms = np.abs(modes).max(axis=0)
         modes = modes / arms
-        free = _null_space(modes[fixed[members].ravel()])  # combinations of the part's modes without support
+        free = _null_space(modes[fixed[members].ravel()])  # combinations of the modes without displacement at supports
         moving.append((members, (modes @ free).reshape(len(members), mesh.dim, -1)))
         if free.shape[1]:
             matrices.append(free)
@@ -192,14 +199,14 @@ def _of_bodies(mesh: Mesh, kinematics: str, fixed: Mask) -> FreeMotions:
                 Label(name, motion, centre if motion.startswith("rotation") else None, float(arm))
                 for motion, arm in zip(MODE_NAMES[kinematics], arms, strict=True)
             ]
-    kept = _turning_about(mesh, rigid, moving)
-    spans = np.split(kept, np.cumsum([motion.shape[2] for _, motion in moving]))
-    displacement = np.zeros((mesh.n_points, mesh.dim, kept.shape[1]))
-    for number, ((members, motion), span) in enumerate(zip(moving, spans[:-1], strict=True)):
-        members_of_body = rigid.part[members] == number
-        displacement[members[members_of_body]] = motion[members_of_body] @ span
+    joint = _joint_motions(mesh, rigid, moving)
+    coefficients = np.split(joint, np.cumsum([motion.shape[2] for _, motion in moving]))
+    displacement = np.zeros((mesh.n_points, mesh.dim, joint.shape[1]))
+    for number, ((members, motion), of_part) in enumerate(zip(moving, coefficients[:-1], strict=True)):
+        own = rigid.part[members] == number  # a node at a hinge belongs to several parts
+        displacement[members[own]] = motion[own] @ of_part
     return FreeMotions(
-        displacement.reshape(mesh.points.size, kept.shape[1]), np.asarray(block_diag(*matrices), float) @ kept, labels,
+        displacement.reshape(mesh.points.size, joint.shape[1]), np.asarray(block_diag(*matrices), float) @ joint, labels,
         np.unique(rigid.hinge_node),
     )  # fmt: skip
 
@@ -208,17 +215,17 @@ def _parts_of(mesh: Mesh, kinematics: str) -> RigidParts:
     """Return the rigid parts: bodies, or parts of them between hinges."""
     if kinematics != "axisymmetric":
         return rigid_parts(mesh)
-    # Rings move only along the axis, and a single common node transmits this motion.
+    # Axisymmetric bodies move only along the axis, and a single common node transmits this motion.
     count, body = bodies(mesh)
     return RigidParts(count, body.astype(np.intp), np.empty(0, np.intp), np.empty(0, np.intp))
 
 
-def _turning_about(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Array]]) -> Array:
-    """Return the combinations (k, j) of the motions of all parts for which nodes at hinges stay together."""
+def _joint_motions(mesh: Mesh, rigid: RigidParts, moving: list[tuple[Indices, Array]]) -> Array:
+    """Return the combinations (k, j) of the motions of all parts for which parts stay connected at hinges."""
     width = sum(motion.shape[2] for _, motion in moving)
     if not len(rigid.hinge_node):
         return np.eye(width)
-    if width > MANY:
+    if width > MOST_MOTIONS:
         raise ModelError(
             f"the mesh consists of {rigid.count} parts that are connected only at single nodes or along lines (first: "
             f"{node_at(mesh, rigid.hinge_node[0])}): let cells share whole facets"
@@ -238,54 +245,55 @@ def node_at(mesh: Mesh, node: int) -> str:
 
 
 def _part_name(mesh: Mesh, rigid: RigidParts, number: int) -> str:
-    """Return the name of a body, or of a part of one and the first node at which it is attached to others."""
+    """Return the name of a body, or of a part of a body with the first node at which it is connected to other parts."""
     _, body = bodies(mesh)
     members, hinges = rigid.nodes_of(number), rigid.hinges_of(number)
     name = f"body {body_name(mesh, body, int(body[members[0]]))}"
     if not len(hinges):
         return name
-    place = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
-    return f"{name}, the part {place} that hangs at {node_at(mesh, hinges[0])}"
+    part = _group_of(mesh, members) or f"around {mesh.points[members].mean(axis=0)}"
+    return f"{name}, the part {part} that hangs at {node_at(mesh, hinges[0])}"
 
 
 def _null_space(A: Array) -> Array:
-    """Return an orthonormal basis (k, j) of the vectors that A (m, k) maps to zero."""
+    """Return an orthonormal basis (k, j) of the null space of A (m, k), with the tolerance ZERO for singular values."""
     k = A.shape[1]
     _, values, right = np.linalg.svd(np.vstack([A, np.zeros((k, k))]), full_matrices=False)
     return np.asarray(right[values < ZERO * max(values.max(initial=0.0), 1.0)].T)
 
 
 def resisting(constraints: Constraints, factor: float = 1.0) -> tuple[csr_array, Array]:
-    """Return rows and gaps at u = 0 that must stay >= 0 without slip: gaps, and edges of the friction cone.
+    """Return the rows that span the cone of admissible contact forces, and their gaps at u = 0 [length].
 
-    A contact force lies in the cone of the rows: normal, with friction in the plane ``n + mu t`` and ``n - mu t``, in 3D
-    the pyramid with EDGES circumscribed to Coulomb's cone. Equations act in both directions. `factor` multiplies the
-    coefficients of friction.
+    Without friction these are the rows of the gaps. With friction they are ``n + mu t`` and ``n - mu t`` in the plane, and in
+    3D the EDGES edges of the pyramid circumscribed to Coulomb's cone. Rows of equality constraints appear with both signs.
+    `factor` multiplies the coefficients of friction.
     """
     rows, gap0 = _edges(constraints, factor)
-    backwards = np.flatnonzero(np.resize(constraints.equality, len(gap0)))
-    both = csr_array(vstack([rows, -rows[backwards]], format="csr"))
-    return both, np.concatenate([gap0, -gap0[backwards]])
+    bilateral = np.flatnonzero(np.resize(constraints.equality, len(gap0)))
+    rows = csr_array(vstack([rows, -rows[bilateral]], format="csr"))
+    return rows, np.concatenate([gap0, -gap0[bilateral]])
 
 
 def _edges(constraints: Constraints, factor: float) -> tuple[csr_array, Array]:
-    """Return the rows and gaps of contact that may open."""
+    """Return the rows and gaps of `resisting` with positive sign."""
     if not constraints.tangents:
         return constraints.B, constraints.gap0
     if len(constraints.tangents) == 1:
-        around = np.array([[1.0], [-1.0]])
+        weights = np.array([[1.0], [-1.0]])
     else:
         angle = 2.0 * np.pi * np.arange(EDGES) / EDGES
-        around = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
+        weights = np.column_stack([np.cos(angle), np.sin(angle)]) / np.cos(np.pi / EDGES)
     shear = [T.multiply(factor * constraints.friction[:, None]) for T in constraints.tangents]
-    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, parts)) for parts in around]
+    edges = [constraints.B + sum(weight * T for T, weight in zip(shear, of_edge)) for of_edge in weights]
     return csr_array(vstack(edges, format="csr")), np.tile(constraints.gap0, len(edges))
 
 
 def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Array:
-    """Return the work (k,) that nodal forces (n_dofs,) do on each motion; round-off counts as zero [force].
+    """Return the generalised forces (k,) of nodal forces (n_dofs,) on each motion, with round-off set to zero [force].
 
-    Round-off is estimated from these forces, and from the `largest` earlier works, of which they may be the remainder.
+    Round-off is estimated from these forces and from the `largest` earlier generalised forces (k,), of which they may be the
+    remainder.
     """
     work = motions.displacement.T @ force
     scale = np.maximum(np.abs(motions.displacement).T @ np.abs(force), largest)
@@ -294,11 +302,11 @@ def generalised(motions: FreeMotions, force: Array, largest: float = 0.0) -> Arr
 
 
 def unstopped(gaps: Array, works: Array) -> Array:
-    """Return motions (k, j) that neither contact nor contact and loads together can stop.
+    """Return the coefficients (k, j) of motions that neither contact nor contact and loads together can stop.
 
-    `gaps` (m, k) are the changes of the gaps and `works` (l, k) the works of the loads for each motion, whose largest
-    displacement is about 1. A motion is stopped if it changes a gap, and closes a gap or is driven by a load. The solution
-    decides whether the load drives it towards the contact or away from it.
+    `gaps` (m, k) are the changes of the gaps and `works` (l, k) the generalised forces of the loads for each motion, whose
+    largest displacement is about 1. A motion is regarded as stopped if it closes a gap, or if it opens one and a load acts on
+    it. The solution decides whether the load presses the body against the contact or pulls it away.
     """
     k = gaps.shape[1]
     gaps = np.where(np.abs(gaps) > ZERO, gaps, 0.0)
@@ -316,7 +324,7 @@ def unstopped(gaps: Array, works: Array) -> Array:
 
 
 def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
-    """Return the name of the motion that changes the gaps least, and by how much relative to the other motions.
+    """Return the name of the motion that changes the gaps least, and the ratio of its change to the largest one [-].
 
     `gaps` (m, k) are the changes of m gaps for each of the k motions.
     """
@@ -325,10 +333,18 @@ def least_held(motions: FreeMotions, gaps: Array) -> tuple[list[str], float]:
 
 
 def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | None:
-    """Return the amplitudes (k,) at which rigid bodies under the loads come to rest in contact, None if they never do.
+    """Return the amplitudes (k,) of the motions at which contact stops rigid bodies under the loads; None if it does not.
 
-    `gaps` (m, k) are the changes of the gaps for each motion, `gap` (m,) the current gaps, where penetration counts as
-    closed [length], `work` (k,) the work of the loads on each motion, and `size` the size of the model [length].
+    Parameters
+    ----------
+    gaps : ndarray (m, k)
+        Changes of the gaps for each motion [-].
+    gap : ndarray (m,)
+        Current gaps; negative ones count as closed [length].
+    work : ndarray (k,)
+        Generalised force of the loads on each motion [force].
+    size : float
+        Size of the model [length].
     """
     if not work.any():
         return np.zeros(len(work))
@@ -339,17 +355,16 @@ def stopped_at(gaps: Array, gap: Array, work: Array, size: float) -> Array | Non
 
 
 def needed_friction(constraints: Constraints, motions: Array, u: Array, work: Array, size: float) -> float | None:
-    """Return the factor on the coefficients of friction that would stop rigid bodies [-].
+    """Return the smallest factor on the coefficients of friction with which rigid bodies are stopped [-].
 
-    None if the coefficients stop them in every direction of the pyramid inside Coulomb's cone, or if none would.
-
-    `motions` (n_dofs, k) are the rigid-body motions, `u` (n_dofs,) displacements [length]; `work` and `size` are as in
-    `stopped_at`.
+    Returns None if the given coefficients suffice even with the pyramid inscribed in Coulomb's cone, or if no factor up to
+    MOST_FRICTION suffices. `motions` (n_dofs, k) are the rigid-body motions, and `u` (n_dofs,) the displacements [length];
+    `work` and `size` are as in `stopped_at`.
     """
     if not constraints.friction.any():
         return None
-    inside = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
-    low, high = inside, MOST_FRICTION
+    inscribed = 1.0 if len(constraints.tangents) == 1 else np.cos(np.pi / EDGES)
+    low, high = inscribed, MOST_FRICTION
 
     def stops(factor: float) -> bool:
         rows, gap0 = resisting(constraints, factor)
@@ -360,11 +375,14 @@ def needed_friction(constraints: Constraints, motions: Array, u: Array, work: Ar
     while high > 1.001 * low:
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if stops(middle) else (middle, high)
-    return high / inside
+    return high / inscribed
 
 
 def _extreme(along: Array, gaps: Array, gap: Array, held: Array, bound: float) -> Array:
-    """Return the y with the largest ``along @ y``, ``gap + gaps @ y >= 0``, ``held @ y = 0``, ``|y| <= bound``."""
+    """Return y (k,) that maximises ``along @ y`` for ``gap + gaps @ y >= 0``, ``held @ y = 0`` and ``|y| <= bound``.
+
+    Returns zeros if the linear programme has no solution.
+    """
     from scipy.optimize import linprog
 
     optimum = linprog(

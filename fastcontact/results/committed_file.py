@@ -1,17 +1,21 @@
-"""An HDF5 file that can be opened after each of its writes.
+"""An HDF5 file that is valid after each of its writes.
 
 HDF5 writes the records of its indices in no particular order. If a process is killed between two writes, an index may refer
 to addresses beyond the end of the file, or entries, and with them completed steps, may be lost. This file buffers writes in
-memory until HDF5 flushes, and then executes them in an order in which the file is valid after each write: new blocks, to
-which nothing refers yet; the superblock with the end of the file; nodes of indices from the root down, so that entries are in
-their new node before they leave the old one; all other writes; and name tables (HDF5 File Format Specification 3.0, sections
-II.A and III.A).
+memory until HDF5 flushes, and then executes them in the following order (HDF5 File Format Specification 3.0, sections II.A
+and III.A):
+
+1. new blocks, to which nothing refers yet;
+2. the superblock with the end of the file;
+3. nodes of indices from the root down, so that entries are in their new node before they are removed from the old one;
+4. all other writes;
+5. name tables.
 
 HDF5 writes whole nodes of indices and parts of tables, of which a step changes a few bytes. Only the range from the first to
 the last changed byte is written.
 
-The order protects against the end of a process but not against a power loss, since disks reorder writes. `synchronised`
-writes are therefore kept in a journal until they are executed.
+The order protects against the end of a process but not against a power loss, since disks reorder writes. Changes in place are
+therefore first written to a journal if the file is `synchronised`.
 """
 
 from __future__ import annotations
@@ -32,16 +36,16 @@ from fastcontact.results import journal
 
 # Signatures of the superblock, of nodes of indices and of name tables in HDF5.
 SUPERBLOCK, NODE, NAMES = b"\x89HDF\r\n\x1a\n", b"TREE", b"SNOD"
-# Longest write that is compared with the file [bytes]. In longer writes, which are data, all bytes change.
-COMPARED = 1 << 16
+# Longest write that is compared with the file [bytes]. Longer writes are data, of which all bytes change.
+LONGEST_COMPARED = 1 << 16
 SIGNALS = tuple(map(int, signal.valid_signals()))
 
 
 class CommittedFile(DriverFile):
     """An existing HDF5 file whose writes are deferred to `flush`, with the methods that `h5py.File` calls.
 
-    Nothing is written after an error, which leaves the file as after the last successful write, or after another program has
-    written to the file.
+    Nothing is written after an error, so that the file remains as it was after the last successful write, and nothing after
+    another program has written to the file.
 
     Attributes
     ----------
@@ -57,23 +61,25 @@ class CommittedFile(DriverFile):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self.synchronised = False
-        repeated = journal.found(self._file)  # left by a writer that was killed or stopped by a power loss
-        for offset, data in repeated:
+        interrupted = journal.found(self._file)  # changes of a writer that was killed or stopped by a power loss
+        for offset, data in interrupted:
             self._put(offset, data)
         self._pending: dict[int, bytes] = {}
         self.ours = True
         self._head = self._read_head()
         self.end = self._contents()
-        if repeated:
+        if interrupted:
             os.fsync(self.fileno())
             self._cut(self.end)
         self._starts, self._ends = [0], [self.end]  # disjoint written ranges in ascending order
 
     def _contents(self) -> int:
-        """Return the end of the contents of the file [bytes]."""
+        """Return the end of the contents of the file, which the superblock states [bytes]."""
         head, size = self._head, self._file.seek(0, os.SEEK_END)
-        known = head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8  # version 0, addresses of eight bytes
-        return min(int.from_bytes(head[40:48], "little"), size) if known else size
+        supported = (
+            head.startswith(SUPERBLOCK) and head[8] == 0 and head[13] == 8
+        )  # version 0, addresses of eight bytes
+        return min(int.from_bytes(head[40:48], "little"), size) if supported else size
 
     def _read_head(self) -> bytes:
         self._file.seek(0)
@@ -81,8 +87,8 @@ class CommittedFile(DriverFile):
 
     def intact(self) -> bool:
         """Return whether no other program has changed the superblock, which each flush changes, or truncated the file."""
-        cut = os.fstat(self.fileno()).st_size < self._ends[-1]
-        self.ours = self.ours and not cut and self._read_head() == self._head
+        truncated = os.fstat(self.fileno()).st_size < self._ends[-1]
+        self.ours = self.ours and not truncated and self._read_head() == self._head
         return self.ours
 
     @property
@@ -91,15 +97,15 @@ class CommittedFile(DriverFile):
         return self.ours and self.failure is None
 
     def _size(self) -> int:
-        waiting = max((offset + len(data) for offset, data in self._pending.items()), default=0)
-        return max(super()._size(), waiting)
+        pending_end = max((offset + len(data) for offset, data in self._pending.items()), default=0)
+        return max(super()._size(), pending_end)
 
     def _get(self, start: int, data: bytearray) -> None:
         super()._get(start, data)
         journal.overlay(self._pending.items(), start, data)
 
     def write(self, data: bytes) -> int:
-        """Buffer data for the current position; they replace earlier data at the same position."""
+        """Buffer data for the current position, where they replace other pending data."""
         data, start = bytes(data), self._position
         end = start + len(data)
         for offset in [p for p, old in self._pending.items() if p < end and start < p + len(old)]:
@@ -128,27 +134,27 @@ class CommittedFile(DriverFile):
                 self._head = self._read_head()  # the superblock may have been written
 
     def _commit(self) -> None:
-        waiting = sorted(self._pending.items(), key=lambda entry: self._turn(*entry))
-        n_new = sum(not self._overlaps(offset, offset + len(data)) for offset, data in waiting)
-        new = waiting[:n_new]
-        changes = [change for write in waiting[n_new:] if (change := self._changed(*write))[1]]
+        pending = sorted(self._pending.items(), key=lambda write: self._order(*write))
+        n_new = sum(not self._overlaps(offset, offset + len(data)) for offset, data in pending)
+        new = pending[:n_new]
+        changes = [change for write in pending[n_new:] if (change := self._changed(*write))[1]]
         for offset, data in new:
             self._put(offset, data)
-        for turn in journal.turns(changes) if self.synchronised else [changes]:
+        for batch in journal.batches(changes) if self.synchronised else [changes]:
             if self.synchronised:
-                self._synchronise(new, turn)
-            for offset, data in turn:
+                self._synchronise(new, batch)
+            for offset, data in batch:
                 self._put(offset, data)
             if self.synchronised:
                 os.fsync(self.fileno())
         self._head = self._read_head()
-        for offset, data in waiting:
-            self._note(offset, offset + len(data))
+        for offset, data in pending:
+            self._record(offset, offset + len(data))
         self._pending.clear()
 
     def _changed(self, offset: int, data: bytes) -> journal.Write:
         """Return the part of a write from the first to the last byte that differs from the file."""
-        if len(data) > COMPARED:
+        if len(data) > LONGEST_COMPARED:
             return offset, data
         stored = bytearray(len(data))
         super()._get(offset, stored)
@@ -168,7 +174,7 @@ class CommittedFile(DriverFile):
     def _cut(self, size: int) -> None:
         self._file.truncate(size)
 
-    def _turn(self, offset: int, data: bytes) -> tuple[int, int, int]:
+    def _order(self, offset: int, data: bytes) -> tuple[int, int, int]:
         """Return the sort key of a write: new blocks, superblock, nodes from the root down, other writes, name tables."""
         if not self._overlaps(offset, offset + len(data)):
             return 0, 0, offset
@@ -179,10 +185,11 @@ class CommittedFile(DriverFile):
         return (4 if data.startswith(NAMES) else 3), 0, offset
 
     def _overlaps(self, start: int, end: int) -> bool:
+        """Return whether a range overlaps a written range."""
         number = bisect.bisect_left(self._ends, start + 1)
         return number < len(self._starts) and self._starts[number] < end
 
-    def _note(self, start: int, end: int) -> None:
+    def _record(self, start: int, end: int) -> None:
         """Record a written range."""
         first, last = bisect.bisect_left(self._ends, start), bisect.bisect_right(self._starts, end)
         if first < last:
@@ -194,7 +201,7 @@ class CommittedFile(DriverFile):
         if self._file.closed:
             return
         try:
-            if self.failure is not None:  # the end that HDF5 has set may not be in the file
+            if self.failure is not None:  # the end that HDF5 has set may lie beyond the file
                 self._head = self._read_head()
                 self.end = self._contents()
             if self.ours:
@@ -223,7 +230,7 @@ def uninterrupted() -> Iterator[None]:
                     signal.signal(number, lambda *signal_and_frame: arrived.append(signal_and_frame))
             yield
     finally:
-        for which, frame in arrived:
-            handler = handlers[which]
+        for number, frame in arrived:
+            handler = handlers[number]
             assert callable(handler)
-            handler(which, frame)
+            handler(number, frame)

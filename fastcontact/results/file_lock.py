@@ -17,7 +17,7 @@ from fastcontact.results.committed_file import uninterrupted
 
 
 def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
-    """Reserve `size` bytes of an open file from the offset `start`; OSError if the disk has too little space."""
+    """Reserve `size` bytes of an open file from the offset `start`. Raises OSError if the disk has too little space."""
     if hasattr(os, "posix_fallocate"):
         try:
             os.posix_fallocate(descriptor, start, size)
@@ -29,8 +29,8 @@ def reserve(descriptor: int, folder: Path, start: int, size: int) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def left_at(path: Path) -> tuple[int, ...] | None:
-    """Return device, inode, size and modification time of the file at a path, or None if there is no file."""
+def file_state(path: Path) -> tuple[int, ...] | None:
+    """Return the device, inode, size and modification time of the file at a path, or None if there is no file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -58,18 +58,19 @@ class PathLock:
     def __init__(self, target: Path) -> None:
         self.path = target.with_name(f".{target.name}.lock")
         with uninterrupted():
-            self._take(target)
+            self._acquire(target)
 
-    def _take(self, target: Path) -> None:
+    def _acquire(self, target: Path) -> None:
         while True:
-            file = _own_file(self.path)
+            file = _open_lock_file(self.path)
             if not _lock(file):
                 file.seek(0)
                 holder = file.read().decode("ascii", "replace").strip() or "unknown"
                 file.close()
                 raise FileError(f"'{target}' is being written by process {holder}: wait for it or name another file")
-            if self._is_current(file):
-                break
+            with contextlib.suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(file.fileno()), os.stat(self.path)):
+                    break
             file.close()  # the previous holder removed the file between `open` and `lock`
         with contextlib.suppress(OSError):  # information for other processes, if the disk has space for it
             file.truncate(0)
@@ -77,17 +78,11 @@ class PathLock:
         # The finalizer releases the lock if an interrupt prevents the caller from doing so.
         self.release = weakref.finalize(self, _release, file, self.path, os.getpid())
 
-    def _is_current(self, file: IO[Any]) -> bool:
-        try:
-            return os.path.samestat(os.fstat(file.fileno()), os.stat(self.path))
-        except FileNotFoundError:
-            return False
-
 
 def _release(file: IO[Any], path: Path, holder: int) -> None:
     """Remove the lock file and release the lock; a process forked from `holder` does not remove the file."""
     if os.getpid() == holder:
-        with contextlib.suppress(OSError):  # on Windows open files are not removed, and a harmless lock file remains
+        with contextlib.suppress(OSError):  # Windows does not remove open files, so that a harmless lock file remains
             path.unlink()
     file.close()
 
@@ -102,8 +97,8 @@ def is_being_written(target: Path) -> bool:
         return not _lock(file)
 
 
-def _own_file(path: Path) -> IO[Any]:
-    """Open or create a lock file; FileError for a link or a file of another user, which would be modified."""
+def _open_lock_file(path: Path) -> IO[Any]:
+    """Open or create a lock file. Raises FileError for a link or a file of another user, which would be modified."""
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o644)
     except OSError as error:

@@ -1,10 +1,10 @@
-"""Write-ahead journal: writes with a checksum at the end of a file, which are executed again after a power loss.
+"""Write-ahead journal at the end of a file, whose changes are executed again after a power loss (Mohan et al., 1992).
 
 At a power loss, the writes since the last synchronisation of a disk may have been executed in any order, in part, or not at
-all. New data are harmless, since nothing refers to them yet, but records of HDF5 that are changed in place are not. These
-changes are therefore first written after the contents of the file, which no reader of HDF5 reads, with checksums of the new
-data. Once both are on the disk, the changes are executed; they are executed again when the file is opened after a power loss
-(write-ahead logging: Mohan et al., 1992).
+all. Incomplete new data are harmless, since nothing refers to them yet, but incomplete changes in place damage the file.
+These changes are therefore first written to a journal beyond the end of the HDF5 contents, which HDF5 ignores, together with
+checksums of the new data. They are executed when the journal and the new data are on the disk. They are executed again when
+the file is opened after a power loss.
 """
 
 from __future__ import annotations
@@ -20,10 +20,13 @@ from fastcontact.errors import FileError
 Write = tuple[int, bytes]
 MAGIC = b"fastcontact journal\n"
 FOOTER = struct.Struct(f"<Q32s{len(MAGIC)}s")  # length and SHA-256 of the writes
-HEADER = struct.Struct("<QQ?")  # offset and length of a write, and whether its checksum replaces its data
+HEADER = struct.Struct(
+    "<QQ?"
+)  # offset and length of a write, and whether it is new data, of which the checksum follows
 DIGEST = hashlib.sha256().digest_size
 # Largest size of the changes in a journal [bytes]. Larger changes are divided, so that a journal fits in memory.
 LARGEST = 1 << 28
+# Size of the pieces in which data are read for a checksum [bytes].
 PIECE = 1 << 20
 
 
@@ -38,25 +41,28 @@ def packed(new: Sequence[Write], changes: Sequence[Write]) -> bytes:
     return body + FOOTER.pack(len(body), hashlib.sha256(body).digest(), MAGIC)
 
 
-def turns(changes: Iterable[Write]) -> Iterator[list[Write]]:
-    """Divide changes in order into lists of at most LARGEST bytes; longer changes are split, and the last may be empty."""
-    turn, size = [], 0  # type: tuple[list[Write], int]
+def batches(changes: Iterable[Write]) -> Iterator[list[Write]]:
+    """Yield changes in lists of at most LARGEST bytes, in order.
+
+    Changes longer than LARGEST are split. Without changes there is one empty list.
+    """
+    batch, size = [], 0  # type: tuple[list[Write], int]
     for offset, data in changes:
         for start in range(0, len(data), LARGEST):
             piece = data[start : start + LARGEST]
             if size + len(piece) > LARGEST:
-                yield turn
-                turn, size = [], 0
-            turn.append((offset + start, piece))
+                yield batch
+                batch, size = [], 0
+            batch.append((offset + start, piece))
             size += len(piece)
-    yield turn
+    yield batch
 
 
 def found(file: IO[bytes]) -> list[Write]:
     """Return the changes in the journal of a file.
 
-    The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for an
-    invalid journal; its bounds are checked before data are read.
+    The list is empty if there is no journal, or if the journal or the new data are incomplete. Raises FileError for a journal
+    with a valid checksum but invalid lengths or offsets, which are checked before the new data are read.
     """
     size = file.seek(0, io.SEEK_END)
     if size < FOOTER.size:
@@ -66,47 +72,49 @@ def found(file: IO[bytes]) -> list[Write]:
     if magic != MAGIC or length > size - FOOTER.size:
         return []
     end = size - FOOTER.size - length  # end of the contents before the journal
-    if length > 2 * LARGEST:  # a bound of the changes with their headers and the checksums of new data
+    if length > 2 * LARGEST:  # an upper bound of the changes with their headers and of the checksums
         raise _forged(file, f"declares {length:.3g} bytes")
     file.seek(end)
     body = file.read(length)
     if hashlib.sha256(body).digest() != digest:
         return []
     records = list(_records(file, body))
-    new = [(offset, count, kept) for offset, count, is_new, kept in records if is_new]
+    new = [(offset, count, checksum) for offset, count, is_new, checksum in records if is_new]
     if sum(count for _, count, _ in new) > end:
         raise _forged(file, "counts data twice")
     if any(count and offset + count > end for offset, count, _, _ in records):
         raise _forged(file, "leads beyond the contents")
-    if any(_digest(file, offset, count) != kept for offset, count, kept in new):
+    if any(_digest(file, offset, count) != checksum for offset, count, checksum in new):
         return []
     return [(offset, data) for offset, _, is_new, data in records if not is_new]
 
 
 def _records(file: IO[bytes], body: bytes) -> Iterator[tuple[int, int, bool, bytes]]:
-    """Yield the offset, the length, whether it is new, and the data or the checksum of each write in a journal."""
-    at = 0
-    while at < len(body):
-        if at + HEADER.size > len(body):
+    """Yield (offset, length, whether the write is new data, data or checksum) for each write in a journal."""
+    position = 0
+    while position < len(body):
+        begin = position + HEADER.size
+        if begin > len(body):
             raise _forged(file, "is cut off")
-        offset, count, is_new = HEADER.unpack_from(body, at)
-        begin, at = at + HEADER.size, at + HEADER.size + (DIGEST if is_new else count)
-        if at > len(body):
+        offset, count, is_new = HEADER.unpack_from(body, position)
+        position = begin + (DIGEST if is_new else count)
+        if position > len(body):
             raise _forged(file, "is cut off")
-        yield offset, count, is_new, body[begin:at]
+        yield offset, count, is_new, body[begin:position]
 
 
 def _digest(file: IO[bytes], offset: int, count: int) -> bytes:
     """Return the SHA-256 hash of `count` bytes of a file from `offset`, which are read in pieces."""
-    hashed = hashlib.sha256()
+    digest = hashlib.sha256()
     file.seek(offset)
     while count > 0 and (piece := file.read(min(count, PIECE))):
-        hashed.update(piece)
+        digest.update(piece)
         count -= len(piece)
-    return hashed.digest()
+    return digest.digest()
 
 
 def _forged(file: IO[bytes], reason: str) -> FileError:
+    """Return the error for an invalid journal."""
     name = getattr(file, "name", "the file")
     return FileError(f"the journal at the end of '{name}' {reason}: it is damaged, compute the file again")
 

@@ -43,9 +43,9 @@ from fastcontact.results.step import ContactResult, StepResult
 
 
 def separated(mesh: Mesh, step: StepResult) -> tuple[Mesh, Numbers, Array]:
-    """Return the mesh cut along material interfaces, the node (m,) of each of its points, and the stress at them [pressure].
+    """Return the mesh cut along material interfaces, and the node (m,) and the stress of each of its points [pressure].
 
-    The first points of the cut mesh are those of `mesh`; it has only solid cells and no groups. The stress (m, n_components)
+    The first points of the cut mesh are those of `mesh`. It has only solid cells and no groups. The stress (m, n_components)
     has the components of `StepResult.stress`. Without interfaces, `mesh` itself is returned.
     """
     material_stress = step.material_stress
@@ -64,7 +64,7 @@ def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
 
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
-    """Return the mean (n_solids, n_components) of the nodal stress of its material over the nodes of each cell [pressure]."""
+    """Return for each cell the mean (n_solids, n_components) over its nodes of the nodal stress of its material [pressure]."""
     separate_mesh, _, stress = separated(mesh, step)
     return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])
 
@@ -109,17 +109,17 @@ XDMF_TYPES = {
 
 STEP_ROW = np.dtype([("index", "<i8"), ("load_factor", "<f8"), ("notes_first", "<i8"), ("notes_count", "<i8")])
 
-# Columns that contain the first row and the number of rows of a contact pair at a step.
+# Columns that contain the first row and the number of rows of the secondary and of the primary nodes of a pair at a step.
 PLACES = ("first", "count", "primary_first", "primary_count")
 
-# Row of a step: first row and number of rows of its nodal stress by material.
+# Row of a step in the table of materials: the first row and the number of rows of its nodal stress by material.
 SIDES_STEP = np.dtype([("first", "<i8"), ("count", "<i8")])
 
 # Row of a run: number of completed steps, and the position of its record in the notes.
 RUN_ROW = np.dtype([("n_steps", "<i8"), ("first", "<i8"), ("count", "<i8")])
 
 
-# Objects, besides the steps, without which a file cannot be resumed.
+# Objects, in addition to the steps, without which an analysis cannot be resumed from a file.
 CONTINUED = (
     "fastcontact/runs", "fastcontact/notes", "fastcontact/contact", "VTKHDF/CellData", "VTKHDF/Types", "VTKHDF/Steps/Values",
     "VTKHDF/Steps/PointDataOffsets", "VTKHDF/Steps/CellDataOffsets",
@@ -134,14 +134,14 @@ def restart_table(number: int) -> str:
     return f"restart{number % 2}"
 
 
-def further_columns(contact: ContactResult) -> tuple[str, ...]:
+def optional_columns(contact: ContactResult) -> tuple[str, ...]:
     """Return the `OPTIONAL_COLUMNS` that a pair has."""
     return tuple(name for name in OPTIONAL_COLUMNS if getattr(contact, name) is not None)
 
 
-def contact_row(dim: int, further: Iterable[str] = ()) -> np.dtype[Any]:
-    """Return the data type of the row of a secondary node of a pair at a step; `further` are its `further_columns`."""
-    names = ("abscissa", "place", "gap", "pressure", "multiplier", *further)
+def contact_row(dim: int, optional: Iterable[str] = ()) -> np.dtype[Any]:
+    """Return the data type of the row of a secondary node of a pair at a step; `optional` are its `optional_columns`."""
+    names = ("abscissa", "place", "gap", "pressure", "multiplier", *optional)
     scalars = [(name, "<f8") for name in names]
     vectors = [
         (name, "<f8", (dim,)) for name in ("coordinates", "force_vectors", "normal", "shear", "slip", "slip_total")
@@ -202,10 +202,10 @@ def solid_cells(mesh: Mesh) -> SolidCells:
 def xdmf_topology(mesh: Mesh) -> Numbers | None:
     """Return, in sequence, the XDMF code and the nodes of each solid cell, or None if XDMF does not support an element."""
     codes = [XDMF_TYPES.get(elements.get(name).vtk) for name in mesh.solids]
-    known = [code for code in codes if code is not None]
-    if not codes or len(known) < len(codes):
+    supported = [code for code in codes if code is not None]
+    if not codes or len(supported) < len(codes):
         return None
-    blocks = [np.insert(block, 0, code, axis=1).ravel() for code, block in zip(known, mesh.solids.values())]
+    blocks = [np.insert(block, 0, code, axis=1).ravel() for code, block in zip(supported, mesh.solids.values())]
     return np.concatenate(blocks).astype(np.int32)
 
 
@@ -259,7 +259,7 @@ def point_fields(mesh: Mesh, step: StepResult) -> dict[str, Array]:
 
 
 def point_flags(mesh: Mesh) -> dict[str, Flags]:
-    """Return a flag (n_points,) for each group of points or facets, called ``group_<name>``: 1 inside and 0 outside."""
+    """Return a flag (n_points,) for each group of points or facets, called ``group_<name>``, which is 1 in the group."""
     members = {}
     for name in mesh.group_names:
         if name in mesh.point_groups:
@@ -281,8 +281,8 @@ def cell_fields(mesh: Mesh) -> dict[str, AnyArray]:
     return {"body": topology.bodies(mesh)[1][first], **_flags(members, len(first))}
 
 
-def _plain(name: str) -> str:
-    """Return a name in ASCII without slashes: old viewers require ASCII, and slashes separate groups in HDF5."""
+def _ascii(name: str) -> str:
+    """Return a name in ASCII, which old viewers require, without slashes, which separate groups in HDF5."""
     letters = unicodedata.normalize("NFKD", name.replace("/", "_"))
     return "".join(c if c.isascii() else "_" for c in letters if not unicodedata.combining(c))
 
@@ -290,7 +290,7 @@ def _plain(name: str) -> str:
 def _flags(members: dict[str, AnyArray], count: int) -> dict[str, Flags]:
     flags: dict[str, Flags] = {}
     for group, numbers in members.items():
-        name = f"group_{_plain(group)}"
+        name = f"group_{_ascii(group)}"
         while name in flags:
             name += "_"
         flags[name] = np.zeros(count, np.int8)
@@ -321,19 +321,19 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
             )
 
 
-def check_contact(where: str, contact: ContactResult, mesh: Mesh) -> None:
-    """Raise FileError if the arrays of a pair are inconsistent or contain points that are not in the mesh."""
-    row = contact_row(mesh.dim, further_columns(contact))
+def check_contact(caption: str, contact: ContactResult, mesh: Mesh) -> None:
+    """Raise FileError, whose message begins with `caption`, if the arrays of a pair are inconsistent or do not fit the mesh."""
+    row = contact_row(mesh.dim, optional_columns(contact))
     for name in row.names or ():
         shape_given, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)
         if shape_given != shape:
-            raise FileError(f"{where}: {name} has shape {shape_given}, but {shape} is needed")
+            raise FileError(f"{caption}: {name} has shape {shape_given}, but {shape} is needed")
     if np.shape(contact.primary_force_vectors) != (len(contact.primary_points), mesh.dim):
         raise FileError(
-            f"{where}: primary_force_vectors has shape {np.shape(contact.primary_force_vectors)}, but "
+            f"{caption}: primary_force_vectors has shape {np.shape(contact.primary_force_vectors)}, but "
             f"{(len(contact.primary_points), mesh.dim)} is needed"
         )
-    named = np.concatenate([contact.points, contact.primary_points])
-    outside = named[(named < 0) | (named >= mesh.n_points)]
+    points = np.concatenate([contact.points, contact.primary_points])
+    outside = points[(points < 0) | (points >= mesh.n_points)]
     if len(outside):
-        raise FileError(f"{where}: point {outside[0]} is not in the mesh of {mesh.n_points} points")
+        raise FileError(f"{caption}: point {outside[0]} is not in the mesh of {mesh.n_points} points")

@@ -23,8 +23,8 @@ STRESSES = {"SIXX": 0, "SIYY": 1, "SIZZ": 2, "SIXY": 3, "SIXZ": 5, "SIYZ": 4}
 def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *, mesh_name: str = "mesh") -> None:
     """Write a mesh and the nodal results of all steps to a MED file, for Salome and ParaVis.
 
-    The file contains the following fields, whose instants are the load factors and whose order numbers are the indices of
-    the steps:
+    The file contains the following fields. Their instants are the load factors, and their order numbers the indices of the
+    steps:
 
     - DEPL (DX, DY [, DZ]): displacement [length].
     - SIEF_NOEU (SIXX, SIYY, SIZZ, SIXY [, SIXZ, SIYZ]): stress, in axisymmetry radial, axial, hoop and shear [pressure].
@@ -41,7 +41,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
     mesh : Mesh
         The mesh of the steps.
     steps : iterable of StepResult
-        Steps, which are taken one by one, so that a generator can be passed.
+        Steps, of which only one is in memory at a time if a generator is passed.
     mesh_name : str
         Name of the mesh in the file, at most 64 bytes.
 
@@ -82,7 +82,7 @@ def write_med_results(path: PathLike, mesh: Mesh, steps: Iterable[StepResult], *
 
 
 def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Return the component names and the values (n_points, n_components) of each field, by name."""
+    """Return the names of the components and the values (n_points, n_components) of each field, by name."""
     directions = tuple(f"D{axis}" for axis in AXES[: mesh.dim])
     stresses = tuple(STRESSES)[: 4 if mesh.dim == 2 else 6]
     stress = _checked(mesh, step, "stress")
@@ -99,6 +99,7 @@ def _fields(mesh: Mesh, step: StepResult) -> dict[str, tuple[tuple[str, ...], Ar
 
 
 def _checked(mesh: Mesh, step: StepResult, name: str) -> Array:
+    """Return the nodal array `name` of a step after a check of its shape."""
     field, shape = np.asarray(getattr(step, name), np.float64), step_shapes(mesh)[name]
     if field.shape != shape:
         raise MeshError(

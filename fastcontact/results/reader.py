@@ -1,4 +1,4 @@
-"""Read result files; neither the model nor the mesh file is needed."""
+"""Reading of result files, which requires neither the model nor the mesh file."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _unpacked(kind: struct.Struct, raw: Any, offset: int, end: int) -> tuple[Any
 if TYPE_CHECKING:
     import pandas
 
-# Contact resultants for which a NaN in the file represents None.
+# Columns of the row of a contact pair in which NaN represents None.
 NAN_IS_NONE = ("obstacle_displacement", "obstacle_angle", "torque", "tangent")
 
 
@@ -149,8 +149,8 @@ class Results(StepSequence):
     def __init__(self, path: PathLike, *, repeat: bool | None = None) -> None:
         """Open the file.
 
-        Changes in the journal, which a power loss may have interrupted, are applied to the data read, but not to the file.
-        They are ignored while the file is being written, unless `repeat`, which requires that no other program writes to it.
+        Changes in the journal, which a power loss may have interrupted, are applied to the data that are read, but not to the
+        file. While another program writes to the file they are ignored; `repeat` states that there is no such program.
         """
         import h5py
 
@@ -174,7 +174,7 @@ class Results(StepSequence):
             raise
 
     def _checked(self) -> Any:
-        """Return the HDF5 group of fastcontact in the file, after a check of its schema."""
+        """Return the HDF5 group of fastcontact after a check of the file and of its schema."""
         if self._file.userblock_size or self._file.id.get_create_plist().get_sizes() != (8, 8):
             raise ValueError("its superblock differs from that of result files")
         check_contents(self._file, self.path)
@@ -213,7 +213,7 @@ class Results(StepSequence):
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *step_warnings]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
-        """Return the record of the end of the run; None during the run, after a crash, and if steps were added later."""
+        """Return the record of the end of the run. It is None during the run, after a crash, and if steps were added later."""
         if "runs" not in group:  # schema 1
             return _read_json(group["run"], self._raw) if "run" in group else None
         rows = group["runs"][-1:]
@@ -224,9 +224,9 @@ class Results(StepSequence):
     def __len__(self) -> int:
         return self._n_steps
 
-    def _chosen(self, number: int | slice) -> int | range:
+    def _positions(self, number: int | slice) -> int | range:
         try:
-            return super()._chosen(number)
+            return super()._positions(number)
         except IndexError:
             raise IndexError(
                 f"'{self.path}' has {self._n_steps} steps, so there is no step at position {number}"
@@ -238,7 +238,7 @@ class Results(StepSequence):
             raise FileError(text) from None
 
     def lacks(self, names: Sequence[str]) -> list[str]:
-        """Return those of the HDF5 paths `names` that the file does not contain."""
+        """Return the HDF5 paths in `names` that the file does not contain."""
         return [name for name in names if name not in self._file]
 
     def __enter__(self) -> Results:
@@ -253,9 +253,9 @@ class Results(StepSequence):
 
     def _repr_html_(self) -> str:
         """Return tables of the contents and of the last step for notebooks."""
-        reached = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
+        steps = f"{self._n_steps}, to load factor {self.load_factors[-1]:.6g}" if self._n_steps else "none yet"
         rows = [
-            ("steps", reached),
+            ("steps", steps),
             ("run", "complete" if self.complete else self.error or "incomplete"),
             ("kinematics", self.kinematics),
             (
@@ -394,8 +394,8 @@ class Results(StepSequence):
     @property
     def cell_field_names(self) -> list[str]:
         """Names of the cell fields that the file contains for each step."""
-        static = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
-        return [name for name in self._file["VTKHDF/CellData"] if name not in static]
+        others = {*layout.cell_fields(self.mesh), *layout.MATERIAL_FIELDS, "material"}
+        return [name for name in self._file["VTKHDF/CellData"] if name not in others]
 
     def _cell_fields(self, number: int) -> dict[str, Array]:
         data, n = self._file["VTKHDF/CellData"], len(self._file["VTKHDF/Types"])
@@ -484,7 +484,7 @@ def _read_contact(pair: Any, number: int, name: str, formulation: str) -> Contac
     columns: dict[str, Any] = {column: np.ascontiguousarray(rows[column]) for column in rows.dtype.names}
     for mask in {"active", "sticking"} & set(columns):
         columns[mask] = columns[mask].astype(bool)
-    # Files of earlier versions lack some of these data; the defaults of ContactResult then apply.
+    # For data that files of earlier versions lack, the defaults of ContactResult apply.
     resultants: dict[str, Any] = {}
     for column in set(step.dtype.names).difference(layout.PLACES):
         value = step[column]

@@ -1,4 +1,4 @@
-"""Results of load steps as plain data, and sequences of steps."""
+"""Results of load steps, and sequences of steps."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class MaterialStress:
     stress: Array
 
     def at(self, point: int) -> dict[int, Array]:
-        """Return the stress (4,) or (6,) [pressure] of each material at a node.
+        """Return the stress (4,) or (6,) of each material at a node [pressure].
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class MaterialStress:
 
 
 def by_largest_von_mises(
-    sides: MaterialSides, cells: Numbers, at_places: Array, n_points: int
+    sides: MaterialSides, cells: Numbers, separated: Array, n_points: int
 ) -> tuple[Array, MaterialStress]:
     """Return the nodal stress (n_points, n_components) [pressure] and the stress of each material at interfaces.
 
@@ -70,8 +70,8 @@ def by_largest_von_mises(
         Nodes at material interfaces.
     cells : ndarray of int (n_solids,)
         Material number of each solid cell.
-    at_places : ndarray (n_places, n_components)
-        Stress at the nodes of the mesh that is cut along interfaces [pressure].
+    separated : ndarray (m, n_components)
+        Stress at the m points of the mesh that is cut along interfaces, see `MaterialSides` [pressure].
     n_points : int
         Number of points of the mesh.
 
@@ -82,7 +82,7 @@ def by_largest_von_mises(
     material_stress : MaterialStress
         Stress of each material at interfaces.
     """
-    stress, values = at_places[:n_points].copy(), at_places[sides.place]
+    stress, values = separated[:n_points].copy(), separated[sides.place]
     order = np.lexsort((recovery.von_mises(values), sides.points))  # the last row of each node has the largest
     stress[sides.points[order]] = values[order]
     return stress, MaterialStress(cells, sides.points, sides.material, values)
@@ -107,11 +107,11 @@ def force_text(parts: Sequence[float], normal_force: float, units: Mapping[str, 
 def half_width(place: Array, closed: Mask, across: Array | None = None) -> tuple[float, float]:
     """Return a lower and an upper bound of the half-width of a contact [length]; (NaN, NaN) if no node is closed.
 
-    `place` (n,) [length] contains the positions of the nodes relative to the middle, with a sign if they lie on both sides
-    of it, and `closed` (n,) states which nodes are closed. The lower bound is half the distance between the two outermost
-    closed nodes, the upper bound half the distance between the next nodes beyond them. Distances are measured in `across`
-    (n,) [length], by default `place`. If all nodes lie on one side, the contact is assumed to be symmetric. The upper bound
-    is infinite if there is no node beyond the closed ones.
+    `place` (n,) contains the positions of the nodes relative to the middle, with a sign if they lie on both sides of it
+    [length], and `closed` (n,) is the mask of closed nodes. The lower bound is half the distance between the two outermost
+    closed nodes, the upper bound half the distance between the next nodes beyond them. Distances are differences of
+    `across` (n,), by default `place` [length]. If all nodes lie on one side, the contact is assumed to be symmetric. The
+    upper bound is infinite if there is no node beyond the closed ones.
     """
     if not closed.any():
         return float("nan"), float("nan")
@@ -271,7 +271,7 @@ class ContactResult(Suggesting):
                 f"coordinates of a ContactResult must be an array (m, dim), not {type(self.coordinates).__name__}"
             )
         dim = self.coordinates.shape[1]
-        defaults = {  # result files of earlier versions do not contain these positions
+        defaults = {  # of attributes that result files of earlier versions do not contain
             "middle": lambda: np.zeros(dim),
             "place": lambda: np.abs(self.coordinates[:, 0]) if dim == 2 else np.array(self.abscissa),
             "primary_points": lambda: np.empty(0, np.int32),
@@ -313,7 +313,7 @@ class ContactResult(Suggesting):
 
     @property
     def extent(self) -> str:
-        """What `radius` is: "radius", or "half-width" in 2D unless it is measured from the axis."""
+        """Term for the quantity `radius`: "radius", or "half-width" in 2D unless it is measured from the axis."""
         return "radius" if self.coordinates.shape[1] == 3 or self.measured_from_axis else "half-width"
 
     @property
@@ -321,8 +321,9 @@ class ContactResult(Suggesting):
         """Whether forces are per unit thickness, as in plane models."""
         if self.coordinates.shape[1] == 3 or self.measured_from_axis:
             return False
-        across, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
-        return bool(abs(self.force[0] - across) <= 1e-9 * size and size > 0.0)
+        # In axisymmetry the resultant has no radial component, but the nodal forces have.
+        force_x, size = float(self.force_vectors[:, 0].sum()), float(np.abs(self.force_vectors).sum())
+        return bool(abs(self.force[0] - force_x) <= 1e-9 * size and size > 0.0)
 
     @property
     def stick_radius(self) -> tuple[float, float]:
@@ -349,9 +350,9 @@ class ContactResult(Suggesting):
     def force_parts(self) -> tuple[float, float, float]:
         """Magnitudes of `force` and of its normal and tangential parts [force]; without friction the last is zero."""
         normal = np.where(np.isfinite(self.normal), self.normal, 0.0)
-        along = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
-        along = np.where(self.force == 0.0, 0.0, along)  # radial forces of axisymmetric models balance each other
-        total, normal_part, tangential = np.linalg.norm([self.force, along, self.force - along], axis=1)
+        part = np.einsum("nd,nd->n", self.force_vectors, normal) @ normal if self.shear.any() else self.force
+        part = np.where(self.force == 0.0, 0.0, part)  # radial forces of axisymmetric models balance each other
+        total, normal_part, tangential = np.linalg.norm([self.force, part, self.force - part], axis=1)
         return float(total), float(normal_part), float(tangential)
 
     @property
@@ -460,8 +461,10 @@ class StepResult(Suggesting):
     def __post_init__(self) -> None:
         if not isinstance(self.contact, Mapping):
             raise FastcontactError(f"contact of a StepResult must be a dict, not {type(self.contact).__name__}")
-        named = {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
-        object.__setattr__(self, "contact", ContactsByName(named or self.contact))
+        with_units = (
+            {name: replace(pair, units=self.units) for name, pair in self.contact.items()} if self.units else {}
+        )
+        object.__setattr__(self, "contact", ContactsByName(with_units or self.contact))
 
     @property
     def instant(self) -> str:
@@ -471,14 +474,14 @@ class StepResult(Suggesting):
     @property
     def shown(self) -> dict[str, str]:
         """Names and values of the load factor, the largest displacement and stress, and the iterations, for reprs."""
-        moved, stressed = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
+        displacement, stress = (float(np.abs(field).max(initial=0.0)) for field in (self.displacement, self.von_mises))
         shown = {
             self.iterations.get("parameter", "load factor"): f"{self.load_factor:.6g}",
-            "largest displacement": with_unit(f"{moved:.6g}", self.units, "length"),
-            "largest von Mises stress": with_unit(f"{stressed:.6g}", self.units, "pressure"),
+            "largest displacement": with_unit(f"{displacement:.6g}", self.units, "length"),
+            "largest von Mises stress": with_unit(f"{stress:.6g}", self.units, "pressure"),
         }
-        named = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
-        return shown | {text: str(self.iterations[key]) for key, text in named.items() if key in self.iterations}
+        labels = {"geometry_updates": "geometry updates", "active_set_iterations": "active-set iterations"}
+        return shown | {label: str(self.iterations[key]) for key, label in labels.items() if key in self.iterations}
 
     def __repr__(self) -> str:
         pairs = [
@@ -569,8 +572,8 @@ class StepResult(Suggesting):
         return stress
 
 
-# Largest number of steps in the representation of a list.
-SHOWN = 30
+# Largest number of steps that the representation of a list shows.
+MOST_SHOWN = 30
 
 
 class StepSequence(Sequence[StepResult]):
@@ -585,10 +588,10 @@ class StepSequence(Sequence[StepResult]):
     def __getitem__(self, number: slice) -> list[StepResult]: ...
     def __getitem__(self, number: int | slice) -> StepResult | list[StepResult]:
         """Return a step by its index, or a list of steps for a slice."""
-        chosen = self._chosen(number)
-        return self._step(chosen) if isinstance(chosen, int) else [self._step(position) for position in chosen]
+        positions = self._positions(number)
+        return self._step(positions) if isinstance(positions, int) else [self._step(position) for position in positions]
 
-    def _chosen(self, number: int | slice) -> int | range:
+    def _positions(self, number: int | slice) -> int | range:
         """Return the position of a step, or the positions of a slice."""
         return range(len(self))[number]
 
@@ -608,12 +611,12 @@ class Steps(list[StepResult]):
 
     def __repr__(self) -> str:
         lines = (f"  {step!r}" for step in _shown(self))
-        return "\n".join([f"{len(self)} steps", *lines, *(["  ..."] if len(self) > SHOWN else [])])
+        return "\n".join([f"{len(self)} steps", *lines, *(["  ..."] if len(self) > MOST_SHOWN else [])])
 
     def _repr_html_(self) -> str:
         """Return an HTML table with a row for each contact pair of each step."""
         rows = [row for step in _shown(self) for row in rows_of(step)]
-        left_out = f", {len(self) - SHOWN} of them not shown" if len(self) > SHOWN else ""
+        left_out = f", {len(self) - MOST_SHOWN} of them not shown" if len(self) > MOST_SHOWN else ""
         return html_table(rows, HEAD, f"{len(self)} steps{left_out}")
 
 
@@ -621,15 +624,15 @@ HEAD = ("step", "load factor", "geometry updates", "contact", "force", "largest 
 
 
 def _shown(steps: Steps) -> Iterable[StepResult]:
-    """Return the steps in the representation, which are the last steps of a long list."""
-    return list(steps)[-SHOWN:]
+    """Return the last MOST_SHOWN steps, which the representation of a list shows."""
+    return list(steps)[-MOST_SHOWN:]
 
 
 def rows_of(step: StepResult) -> list[tuple[str, ...]]:
     """Return a row of strings with the columns `HEAD` for each contact pair of a step, or one row if there are no pairs."""
-    begin = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
+    leading = (str(step.index), f"{step.load_factor:.6g}", str(step.iterations.get("geometry_updates", "")))
     pairs = [(name, *contact.shown.values()) for name, contact in step.contact.items()]
-    return [(*begin, *pair) for pair in pairs] or [(*begin, *[""] * (len(HEAD) - len(begin)))]
+    return [(*leading, *pair) for pair in pairs] or [(*leading, *[""] * (len(HEAD) - len(leading)))]
 
 
 def phases(shape: StepResult, count: int) -> list[StepResult]:
@@ -639,12 +642,11 @@ def phases(shape: StepResult, count: int) -> list[StepResult]:
     """
     if count < 2:
         raise ModelError(f"count = {count}: a period needs two phases or more")
-    return [_times(shape, k + 1, k / count, math.cos(2.0 * math.pi * k / count)) for k in range(count)]
-
-
-def _times(shape: StepResult, index: int, phase: float, factor: float) -> StepResult:
-    return replace(
-        shape, index=index, load_factor=phase, displacement=factor * shape.displacement, stress=factor * shape.stress,
-        von_mises=abs(factor) * shape.von_mises, von_mises_signed=factor * shape.von_mises_signed, restart=None,
-        iterations={"parameter": "phase"},
-    )  # fmt: skip
+    return [
+        replace(
+            shape, index=k + 1, load_factor=k / count, displacement=factor * shape.displacement,
+            stress=factor * shape.stress, von_mises=abs(factor) * shape.von_mises,
+            von_mises_signed=factor * shape.von_mises_signed, restart=None, iterations={"parameter": "phase"},
+        )
+        for k, factor in enumerate(np.cos(2.0 * np.pi * np.arange(count) / count).tolist())
+    ]  # fmt: skip

@@ -71,7 +71,7 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
     array([2., 2., 2., 2., 2., 2., 2.])
     """
     columns = {
-        **_places(contact.points, contact.coordinates, contact.abscissa),
+        **_positions(contact.points, contact.coordinates, contact.abscissa),
         "radius": np.abs(contact.place),
         "place": contact.place,
         "gap": contact.gap,
@@ -87,14 +87,12 @@ def contact_table(contact: ContactResult, step: StepResult | None = None) -> Any
     }
     if step is not None:
         fields = _fields(step, contact.points)
-        without_von_mises = {
-            name: values for name, values in fields.items() if name not in ("von_mises", "von_mises_signed")
-        }
-        columns |= without_von_mises | {"normal_stress": normal_stress(contact, step)} | fields
+        equivalent = {name: fields.pop(name) for name in ("von_mises", "von_mises_signed")}
+        columns |= fields | {"normal_stress": normal_stress(contact, step)} | equivalent
     table = structured(columns)
     if contact.abscissa.any() or contact.coordinates.shape[1] == 3:
         return table
-    # A closed line, or one in several pieces, has no abscissa.
+    # A closed line and a line of several pieces have no abscissa.
     return table[np.argsort(contact.place, kind="stable")]
 
 
@@ -185,9 +183,9 @@ def line_table(mesh: Mesh, step: StepResult, group: str, start: str | int | None
     array([ 0.   , -0.001, -0.002])
     """
     line = ordered_line(mesh, group, start)
-    places = mesh.points[line.points]
-    radius = np.abs(places[:, 0]) if mesh.dim == 2 else np.hypot(places[:, 0], places[:, 2])
-    columns = {**_places(line.points, places, line.abscissa), "radius": radius}
+    x = mesh.points[line.points]
+    radius = np.abs(x[:, 0]) if mesh.dim == 2 else np.hypot(x[:, 0], x[:, 2])
+    columns = {**_positions(line.points, x, line.abscissa), "radius": radius}
     return structured(columns | _fields(step, line.points))
 
 
@@ -247,7 +245,7 @@ def _text(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, float):
         text = f"{value:.17g}"
-        return text if text.strip("-0123456789") else text + ".0"  # otherwise readers would parse an integer
+        return text if text.strip("-0123456789") else text + ".0"  # without it, readers would parse an integer
     return str(value)
 
 
@@ -272,12 +270,12 @@ def _by_axis(prefix: str, vectors: AnyArray) -> Columns:
     return {f"{prefix}{axis}": vectors[:, i] for i, axis in enumerate(AXES[: vectors.shape[1]])}
 
 
-def _places(points: AnyArray, coordinates: AnyArray, abscissa: AnyArray) -> Columns:
+def _positions(points: AnyArray, coordinates: AnyArray, abscissa: AnyArray) -> Columns:
     return {"point": points, **_by_axis("", coordinates), "abscissa": abscissa}
 
 
 def _fields(step: StepResult, points: AnyArray) -> Columns:
-    """Return displacement, stress and von Mises stress at some points."""
+    """Return the columns of displacement, stress and von Mises stress at `points` (m,)."""
     stress = step.stress[points]
     return {
         **_by_axis("displacement_", step.displacement[points]),
@@ -295,7 +293,7 @@ LEADING = ("step", "load_factor", "contact")
 
 
 def library(name: str, title: str, install: str) -> Any:
-    """Import a library; FileError with the installation command if it is missing."""
+    """Import a library. Raises FileError with the installation command if the library is missing."""
     try:
         return importlib.import_module(name)
     except ImportError as error:
@@ -378,8 +376,8 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
     data = {}
     for name, (dims, quantity, of_step) in fields.items():
         values = np.array([of_step(step) for step in all_steps], np.float64)
-        shaped = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
-        data[name] = (("step", *dims), shaped, _unit(units, quantity))
+        values = values.reshape(len(all_steps), *(sizes[name_of_dim] for name_of_dim in dims))
+        data[name] = (("step", *dims), values, _unit(units, quantity))
     coordinates = {
         "step": [step.index for step in all_steps],
         "load_factor": ("step", [step.load_factor for step in all_steps]),
@@ -387,8 +385,8 @@ def dataset(mesh: Mesh, steps: Iterable[StepResult], units: dict[str, str]) -> A
         "stress_component": components,
         "contact": pairs,
     }
-    places = {AXES[k]: (("point",), mesh.points[:, k], _unit(units, "length")) for k in range(dim)}
-    return xarray.Dataset(data, coordinates | places)
+    positions = {AXES[k]: (("point",), mesh.points[:, k], _unit(units, "length")) for k in range(dim)}
+    return xarray.Dataset(data, coordinates | positions)
 
 
 def _unit(units: dict[str, str], quantity: str) -> dict[str, str]:

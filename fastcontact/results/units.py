@@ -1,10 +1,10 @@
-"""Names of units in labels of results."""
+"""Names of units in the labels and texts of results."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-# Kind of unit of the columns of tables, by prefixes of their names.
+# Quantities of the columns of tables, by the beginnings of their names.
 COLUMNS = {
     **dict.fromkeys(("abscissa", "radius", "place", "gap", "displacement_", "slip_", "wear"), "length"),
     **dict.fromkeys(("pressure", "stress_", "normal_stress", "von_mises", "shear_", "fluid_pressure"), "pressure"),
@@ -13,15 +13,15 @@ COLUMNS = {
 
 
 def known_units(units: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of the units of length, force and pressure; empty if a unit is unknown or given as a dash.
+    """Return the names of all units, which include those of length, force and pressure; unknown units and dashes are empty.
 
     Examples
     --------
     >>> known_units({"length": "mm", "force": "-"})
     {'length': 'mm', 'force': '', 'pressure': ''}
     """
-    units_known = {"length": "", "force": "", "pressure": "", **units}
-    return {key: "" if name == "-" else name for key, name in units_known.items()}
+    names = {"length": "", "force": "", "pressure": "", **units}
+    return {key: "" if name == "-" else name for key, name in names.items()}
 
 
 def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str]:
@@ -37,15 +37,15 @@ def units_of_results(units: Mapping[str, str], kinematics: str) -> dict[str, str
     >>> units_of_results({"length": "m", "force": "N"}, "3d")
     {'length': 'm', 'force': 'N', 'pressure': '', 'penalty': '', 'moment': 'N m', 'stiffness': 'N/m'}
     """
-    known = known_units(units)
-    length, force, pressure = known["length"], known["force"], known["pressure"]
-    known["penalty"] = f"{pressure}/{length}" if pressure and length else ""
+    names = known_units(units)
+    length, force, pressure = names["length"], names["force"], names["pressure"]
+    names["penalty"] = f"{pressure}/{length}" if pressure and length else ""
     if not (length and force):
-        return {**known, "moment": "", "stiffness": ""}
+        return {**names, "moment": "", "stiffness": ""}
     if kinematics not in ("plane_strain", "plane_stress") or "/" in force:
-        return {**known, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
+        return {**names, "moment": f"{force} {length}", "stiffness": f"{force}/{length}"}
     per_thickness = {"moment": f"{force} {length}/{length}", "stiffness": f"{force}/{length}^2"}
-    return {**known, "force": f"{force}/{length}", **per_thickness}
+    return {**names, "force": f"{force}/{length}", **per_thickness}
 
 
 def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, str]:
@@ -64,13 +64,13 @@ def column_units(columns: Iterable[str], units: Mapping[str, str]) -> dict[str, 
 
 
 def labelled(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return the label of an axis or a column with its unit, if the unit is known."""
+    """Return a label with the unit of its quantity in brackets, if the unit is known."""
     unit = units.get(quantity, "")
     return f"{text} [{unit}]" if unit and unit != "-" else text
 
 
 def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 4) -> str:
-    """Return a value as text with its unit, if the unit is known; values below a million have no power of ten.
+    """Return a value as text with its unit, if the unit is known. Values from 1e`digits` to a million are rounded integers.
 
     Examples
     --------
@@ -82,5 +82,5 @@ def valued(value: float, units: Mapping[str, str], quantity: str, digits: int = 
 
 
 def with_unit(text: str, units: Mapping[str, str], quantity: str) -> str:
-    """Return a string with one or several values, followed by their unit if it is known."""
+    """Return the `text` of one or several values, followed by their unit if it is known."""
     return f"{text} {units.get(quantity, '')}".removesuffix(" -").rstrip()

@@ -1,6 +1,6 @@
 """Functions that write the arrays of a result file: groups and empty tables when it is created, and the data of each step.
 
-The data of a step become valid when the writer increments the number of steps, which it does last.
+The data of a step become valid when the writer finally increments the number of steps.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import layout
 from fastcontact.results.step import ContactResult, MaterialStress, StepResult
 
-# Chunk sizes: number of rows of a growing table, and of bytes of a growing text.
+# Sizes of the chunks of growing tables [rows] and of growing texts [bytes].
 ROWS, BYTES = 64, 4096
-# Largest size of a chunk with the fields of several steps [bytes].
+# Largest size of a chunk that contains the fields of several steps [bytes].
 SHARED = 4096
 
 
@@ -29,9 +29,9 @@ def write_geometry(
 ) -> None:
     """Write the group /VTKHDF with the solid cells, the constant arrays and empty tables for the steps.
 
-    `growing` are the names of cell fields of steps. With `heat`, steps have the `layout.HEAT_FIELDS`. `material` (n_solids,)
-    contains the material number of each cell of a model with material interfaces, whose steps have the stress of each
-    material.
+    `growing` are the names of the cell fields of steps. With `heat`, steps have the `layout.HEAT_FIELDS`. `material`
+    (n_solids,) contains the material number of each cell of a model with material interfaces, whose steps also have the
+    `layout.MATERIAL_FIELDS`.
     """
     root = file.create_group("VTKHDF")
     root.attrs["Version"] = np.array([2, 0], np.int64)
@@ -88,7 +88,7 @@ def _write_steps_group(
         growing_table(cell_offsets, name, np.int64)
 
 
-def write_own(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
+def write_case(file: Any, mesh: Mesh, kinematics: str, case_text: str, units: Mapping[str, str]) -> None:
     """Write the group /fastcontact with the mesh, all its cells and groups, the case, and empty tables for the steps."""
     import h5py
 
@@ -175,8 +175,8 @@ class OpenObjects(dict[str, Any]):
         self.file = file
 
     def __missing__(self, path: str) -> Any:
-        self[path] = known = self.file.get(path)
-        return known
+        self[path] = opened = self.file.get(path)
+        return opened
 
 
 def append_fields(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, cell_fields: Sequence[str]) -> None:
@@ -201,7 +201,7 @@ def append_tables(
     for name in step.contact:
         if name not in pairs:
             pairs[name] = _new_pair(
-                file["fastcontact/contact"], name, mesh.dim, layout.further_columns(step.contact[name])
+                file["fastcontact/contact"], name, mesh.dim, layout.optional_columns(step.contact[name])
             )
     for name, pair in pairs.items():
         _append_contact(pair, number, step.contact.get(name))
@@ -220,8 +220,8 @@ def append_rows(file: OpenObjects, mesh: Mesh, number: int, step: StepResult, ce
     rows = {"Values": step.load_factor, "NumberOfParts": 1, "PartOffsets": 0, "CellOffsets": 0}
     for name, value in {**rows, "PointDataOffsets/displacement": number * mesh.n_points}.items():
         _set_row(file[f"VTKHDF/Steps/{name}"], number, value)
-    further = layout.MATERIAL_FIELDS if _has_material_stress(file) else ()
-    for name in (*cell_fields, *further):
+    optional = layout.MATERIAL_FIELDS if _has_material_stress(file) else ()
+    for name in (*cell_fields, *optional):
         _set_row(file[f"VTKHDF/Steps/CellDataOffsets/{name}"], number, number * len(file["VTKHDF/Types"]))
 
 
@@ -236,7 +236,7 @@ def append_run(file: OpenObjects, n_steps: int, run: Any, flush: Callable[[], No
 
 
 def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> None:
-    """Write the packed restart state of step `number`; the table is never reduced, since HDF5 would reuse the space."""
+    """Write the packed restart data of step `number`. The table never shrinks, since HDF5 would reuse the space."""
     table = file[f"fastcontact/{layout.restart_table(number)}"]
     if len(table) < len(state):
         table.resize(len(state), axis=0)
@@ -244,19 +244,19 @@ def set_restart(file: OpenObjects, number: int, state: NDArray[np.uint8]) -> Non
 
 
 def header_size(mesh: Mesh) -> int:
-    """Return an upper bound on the size of a file without steps [bytes]."""
+    """Return an upper bound of the size of a file without steps [bytes]."""
     n_groups = len(mesh.cell_groups) + len(mesh.point_groups)
     arrays = [mesh.points, *mesh.cells.values(), *mesh.cell_groups.values(), *mesh.point_groups.values()]
     return 6 * sum(array.nbytes for array in arrays) + n_groups * (mesh.n_cells + mesh.n_points + BYTES)
 
 
 def step_size(mesh: Mesh, step: StepResult) -> int:
-    """Return an upper bound on the size of a step in the file, without its restart state [bytes]."""
+    """Return an upper bound of the size of a step in the file, without its restart data [bytes]."""
     fields = 8 * (sum(layout.POINT_FIELDS.values()) * mesh.n_points + sum(map(np.size, step.cell_fields.values())))
-    faced = layout.primary_row(mesh.dim).itemsize
+    primary_size = layout.primary_row(mesh.dim).itemsize
     contact = sum(
-        (len(pair.points) + 2 * ROWS) * layout.contact_row(mesh.dim, layout.further_columns(pair)).itemsize
-        + (len(pair.primary_points) + 2 * ROWS) * faced
+        (len(pair.points) + 2 * ROWS) * layout.contact_row(mesh.dim, layout.optional_columns(pair)).itemsize
+        + (len(pair.primary_points) + 2 * ROWS) * primary_size
         + BYTES
         for pair in step.contact.values()
     )
@@ -267,10 +267,10 @@ def step_size(mesh: Mesh, step: StepResult) -> int:
     return int(1.01 * fields) + contact + len(as_json([step.iterations, step.warnings]))
 
 
-def _new_pair(parent: Any, name: str, dim: int, further: Iterable[str]) -> dict[str, Any]:
-    pair = parent.create_group(None)  # the group has no name until it is complete, because of interrupts
+def _new_pair(parent: Any, name: str, dim: int, optional: Iterable[str]) -> dict[str, Any]:
+    pair = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
     pair["name"] = as_json(name)
-    growing_table(pair, "rows", layout.contact_row(dim, further))
+    growing_table(pair, "rows", layout.contact_row(dim, optional))
     growing_table(pair, "primary", layout.primary_row(dim))
     growing_table(pair, "steps", layout.contact_step(dim))
     parent[str(len(parent))] = pair
@@ -286,7 +286,7 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
         for name in set(row.dtype.names or ()).difference(layout.PLACES):
             value = getattr(contact, name)
             row[name] = np.nan if value is None else value
-        if "primary" in pair:  # missing in older files
+        if "primary" in pair:  # files of earlier versions do not have this table
             row["primary_first"], row["primary_count"] = _append_rows(pair["primary"], contact, "primary_")
     _set_row(steps, number, row)
 
@@ -294,7 +294,7 @@ def _append_contact(pair: dict[str, Any], number: int, contact: ContactResult | 
 def _append_sides(parent: Any, mesh: Mesh, number: int, sides: MaterialStress) -> None:
     """Append the stress of each material at interfaces; the first call creates the tables."""
     if "materials" not in parent:
-        group = parent.create_group(None)  # the group has no name until it is complete, because of interrupts
+        group = parent.create_group(None)  # the group gets a name when it is complete, so that interrupts do no harm
         _packed(group, "cells", np.asarray(sides.cells, np.int32))
         growing_table(group, "rows", layout.material_row(mesh.dim))
         growing_table(group, "steps", layout.SIDES_STEP)
@@ -326,7 +326,7 @@ def _set_row(table: Any, number: int, value: Any) -> None:
 
 
 def _write(table: Any, values: AnyArray, first: int) -> None:
-    """Write values over the rows from `first`, without h5py's indexing, which takes longer than small tables do."""
+    """Write values to the rows from `first`. Indexing by h5py would take longer than the writing of small tables."""
     from h5py import h5s
 
     if values.size:

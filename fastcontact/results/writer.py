@@ -1,9 +1,9 @@
-"""Write result files such that a crash does not damage the steps that are complete.
+"""Writing of result files in which a crash does not damage the steps that are complete.
 
-For each step the fields are written first, then its rows in the tables, and finally the number of steps, with a flush after
-each of the three. Uncompressed tables and small fields grow in place, and larger fields have a separate chunk for each step,
-so that data of a completed step are never moved. Disk space is reserved beforehand, because HDF5 loses the entire file when
-one of its writes fails.
+The fields and tables of a step are written first, then the rows that locate its fields, and finally the number of steps, with
+a flush after each of the three. Uncompressed tables and small fields grow in place, and larger fields have a separate chunk
+for each step, so that data of a completed step are never moved. Disk space is reserved beforehand, because a failed write of
+HDF5 may damage the entire file.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ from fastcontact.errors import ConvergenceError, FastcontactError, FileError, Mo
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results import journal, layout, write_arrays
 from fastcontact.results.committed_file import CommittedFile, uninterrupted
-from fastcontact.results.file_lock import PathLock, left_at, reserve
+from fastcontact.results.file_lock import PathLock, file_state, reserve
 from fastcontact.results.reader import Results, StoredSteps, read_text
 from fastcontact.results.step import StepResult
 
-# Time after which each step is synchronised with the disk [s]; a shorter run is quickly repeated after a power loss.
-SHORT = 10.0
+# Age of a file from which on each step is synchronised with the disk [s]. A shorter run is quickly repeated.
+SYNCHRONISED_FROM = 10.0
 # Disk space that is reserved for the metadata of HDF5 [bytes].
 MARGIN = 1 << 19
 # Size in the file of the indices that HDF5 caches in memory [bytes].
-INDICES = 1 << 18
+CACHED_INDICES = 1 << 18
 # Suffixes of formats in which results are not written.
 OTHER_FORMATS = {".vtu", ".vtk", ".pvd", ".med", ".rmed", ".xdmf"}
 
@@ -143,20 +143,22 @@ class ResultWriter:
         self._closed = self._ended = False
         self._background = ThreadPoolExecutor(1, "fastcontact-writer") if background else None
         self._writing: Future[None] | None = None
-        self._turn = threading.RLock()
+        self._access = threading.RLock()
         self._last: tuple[int, Any] = (0, None)  # index and case of the last step
-        self._notes: dict[str, str] = {}  # notes of the next step: the case file, if another one is resumed
-        self._left: tuple[int, ...] | None = None
+        self._notes: dict[str, str] = {}  # the text of the case file, if it differs from that of the resumed run
+        self._resumed_state: tuple[int, ...] | None = None
         with self._explained("begun"):
             self._lock = PathLock(self.path)
             try:
                 if resume:
-                    left = left_at(self.path)
-                    self.done, self._ended, old = _steps_to_resume(self.path, mesh, str(kinematics), self._cell_fields)
+                    state = file_state(self.path)
+                    self.done, self._ended, old_text = _steps_to_resume(
+                        self.path, mesh, str(kinematics), self._cell_fields
+                    )
                 if self.done:
-                    self._left, self.n_steps = left, len(self.done)
+                    self._resumed_state, self.n_steps = state, len(self.done)
                     self._last = self.done[-1].index, _case_of(self.done[-1])
-                    self._notes = {"case": case_text} if case_text not in ("", old) else {}
+                    self._notes = {"case": case_text} if case_text not in ("", old_text) else {}
                 else:
                     _check_replaceable(self.path, overwrite or resume)
                     self._begin(str(kinematics), case_text)
@@ -176,9 +178,9 @@ class ResultWriter:
         except FileError as failure:
             error.add_note(str(failure))
         if self._file is None and not isinstance(error, ConvergenceError):
-            self._give_up()  # nothing was added: the error does not concern the existing steps
+            self._give_up()  # no step was added, and the error does not concern the existing steps
             return
-        with contextlib.suppress(FileError):  # the first error is the relevant one
+        with contextlib.suppress(FileError):  # only the first error is raised
             run: dict[str, Any] = {"error": f"{type(error).__name__}: {error}"}
             if isinstance(error, ConvergenceError):
                 run["log"] = {"failed_step": error.history}
@@ -200,7 +202,7 @@ class ResultWriter:
             If the file is closed, the step does not follow the previous one, belongs to another case or does not fit
             the mesh, or if the disk is full or fails.
         """
-        with self._turn:
+        with self._access:
             self.wait()
             if self._closed:
                 raise FileError(f"'{self.path}' is closed: write steps before close, or inside the with block")
@@ -221,7 +223,7 @@ class ResultWriter:
             If the disk was full or failed.
         """
         if self._background is not None:
-            with self._turn, uninterrupted():
+            with self._access, uninterrupted():
                 writing, self._writing = self._writing, None
                 if writing is not None:
                     writing.result()
@@ -230,13 +232,13 @@ class ResultWriter:
         with self._explained(f"written at step {step.index}"):
             self._open()
             self._check_in_place()
-            late = time.monotonic() - self._started > SHORT
-            self._committed.synchronised = late if self._synchronise is None else self._synchronise
+            by_default = time.monotonic() - self._started > SYNCHRONISED_FROM
+            self._committed.synchronised = by_default if self._synchronise is None else self._synchronise
             restart = packed({"step": self.n_steps, "restart": step.restart})
-            room = write_arrays.step_size(self._mesh, step) + restart.nbytes
-            self._reserve(2 * room if self._committed.synchronised else room)
-            # Fields, rows and number of steps are flushed in this order, unless a single journal contains all of them.
-            in_parts = not self._committed.synchronised or room > journal.LARGEST
+            size = write_arrays.step_size(self._mesh, step) + restart.nbytes
+            self._reserve(2 * size if self._committed.synchronised else size)
+            # Fields, rows and the number of steps are flushed separately, unless a single journal contains all of them.
+            in_parts = not self._committed.synchronised or size > journal.LARGEST
             write_arrays.append_fields(self._objects, self._mesh, self.n_steps, step, self._cell_fields)
             write_arrays.append_tables(self._objects, self._mesh, self.n_steps, step, self._pairs, self._notes)
             write_arrays.set_restart(self._objects, self.n_steps, restart)
@@ -281,7 +283,7 @@ class ResultWriter:
         self._finish({"log": log, "warnings": [str(warning) for warning in warnings]})
 
     def _finish(self, run: dict[str, Any]) -> None:
-        with self._turn, contextlib.ExitStack() as closing:
+        with self._access, contextlib.ExitStack() as closing:
             closing.callback(self._give_up)
             if self._closed or (self._file is None and self._ended and "error" not in run):
                 return  # a complete file is not changed
@@ -303,7 +305,7 @@ class ResultWriter:
         self._lock.release()
 
     def _release_done(self) -> None:
-        """Close the reader of the existing steps, before the file changes."""
+        """Close the reader of the existing steps before the file changes."""
         if isinstance(self.done, StoredSteps):
             self.done.release()
 
@@ -312,7 +314,7 @@ class ResultWriter:
         import h5py
 
         if self._file is None:
-            if self._left is not None and self._left != left_at(self.path):
+            if self._resumed_state is not None and self._resumed_state != file_state(self.path):
                 raise FileError(self._gone())
             self._committed = CommittedFile(self.path)
             try:
@@ -320,7 +322,7 @@ class ResultWriter:
                 # The cache for index nodes grows with the steps and takes ten times the size in the file.
                 settings = self._file.id.get_mdc_config()
                 settings.set_initial_size = True
-                settings.initial_size = settings.min_size = settings.max_size = INDICES
+                settings.initial_size = settings.min_size = settings.max_size = CACHED_INDICES
                 self._file.id.set_mdc_config(settings)
             except BaseException:
                 self._committed.close()
@@ -361,11 +363,11 @@ class ResultWriter:
 
     @contextlib.contextmanager
     def _explained(self, action: str) -> Iterator[None]:
-        """Convert errors of HDF5 and of the operating system to a FileError with a remedy, and defer signals meanwhile."""
+        """Convert errors of HDF5 and of the operating system to a FileError with a remedy, and defer signals."""
         with uninterrupted():
             try:
                 yield
-            except Exception as error:  # a failed read causes errors of many kinds
+            except Exception as error:  # errors of HDF5 have many types
                 failure = self._committed.failure if self._committed is not None else None
                 if isinstance(error, (FastcontactError, MemoryError)):
                     raise
@@ -388,8 +390,8 @@ class ResultWriter:
                 reserve(probe.fileno(), temporary.parent, 0, size)
             with new_hdf5(temporary) as file:
                 write_arrays.write_geometry(file, self._mesh, self._cell_fields, self._material, self._heat)
-                write_arrays.write_own(file, self._mesh, kinematics, case_text, self._units)
-        # The file is closed in between, because Windows does not rename open files; without locks viewers can read it.
+                write_arrays.write_case(file, self._mesh, kinematics, case_text, self._units)
+        # The file was closed, because Windows does not rename open files. `_open` sets no lock, so that viewers can read it.
         self._open()
 
 
@@ -408,7 +410,7 @@ def _steps_to_resume(
 ) -> tuple[Sequence[StepResult], bool, str]:
     """Return the steps of the file at `path`, whether its run is complete, and the text of its case file.
 
-    If there is no file, there are no steps. FileError if steps of this mesh cannot be appended to the file.
+    If there is no file, there are no steps. Raises FileError if steps of this mesh cannot be appended to the file.
     """
     if not path.exists() or not path.stat().st_size:
         return [], False, ""
@@ -416,30 +418,30 @@ def _steps_to_resume(
         old = closed.enter_context(Results(path, repeat=True))
         if not len(old):
             return [], False, ""
-        begin_anew = "or start anew without resuming, which replaces the file"
+        start_anew = "or start anew without resuming, which replaces the file"
         if old.schema < layout.RESUMABLE:
             raise FileError(
                 f"'{path}' was written by an earlier fastcontact, which stored no data to resume from: name another file "
-                f"{begin_anew}"
+                f"{start_anew}"
             )
-        if lost := old.lacks(layout.CONTINUED):
-            raise FileError(f"'{path}' is damaged, it lacks '{lost[0]}': restore a copy, {begin_anew}")
+        if missing := old.lacks(layout.CONTINUED):
+            raise FileError(f"'{path}' is damaged, it lacks '{missing[0]}': restore a copy, {start_anew}")
         if not _same_mesh(old.mesh, mesh) or old.kinematics != kinematics:
             difference = "kinematics" if _same_mesh(old.mesh, mesh) else "mesh"
-            raise FileError(f"'{path}' belongs to another {difference}: resume the case it was begun for, {begin_anew}")
+            raise FileError(f"'{path}' belongs to another {difference}: resume the case it was begun for, {start_anew}")
         names = sorted(old.cell_field_names)
         if names != sorted(cell_fields):
             raise FileError(
                 f"the steps in '{path}' contain the cell fields {names or 'none'}, not {sorted(cell_fields) or 'none'}: ask "
-                f"for the same ones, {begin_anew}"
+                f"for the same ones, {start_anew}"
             )
         steps = StoredSteps(old)
-        closed.pop_all()  # the file stays open to read them
+        closed.pop_all()  # the file stays open, because steps are read on access
         return steps, old.complete, old.case_text
 
 
 def _case_of(step: StepResult) -> Any:
-    """Return the identity of the case for which a step was computed; None if unknown."""
+    """Return the fingerprint of the case for which a step was computed; None if it is unknown."""
     return (step.restart or {}).get("case", {}).get("parts")
 
 
@@ -447,11 +449,8 @@ def _same_mesh(old: Mesh, other: Mesh) -> bool:
     """Return whether points, cells and groups of two meshes are equal."""
     if not np.array_equal(old.points, other.points):
         return False
-    for kind in ("cells", "cell_groups", "point_groups"):
-        of_old, of_other = getattr(old, kind), getattr(other, kind)
-        if list(of_old) != list(of_other) or not all(np.array_equal(of_old[name], of_other[name]) for name in of_old):
-            return False
-    return True
+    pairs = [(getattr(old, kind), getattr(other, kind)) for kind in ("cells", "cell_groups", "point_groups")]
+    return all(list(a) == list(b) and all(np.array_equal(a[name], b[name]) for name in a) for a, b in pairs)
 
 
 def _checked_names(cell_fields: Iterable[str], mesh: Mesh) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""XDMF sidecar of a result file, for viewers that do not support steps in VTKHDF."""
+"""XDMF files that refer to the data of result files, for viewers that do not support steps in VTKHDF."""
 
 from __future__ import annotations
 
@@ -58,14 +58,14 @@ def write_xdmf(result_path: PathLike, xdmf_path: PathLike) -> None:
         _data(f"{reference}:/VTKHDF/Points", (n_points, 3)),
         "</Geometry>",
     ]
-    static = [*_static(reference, "Node", "PointData", layout.point_flags(mesh))]
-    static += _static(reference, "Cell", "CellData", layout.cell_fields(mesh))
+    constant = [*_constant(reference, "Node", "PointData", layout.point_flags(mesh))]
+    constant += _constant(reference, "Cell", "CellData", layout.cell_fields(mesh))
     grids = []
     for number, load_factor in enumerate(load_factors):
         grids += [f'<Grid Name="step {number + 1}" GridType="Uniform"><Time Value="{load_factor!r}"/>', *shape]
         for field in fields:
             grids += _field(f"{reference}:/VTKHDF/PointData/{field}", n_points, number, n_steps)
-        grids += [*static, "</Grid>"]
+        grids += [*constant, "</Grid>"]
     with replacing(target) as temporary:
         temporary.write_text("\n".join([HEAD, *grids, TAIL]), encoding="utf-8")
 
@@ -75,24 +75,24 @@ def _words(numbers: Iterable[int]) -> str:
 
 
 def _data(address: str, shape: Iterable[int], kind: str = "Float", precision: int = 8) -> str:
-    """Return an XDMF item that refers to a data set."""
-    form = f'Dimensions="{_words(shape)}" NumberType="{kind}" Precision="{precision}"'
-    return f'<DataItem Format="HDF" {form}>{escape(address)}</DataItem>'
+    """Return an XDMF item that refers to the data set at `address`."""
+    attributes = f'Dimensions="{_words(shape)}" NumberType="{kind}" Precision="{precision}"'
+    return f'<DataItem Format="HDF" {attributes}>{escape(address)}</DataItem>'
 
 
 def _attribute(name: str, kind: str, center: str, item: str) -> str:
     return f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="{center}">{item}</Attribute>'
 
 
-def _static(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
-    """Yield the attributes that are constant over the steps."""
+def _constant(reference: str, center: str, group: str, arrays: Mapping[str, AnyArray]) -> Iterator[str]:
+    """Yield the attributes of arrays that do not change from step to step."""
     for name, values in arrays.items():
         address, kind = f"{reference}:/VTKHDF/{group}/{name}", "Char" if values.itemsize == 1 else "Int"
         yield _attribute(name, "Scalar", center, _data(address, values.shape, kind, values.itemsize))
 
 
 def _field(address: str, n_points: int, number: int, n_steps: int) -> Iterator[str]:
-    """Yield the attributes of a point field in one step, which is part of the data set of all steps."""
+    """Yield the attributes of a point field in one step, which occupies a part of the data set for all steps."""
     name = address.rpartition("/")[2]
     width = {**layout.POINT_FIELDS, **layout.HEAT_FIELDS}[name]
     columns = [(name, 0, width)]  # label, first column and number of columns of each attribute

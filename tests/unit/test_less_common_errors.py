@@ -146,7 +146,7 @@ def test_folders_of_file_systems_that_cannot_wait(tmp_path, monkeypatch):
 
 def test_a_lock_in_a_folder_that_is_not_there(tmp_path):
     with pytest.raises(FileNotFoundError):
-        file_lock._own_file(tmp_path / "none" / "x.lock")
+        file_lock._open_lock_file(tmp_path / "none" / "x.lock")
 
 
 def test_a_picture_that_cannot_be_drawn(tmp_path):

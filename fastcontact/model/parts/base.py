@@ -88,7 +88,7 @@ class Support:
 
 
 def group_names(groups: Sequence[str] | str | None) -> tuple[str, ...] | None:
-    """Return one or several names of groups as a tuple; None, which stands for all groups, is returned unchanged."""
+    """Return one or several names of groups as a tuple, and pass None, which means all cells, through."""
     if groups is None:
         return None
     names = (groups,) if isinstance(groups, str) else tuple(groups)
@@ -144,7 +144,7 @@ class ModelBase(Suggesting):
         self.related_supports: list[tuple[str, MultiPointConstraint]] = []  # supports by group, as constraints
         self.springs: list[Springs] = []
         self.pretensions: list[Pretension] = []
-        self.interpolated: list[str] = []  # cyclic symmetries whose nodes follow facets
+        self.interpolated: list[str] = []  # cyclic symmetries whose nodes are tied to facets
         self.periodic_interfaces: list[PeriodicInterface] = []  # coincident nodes of periodic parts
         self.contact: list[ContactPair] = []
 
@@ -156,18 +156,18 @@ class ModelBase(Suggesting):
     def _solid_groups(self, groups: Sequence[str] | str | None, otherwise: str) -> tuple[str, ...] | None:
         """Return the names of groups of solid cells, None for all cells.
 
-        Raise a ModelError that ends with `otherwise` if a group contains no solid cell.
+        Raises a ModelError that ends with `otherwise` if a group contains no solid cell.
         """
         names = group_names(groups)
         check_solids(self.mesh, names, otherwise)
         return names
 
     def _cells_of(self, groups: Sequence[str] | None) -> Cells:
-        """Return the solid cells of the given groups, or all solid cells for None."""
+        """Return the solid cells of `groups`, or all solid cells for None."""
         return Cells(self.mesh, solid_rows(self.mesh, groups))
 
     def _nodes(self, point: str | int) -> AnyArray:
-        """Return the numbers (n,) of the points of a group, or the given point number as an array (1,)."""
+        """Return the numbers (n,) of the points of a group, or the number of a point as an array (1,)."""
         if isinstance(point, str):
             return self.mesh.points_of(point)
         if point != int(point) or not 0 <= point < self.mesh.n_points:
@@ -177,9 +177,10 @@ class ModelBase(Suggesting):
     def _direction(
         self, name: str, along: Mapping[str, float], joined: bool, direction: Sequence[float] | None
     ) -> Array | None:
-        """Return the unit vector (dim,) of the axial direction of a spring.
+        """Return the unit vector (dim,) of the axial direction of a spring, or None if no `direction` is given.
 
-        None means that the spring has no axial or transverse stiffness, or that it acts along the line between its nodes.
+        `along` are its axial and transverse stiffnesses. A spring between two nodes, which is `joined`, acts along the line
+        between them by default.
         """
         if direction is None:
             if along and not joined:
@@ -198,7 +199,7 @@ class ModelBase(Suggesting):
         return np.asarray(vector / np.linalg.norm(vector))
 
     def related_points(self) -> Mask:
-        """Return for each point (n_points,) whether a multi-point constraint or a spring acts on it."""
+        """Return the mask (n_points,) of the points on which a multi-point constraint or a spring acts."""
         related = np.zeros(self.mesh.n_points, bool)
         related[self.holding_rows().indices // self.mesh.dim] = True
         return related
@@ -242,8 +243,8 @@ class ModelBase(Suggesting):
 
     def bending(self) -> list[bool]:
         """Return for each material whether linear quadrangles and hexahedra of this material have incompatible modes."""
-        bend = self.kinematics != "axisymmetric" and any(name in BENDING for name in self.mesh.solids)
-        return [bend and material.incompatible_modes for material, _ in self.materials]
+        possible = self.kinematics != "axisymmetric" and any(name in BENDING for name in self.mesh.solids)
+        return [possible and material.incompatible_modes for material, _ in self.materials]
 
     @property
     def nonlinear(self) -> bool:
@@ -255,11 +256,11 @@ class ModelBase(Suggesting):
         return nonlinear_bodies(self.mesh, self.kinematics, self.strain, field)
 
     def refuse_nonlinear(self, feature: str) -> None:
-        """Raise ModelError if bodies are nonlinear, since `feature` is limited to linear elasticity."""
+        """Raise ModelError if bodies are nonlinear. The message begins with `feature`, which needs linear elasticity."""
         nonlinear = [type(law).__name__ for law, _ in self.materials if isinstance(law, NonlinearElastic)]
         if self.nonlinear:
-            named = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
-            raise ModelError(f"{feature} available for linear elasticity only, not with {named}")
+            cause = nonlinear[0] if nonlinear else f"strain='{self.strain}'"
+            raise ModelError(f"{feature} available for linear elasticity only, not with {cause}")
 
     def material_numbers(self) -> tuple[Array, dict[str, Numbers]]:
         """Return the matrices of moduli, and by element type the number of the matrix of each solid cell.

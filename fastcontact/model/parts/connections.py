@@ -87,16 +87,14 @@ class ModelConnections(ModelInitialStates):
         if name in {other.label for other in self.pretensions}:
             raise ModelError(f"there is already a pretension '{name}': names must differ")
         table = table_of(ramp, f"the ramp of pretension '{name}'")
-        section_of_bolt = pretension(
-            self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table
-        )
+        bolt = pretension(self.mesh, name, section, opposite, normal, (force, shortening, locked_from), table)
         for other in self.pretensions:
-            if np.isin(section_of_bolt.nodes, [other.nodes, other.opposite]).any():
-                raise ModelError(f"{section_of_bolt.name} and {other.name} are in one section, which has one force")
-        self.pretensions.append(section_of_bolt)
-        self.relations.extend(section_of_bolt.relations(self.n_dofs))
+            if np.isin(bolt.nodes, [other.nodes, other.opposite]).any():
+                raise ModelError(f"{bolt.name} and {other.name} are in one section, which has one force")
+        self.pretensions.append(bolt)
+        self.relations.extend(bolt.relations(self.n_dofs))
         if force is not None:
-            self._add(PretensionForce(section_of_bolt))
+            self._add(PretensionForce(bolt))
 
     def couple(self, group: str, component: str) -> None:
         """Constrain all nodes of a group to have equal displacement components.
@@ -232,15 +230,15 @@ class ModelConnections(ModelInitialStates):
         >>> model.add_periodicity("LEFT", "RIGHT", x=0.001)
         """
         name = f"the periodicity of '{first}' and '{second}'"
-        given = {key: value for key, value in components.items() if value != 0.0}
-        for key, value in given.items():
+        prescribed = {key: value for key, value in components.items() if value != 0.0}
+        for key, value in prescribed.items():
             check_number(f"{key} of {name}", value)
-        jump: Any = axes_of(name, given, self.mesh.dim) if given else {}
-        loose = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
-        if any(axis in jump for axis in loose):
-            raise ModelError(f"{name}: '{free}' is free, so no displacement can be given there")
+        jump: Any = axes_of(name, prescribed, self.mesh.dim) if prescribed else {}
+        free_axes = sorted(axes_of(name, dict.fromkeys(free, 1.0), self.mesh.dim)) if free else []
+        if any(axis in jump for axis in free_axes):
+            raise ModelError(f"{name}: '{free}' is free, so no displacement can be prescribed there")
         relations, interface = periodic(
-            self.mesh, (first, second), jump, loose, translation, table_of(ramp, f"the ramp of {name}")
+            self.mesh, (first, second), jump, free_axes, translation, table_of(ramp, f"the ramp of {name}")
         )
         self.relations.extend(relations)
         self.periodic_interfaces.append(interface)
@@ -290,15 +288,15 @@ class ModelConnections(ModelInitialStates):
         name = f"the cyclic symmetry of '{first}' and '{second}'"
         if self.kinematics == "axisymmetric":
             raise ModelError(f"{name}: an axisymmetric model is the whole ring already")
-        origin_given = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
-        along = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
-        on_axis = len(origin_given) == self.mesh.dim and len(along) == 3 and any(along)
-        if sectors < 2 or sectors != int(sectors) or not on_axis:
+        point = (0.0,) * self.mesh.dim if origin is None else tuple(origin)
+        axis = (0.0, 0.0, 1.0) if self.mesh.dim == 2 else tuple(direction)
+        valid_axis = len(point) == self.mesh.dim and len(axis) == 3 and any(axis)
+        if sectors < 2 or sectors != int(sectors) or not valid_axis:
             raise ModelError(
                 f"{name} needs two sectors at least, a whole number, an origin of {self.mesh.dim} numbers and a direction of "
-                f"three, not {sectors}, {origin_given} and {along}"
+                f"three, not {sectors}, {point} and {axis}"
             )
-        relations, interface = cyclic(self.mesh, (first, second), sectors, origin_given, along)
+        relations, interface = cyclic(self.mesh, (first, second), sectors, point, axis)
         self.relations.extend(relations)
         if interface is None:
             self.interpolated.append(name)
@@ -335,10 +333,10 @@ class ModelConnections(ModelInitialStates):
         >>> model.relate([("TOP_LEFT", "y", 1.0), ("TOP_RIGHT", "y", -2.0)])
         """
         terms_of_nodes: list[Term] = []
-        listed = [(point, component, coefficient) for point, component, coefficient in terms]
-        name = "the relation of " + ", ".join(f"{component} of '{point}'" for point, component, _ in listed)
+        terms = list(terms)
+        name = "the relation of " + ", ".join(f"{component} of '{point}'" for point, component, _ in terms)
         check_number(f"the value of {name}", value)
-        for point, component, coefficient in listed:
+        for point, component, coefficient in terms:
             check_number(f"a coefficient of {name}", coefficient)
             (axis,) = axes_of(name, {component: coefficient}, self.mesh.dim)
             terms_of_nodes += [(int(node), axis, float(coefficient)) for node in self._nodes(point)]
@@ -457,17 +455,15 @@ class ModelConnections(ModelInitialStates):
             check_number(f"the stiffness of {name}", value)
             if not value > 0:
                 raise ModelError(f"{name}: the stiffness {value:g} must be positive")
-        nodes = self._nodes(group)
-        if not len(nodes):
-            raise ModelError(f"group '{group}' is empty: no spring can be there")
-        if to is None:
+        nodes, opposite = self._nodes(group), None if to is None else self._nodes(to)
+        for end, points in ((group, nodes), (to, opposite)):
+            if points is not None and not len(points):
+                raise ModelError(f"group '{end}' is empty: no spring can be there")
+        if opposite is None:
             if translation is not None:
                 raise ModelError(f"{name} goes to the ground: leave out the translation, or name the group to join")
             self.springs.append(grounded(name, nodes, axes, self.n_dofs, self.mesh.dim, along, vector))
             return
-        opposite = self._nodes(to)
-        if not len(opposite):
-            raise ModelError(f"group '{to}' is empty: no spring can be there")
         if len(nodes) > 1 < len(opposite):
             match = matched(self.mesh, (str(group), nodes), (str(to), opposite), translation)
             opposite = opposite[match]

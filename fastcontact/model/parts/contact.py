@@ -202,16 +202,16 @@ class ModelContact(ModelConnections):
             ends = [self.mesh.points_of(group) for group in (secondary, primary)]
             if any(np.isin(side, [cut.nodes, cut.opposite]).all() for cut in self.pretensions for side in ends):
                 continue
-            if any(joined_already(self.mesh, (pair.secondary, pair.primary), other) for other in self.contact):
-                log.info("contact '%s' is left out, since another one joins its facets already", pair.name)
+            if any(joined_already(self.mesh, (secondary, primary), other) for other in self.contact):
+                log.info("contact '%s' is left out, since another contact pairs its facets already", pair.name)
                 continue
             self.add_contact(pair.name, secondary=secondary, primary=primary, formulation=formulation, **options)
             self.contact[-1] = dataclasses.replace(self.contact[-1], found_gap=pair.gap[0])
             added.append(pair)
-        if not added and options:  # check the options anyway
-            checked = copy.copy(self)
-            checked.contact = []
-            checked.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
+        if not added and options:  # invalid options raise an error even if no pair is added
+            trial = copy.copy(self)
+            trial.contact = []
+            trial.add_contact("contacts", formulation=formulation, secondary=secondary, primary=primary, **options)
         return FoundContacts(self.mesh, tuple(added))
 
     def add_fluid_pressure(self, contact: str, pressure: float, *, source: str, ramp: History = None) -> None:
@@ -247,9 +247,9 @@ class ModelContact(ModelConnections):
         check_known("contact", contact, names, ModelError)
         fluid = FluidPressure(float(pressure), source, table_of(ramp, f"the ramp of the fluid in contact '{contact}'"))
         index = names.index(contact)
-        changed = dataclasses.replace(self.contact[index], fluid=fluid)
-        self.bind(changed)
-        self.contact[index] = changed
+        wetted = dataclasses.replace(self.contact[index], fluid=fluid)
+        self.bind(wetted)
+        self.contact[index] = wetted
 
     def add_obstacle(
         self,
@@ -313,8 +313,8 @@ class ModelContact(ModelConnections):
         >>> round(float(step.contact["ball"].force[1]), 6)
         -100.0
         """
-        moves = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
-        displacement = tuple(float(moves.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
+        components = axes_of(f"the motion of obstacle '{name}'", dict(motion), self.mesh.dim) if motion else {}
+        displacement = tuple(float(components.get(axis, 0.0)) for axis in range(self.mesh.dim))  # type: ignore[arg-type]
         if not np.isfinite(displacement).all():
             raise ModelError(f"the motion {motion} of obstacle '{name}' must be finite numbers")
         if isinstance(obstacle, MeshedSurface):
@@ -328,14 +328,16 @@ class ModelContact(ModelConnections):
             log.info("contact '%s': %s, since %s", name, method(formulation, chosen), reason)
         if formulation == "mortar":
             chosen.setdefault("multipliers", "dual")
-        driving = self._driving(name, moves, force)
-        turned = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
+        driving = self._driving(name, components, force)
+        rotation_and_ramp = rotation_of(f"the rotation of obstacle '{name}'", rotation, self.kinematics)
         self._add_pair(
-            ContactPair(name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *turned)
+            ContactPair(
+                name, secondary, "", formulation, chosen, obstacle, displacement, history, driving, *rotation_and_ramp
+            )
         )
 
     def _source(self, pair: ContactPair, side: Surface, options: PairOptions) -> Mask | None:
-        """Return for each point (n_points,) whether the fluid enters a contact pair there; None without a fluid."""
+        """Return the mask (n_points,) of the points at which fluid enters a contact pair; None without a fluid."""
         if pair.fluid is None:
             return None
         mask = np.zeros(self.mesh.n_points, bool)
@@ -355,20 +357,20 @@ class ModelContact(ModelConnections):
     def _facet_kinds(self, group: str) -> tuple[list[str], bool]:
         """Return the element types of the facets of a group, and whether all belong to linear triangles or tetrahedra."""
         facets = self.mesh.cells_of(group, self.mesh.dim - 1) if group in self.mesh.cell_groups else {}
-        if not facets:  # reported by `check`
+        if not facets:  # `bind` raises the error
             return [], False
         simplices = [block for name, block in self.mesh.solids.items() if name in ("tri3", "tet4")]
         of_simplices = any(np.isin(self.mesh.points_of(group), block).all() for block in simplices)
         return list(facets), of_simplices
 
-    def _driving(self, name: str, moves: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
+    def _driving(self, name: str, motion: Mapping[int, Value], force: Mapping[str, float] | None) -> Driving:
         """Return the force on obstacle `name` by component, None where its motion is prescribed; empty without forces."""
         if not force:
             return ()
         forces = axes_of(f"the force on obstacle '{name}'", dict(force), self.mesh.dim)
         for axis, value in forces.items():
             check_number(f"the force {'xyz'[axis]} on obstacle '{name}'", value)
-            if axis in moves:
+            if axis in motion:
                 raise ModelError(
                     f"obstacle '{name}' is both moved and pushed along {'xyz'[axis]}: name this component either in its "
                     "motion or in its force"
@@ -395,18 +397,21 @@ class ModelContact(ModelConnections):
         self.contact.append(pair)
 
     def bind(self, pair: ContactPair, held: HeldMotions | None = None, *, sectors_alike: bool = True) -> Formulation:
-        """Return the formulation of a contact pair on this mesh; it raises the errors of `add_contact`.
+        """Return the formulation of a contact pair on this mesh. Raises the errors of `add_contact`.
 
         `held` contains the nodal motions that supports and multi-point constraints prescribe, if they are known.
-        `sectors_alike` states whether pressures are equal at both ends of a sector, as in static analyses; in vibration
-        modes they may differ.
+        `sectors_alike` states whether pressures are equal at both ends of a sector. This holds in static analyses, but not
+        necessarily in vibration modes.
         """
         check_known("contact formulation", pair.formulation, FORMULATIONS, ContactError)
         kind = FORMULATIONS[pair.formulation].variant(self.mesh.dim, pair.options)
-        set_here = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
-        known = [*SHARED_OPTIONS, *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in set_here)]
+        no_options = ("secondary", "primary", "points", "axisymmetric", "modulus", "options", "held")
+        available = [
+            *SHARED_OPTIONS,
+            *(f.name for f in dataclasses.fields(kind) if f.init and f.name not in no_options),
+        ]
         for option in pair.options:
-            check_known(f"option of {pair.formulation}", option, known, ContactError)
+            check_known(f"option of {pair.formulation}", option, available, ContactError)
         specific = {key: value for key, value in pair.options.items() if key not in SHARED_OPTIONS}
         check_fields(f"contact '{pair.name}'", specific, kind, ContactError)
         ends = [

@@ -54,7 +54,7 @@ class ModelHeat(ModelBase):
         >>> model.fix_temperature("TOP", 120.0)
         """
         table = table_of(ramp, f"the ramp of the temperature on '{group}'")
-        self._heat(FixedTemperature(group, value, table, *_span(begins, ends)))
+        self._add_heat(FixedTemperature(group, value, table, *_span(begins, ends)))
 
     def add_heat_flux(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a heat flux to a group of facets.
@@ -74,7 +74,7 @@ class ModelHeat(ModelBase):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_heat_flux("TOP", 3.0)
         """
-        self._heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
+        self._add_heat(HeatFlux(group, value, table_of(ramp, f"the ramp of the heat flux on '{group}'")))
 
     def add_heat_source(self, value: Value, groups: Sequence[str] | str | None = None, *, ramp: History = None) -> None:
         """Apply a volumetric heat source to groups of solid cells.
@@ -95,7 +95,7 @@ class ModelHeat(ModelBase):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_heat_source(0.1, "BLOCK")
         """
-        self._heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
+        self._add_heat(HeatSource(group_names(groups), value, table_of(ramp, "the ramp of the heat source")))
 
     def add_nodal_heat(self, group: str, value: Value, *, ramp: History = None) -> None:
         """Apply a concentrated heat source to every node of a group.
@@ -115,7 +115,7 @@ class ModelHeat(ModelBase):
         >>> model = fc.Model(fc.generate.block(), kinematics="plane_strain")
         >>> model.add_nodal_heat("TOP_LEFT", 5.0)
         """
-        self._heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
+        self._add_heat(NodalHeat(group, value, table_of(ramp, f"the ramp of the heat at nodes of '{group}'")))
 
     def add_film(
         self, group: str, coefficient: Value, ambient: Value, *, ramp: History = None, begins: float | None = None,
@@ -142,9 +142,9 @@ class ModelHeat(ModelBase):
         >>> model.add_film("TOP", 1.5, 20.0)
         """
         table = table_of(ramp, f"the ramp of the film on '{group}'")
-        self._heat(Film(group, coefficient, ambient, table, *_span(begins, ends)))
+        self._add_heat(Film(group, coefficient, ambient, table, *_span(begins, ends)))
 
-    def _heat(self, load: FixedTemperature | Heating | Film) -> None:
+    def _add_heat(self, load: FixedTemperature | Heating | Film) -> None:
         load.check(self.mesh, self.kinematics)
         self.heat_loads.append(load)
 
@@ -180,8 +180,8 @@ class ModelHeat(ModelBase):
         """Return the mask (n_points,) of nodes with a prescribed temperature, and their rises at multiplier 1, by history.
 
         Rises above the reference temperature have the shape (n_points,) [temperature]. Of nodes that share their
-        temperature only the first is marked, see `same_temperature`. ModelError if two prescribed temperatures differ at a
-        node.
+        temperature only the first is marked, see `same_temperature`. Raises ModelError if two prescribed temperatures differ
+        at a node.
         """
         fixed, values = np.zeros(self.mesh.n_points, bool), np.zeros(self.mesh.n_points)
         by_ramp: dict[Table | None, Array] = {}
@@ -192,21 +192,21 @@ class ModelHeat(ModelBase):
             nodes = self.mesh.points_of(support.group)
             rise = evaluated(support.value, self.mesh.points[nodes], support.name) - self.reference_temperature
             nodes = same[nodes]
-            again = np.flatnonzero(fixed[nodes])
-            for row in again[(values[nodes[again]] != rise[again])][:1]:
+            repeated = np.flatnonzero(fixed[nodes])
+            for row in repeated[(values[nodes[repeated]] != rise[repeated])][:1]:
                 other = supports[owner[nodes[row]]]
                 raise ModelError(
                     f"'{support.group}' and '{other.group}' prescribe different temperatures at point {nodes[row]}"
                 )
-            new, (ramp, leaving) = nodes[~fixed[nodes]], support.history()
+            new, (ramp, initial_ramp) = nodes[~fixed[nodes]], support.history()
             by_ramp.setdefault(ramp, np.zeros(self.mesh.n_points))[new] = rise[~fixed[nodes]]
-            if support.reached is not None and leaving:
-                by_ramp.setdefault(leaving, np.zeros(self.mesh.n_points))[new] = support.reached[new]
+            if support.reached is not None and initial_ramp:
+                by_ramp.setdefault(initial_ramp, np.zeros(self.mesh.n_points))[new] = support.reached[new]
             fixed[nodes], values[nodes], owner[new] = True, rise, number
         return fixed, by_ramp
 
     def check_heat(self) -> None:
-        """Raise ModelError if the heat conduction problem has no unique solution or lacks data."""
+        """Raise ModelError if data of the heat conduction problem are missing or its solution is not unique."""
         for pair in self.contact:
             if "friction_heat" in pair.options and not self.conducts:
                 raise ModelError(
@@ -223,29 +223,29 @@ class ModelHeat(ModelBase):
                 f"{self.interpolated[0]} joins meshes that differ, which no heat crosses: mesh its ends alike"
             )
         self.conduction().check()
-        lacking = [material for material, _ in self.materials if material.expansion is None]
-        if self.expands and lacking:
+        without_expansion = [material for material, _ in self.materials if material.expansion is None]
+        if self.expands and without_expansion:
             raise ModelError(
-                f"heat expands some materials, but that with {lacking[0].described} has no coefficient of thermal expansion: "
-                "give it expansion=..., 0.0 if it does not expand"
+                f"heat expands some materials, but that with {without_expansion[0].described} has no coefficient of thermal "
+                "expansion: give it expansion=..., 0.0 if it does not expand"
             )
-        held, _ = self.fixed_temperatures()
+        determined, _ = self.fixed_temperatures()
         for load in self.heat_loads:
             if isinstance(load, Film):
-                held[self.mesh.points_of(load.group)] = True
+                determined[self.mesh.points_of(load.group)] = True
         _, body = bodies(self.mesh)
         joined = [np.stack([np.arange(len(body)), self.same_temperature()], axis=1)]
         for pair in self.contact:
             if pair.options.get("obstacle_temperature") is not None:
-                held[self.mesh.points_of(pair.secondary)] = True
+                determined[self.mesh.points_of(pair.secondary)] = True
             elif pair.options.get("conductance") is not None:
                 ends = np.concatenate([self.mesh.points_of(pair.secondary), self.mesh.points_of(pair.primary)])
                 joined.append(np.stack([np.full(len(ends), ends[0]), ends], axis=1))
-        unreached = not_reached(body, held, np.concatenate(joined))
-        if len(unreached):
+        undetermined = not_reached(body, determined, np.concatenate(joined))
+        if len(undetermined):
             raise ModelError(
-                f"nothing determines the temperature of body {body_name(self.mesh, body, unreached[0])}: fix a temperature, "
-                "add a film, or give a contact with another body a conductance"
+                f"nothing determines the temperature of body {body_name(self.mesh, body, undetermined[0])}: fix a "
+                "temperature, add a film, or give a contact with another body a conductance"
             )
 
     def conductances(self) -> dict[str, Conductance]:
@@ -255,5 +255,5 @@ class ModelHeat(ModelBase):
 
 
 def _span(begins: float | None, ends: float | None) -> tuple[float, float]:
-    """Return the load factors between which a load acts; minus and plus infinity replace those that are not given."""
+    """Return the load factors between which a load acts, by default minus and plus infinity."""
     return -np.inf if begins is None else float(begins), np.inf if ends is None else float(ends)

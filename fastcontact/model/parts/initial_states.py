@@ -146,10 +146,10 @@ class ModelInitialStates(ModelLoads):
             return
         if ramp is not None:
             raise ModelError(f"field '{field}' has {len(values)} instants and thus no ramp: give times, or one instant")
-        when = times if times_of_file is None or times is not None else times_of_file.tolist()
-        if when is None:
+        times_used = times if times_of_file is None or times is not None else times_of_file.tolist()
+        if times_used is None:
             raise ModelError(f"field '{field}' has {len(values)} instants without times: give the load factor of each")
-        self.add_temperature(values, names, reference=reference, times=when)
+        self.add_temperature(values, names, reference=reference, times=times_used)
 
     def add_initial_stress(
         self,
@@ -239,7 +239,7 @@ class ModelInitialStates(ModelLoads):
     def temperature_rise(self, factors: Sequence[float]) -> Array | None:
         """Return the sum of the temperature rises (n_points,) [temperature]; None without temperatures.
 
-        `factors` contains the multiplier of each temperature; of a step result it is
+        `factors` contains the multiplier of each temperature; those of a step result are
         ``step.iterations["temperature_factors"]``.
         """
         if not self.temperatures or not len(factors):
@@ -279,7 +279,7 @@ class ModelInitialStates(ModelLoads):
     def thermal_forces_by_ramp(self) -> dict[Table | None, Array]:
         """Return the nodal forces (n_points, dim) [force] of thermal strains at multiplier 1, by history.
 
-        ModelError if a cell with a temperature rise has a material without a coefficient of thermal expansion.
+        Raises ModelError if a cell with a temperature rise has a material without a coefficient of thermal expansion.
         """
         by_ramp: dict[Table | None, Array] = {}
         if not self.temperatures:
@@ -317,5 +317,5 @@ class ModelInitialStates(ModelLoads):
     def _forces_of(self, field: MaterialField, offset: StressOffset | None) -> Array:
         """Return the nodal forces (n_points, dim) [force] of a stress offset."""
         u, treatment = np.zeros(self.mesh.points.shape), field.treatment
-        held = stress_at_points(self.mesh, self.kinematics, field.moduli, field.loops, u, treatment, offset)
-        return -internal_force(self.mesh, self.kinematics, held)
+        stress = stress_at_points(self.mesh, self.kinematics, field.moduli, field.loops, u, treatment, offset)
+        return -internal_force(self.mesh, self.kinematics, stress)

@@ -27,7 +27,7 @@ from fastcontact.model.relation_rows import NORMAL, along, normals_of
 from fastcontact.round_off import SINGLE_PRECISION
 
 log = logging.getLogger("fastcontact")
-# Unit vectors or a function that returns them, as for materials; in 2D a single vector also suffices.
+# Unit vectors or a function that returns them, as for materials. In 2D a single vector also suffices.
 SupportAxes = Axes | Sequence[float]
 
 
@@ -120,8 +120,8 @@ class ModelSupports(ModelContact):
         if rotation is not None:
             if axes is not None or normal is not None:
                 raise ModelError(f"the support of '{group}' rotates: give the displacement of its axis as x, y, z")
-            turned = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
-            self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *turned)
+            rotation_and_ramp = rotation_of(f"the rotation of '{group}'", rotation, self.kinematics)
+            self._support(group, dict.fromkeys("xyz"[: self.mesh.dim], 0.0) | components, ramp, *rotation_and_ramp)
             return
         if axes is not None:
             if normal is not None:
@@ -145,9 +145,9 @@ class ModelSupports(ModelContact):
         dim, name = self.mesh.dim, f"the support of '{group}'"
         check_points(self.mesh, group, "no displacement can be prescribed on it")
         nodes = self.mesh.points_of(group).astype(np.intp)
-        places = self.mesh.points[nodes]
+        positions = self.mesh.points[nodes]
         try:
-            frame = frames(checked_axes(axes), places, self.kinematics)
+            frame = frames(checked_axes(axes), positions, self.kinematics)
         except ModelError as error:
             raise ModelError(str(error).replace("a material", name).replace("a point of a cell", "a node")) from None
         for axis, value in axes_of(f"prescribe('{group}')", components, dim).items():
@@ -158,7 +158,7 @@ class ModelSupports(ModelContact):
                 raise ModelError(f"{name}: its axes have components out of the plane of the model")
             rows = along(nodes, np.ascontiguousarray(direction[:, :dim]), self.n_dofs)
             table = table_of(ramp, f"the ramp of {caption}")
-            values = evaluated(value, places, caption)
+            values = evaluated(value, positions, caption)
             self._related_support(group, MultiPointConstraint(f"{caption} along axes", rows, values, table))
 
     def _related_support(self, group: str, relation: MultiPointConstraint) -> None:
@@ -187,8 +187,8 @@ class ModelSupports(ModelContact):
     def prescribed_by_ramp(self) -> tuple[Mask, dict[PartHistory, Array]]:
         """Return the mask (n_points, dim) of the prescribed components and their displacements at multiplier 1, by history.
 
-        Displacements have the shape (n_points, dim) [length] for each history. ModelError if two supports contradict each
-        other.
+        Displacements have the shape (n_points, dim) [length] for each history. Raises ModelError if two supports contradict
+        each other.
         """
         fixed = np.zeros(self.mesh.points.shape, bool)
         by_ramp: dict[PartHistory, Array] = {}
@@ -198,9 +198,9 @@ class ModelSupports(ModelContact):
             for history in {**by_ramp, **histories}:
                 total = by_ramp.setdefault(history, np.zeros(self.mesh.points.shape))
                 values = histories.get(history, np.zeros(len(nodes)))
-                other = np.flatnonzero((total[nodes, k] != values) & ~new)
-                if len(other):
-                    self._refuse(number, int(nodes[other[0]]))
+                different = np.flatnonzero((total[nodes, k] != values) & ~new)
+                if len(different):
+                    self._refuse(number, int(nodes[different[0]]))
                 total[nodes[new], k] = values[new]
             fixed[nodes, k] = True
         self._hold_axis(fixed, by_ramp)
@@ -209,12 +209,14 @@ class ModelSupports(ModelContact):
     def _refuse(self, number: int, node: int) -> None:
         """Raise a ModelError which states that support `number` contradicts an earlier support at `node`."""
         support = self.supports[number]
-        for before in self.supports[:number]:
-            if before.component == support.component and node in self.mesh.points_of(before.group):
+        for earlier in self.supports[:number]:
+            if earlier.component == support.component and node in self.mesh.points_of(earlier.group):
                 break
-        value, other = (float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, before))
+        value, other = (
+            float(np.sum(list(s.by_history(self.mesh.points[[node]]).values()))) for s in (support, earlier)
+        )
         raise ModelError(
-            f"'{support.group}' prescribes {'xyz'[support.component]} = {value:g} at point {node}, but '{before.group}' "
+            f"'{support.group}' prescribes {'xyz'[support.component]} = {value:g} at point {node}, but '{earlier.group}' "
             f"prescribes {other:g} there{' with another ramp' if value == other else ''}: remove one of the two"
         )
 
@@ -237,8 +239,10 @@ class ModelSupports(ModelContact):
         return axis_nodes(self.mesh) if self.kinematics == "axisymmetric" else np.empty(0, np.intp)
 
     def _log_axis(self) -> None:
-        """Log the nodes whose radial displacement is fixed by the axial symmetry only, not by a support."""
-        named = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
-        held = np.setdiff1d(self.axis_nodes, np.concatenate(named)) if named else self.axis_nodes
-        if len(held):
-            log.info("axis of symmetry: x is held at zero at %d nodes with x = 0 (first: point %d)", len(held), held[0])
+        """Log the nodes whose radial displacement is fixed only by the axial symmetry, and not by a support."""
+        supported = [self.mesh.points_of(support.group) for support in self.supports if support.component == 0]
+        nodes = np.setdiff1d(self.axis_nodes, np.concatenate(supported)) if supported else self.axis_nodes
+        if len(nodes):
+            log.info(
+                "axis of symmetry: x is held at zero at %d nodes with x = 0 (first: point %d)", len(nodes), nodes[0]
+            )

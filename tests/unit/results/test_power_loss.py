@@ -184,9 +184,9 @@ def test_a_journal_counts_whole_or_not_at_all(tmp_path: Path, damage: str) -> No
 
 def test_changes_beyond_a_journal_are_made_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(journal, "LARGEST", 4)
-    turns = list(journal.turns([(0, b"ab"), (7, b"c"), (10, b"0123456789"), (30, b"xy")]))
-    assert turns == [[(0, b"ab"), (7, b"c")], [(10, b"0123")], [(14, b"4567")], [(18, b"89"), (30, b"xy")]]
-    assert list(journal.turns([])) == [[]]
+    batches = list(journal.batches([(0, b"ab"), (7, b"c"), (10, b"0123456789"), (30, b"xy")]))
+    assert batches == [[(0, b"ab"), (7, b"c")], [(10, b"0123")], [(14, b"4567")], [(18, b"89"), (30, b"xy")]]
+    assert list(journal.batches([])) == [[]]
 
 
 @pytest.fixture

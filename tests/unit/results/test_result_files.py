@@ -451,7 +451,7 @@ def test_an_old_file_stays_until_the_new_one_is_begun(path: Path, monkeypatch: p
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fastcontact.results.write_arrays.write_own", fail)
+    monkeypatch.setattr("fastcontact.results.write_arrays.write_case", fail)
     with pytest.raises(FileError, match=r"cannot be written \(No space left on device\)"):
         ResultWriter(path, MESH)
     assert path.read_bytes() == before
