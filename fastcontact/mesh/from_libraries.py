@@ -1,4 +1,4 @@
-"""Convert meshes in memory from the libraries gmsh, meshio and PyVista, each of which is imported at its first use."""
+"""Conversion of meshes in memory from the libraries gmsh, meshio and PyVista, which are imported only when needed."""
 
 from __future__ import annotations
 
@@ -151,10 +151,10 @@ def from_gmsh() -> Mesh:
     if not gmsh.isInitialized():
         raise MeshError("no model is open in gmsh: call gmsh.initialize() and make one")
     dim = gmsh.model.getDimension()
-    if not any(map(len, gmsh.model.mesh.getElements(dim)[1])) if dim >= 0 else True:
+    if dim < 0 or not any(map(len, gmsh.model.mesh.getElements(dim)[1])):
         raise MeshError("the model that is open in gmsh has no mesh: call gmsh.model.mesh.generate(2) or (3)")
     _warn_of_omissions(gmsh, dim)
-    before = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
+    saved = {name: gmsh.option.getNumber(name) for name in GMSH_OPTIONS}
     try:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "model.msh"
@@ -163,7 +163,7 @@ def from_gmsh() -> Mesh:
             gmsh.write(str(path))
             return read_mesh(path)
     finally:
-        for name, value in before.items():
+        for name, value in saved.items():
             gmsh.option.setNumber(name, value)
 
 
@@ -171,18 +171,18 @@ def _warn_of_omissions(gmsh: Any, dim: int) -> None:
     """Warn of solid cells without a physical group, which gmsh omits if the model has physical groups."""
     if not gmsh.model.getPhysicalGroups():
         return
-    loose = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
-    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in loose)
+    ungrouped = [tag for _, tag in gmsh.model.getEntities(dim) if not len(gmsh.model.getPhysicalGroupsForEntity(dim, tag))]
+    count = sum(sum(map(len, gmsh.model.mesh.getElements(dim, tag)[1])) for tag in ungrouped)
     if count:
         kind = "volumes" if dim == 3 else "surfaces"
         warn(
             f"{count} solid cells belong to no physical group and are left out (those of the {kind} "
-            f"{', '.join(map(str, loose[:6]))}): give every body a group"
+            f"{', '.join(map(str, ungrouped[:6]))}): give every body a group"
         )
 
 
 def _flags(data: Any, prefix: str) -> dict[str, Any]:
-    """Return the arrays that define groups, under the names expected by `mesh_of`."""
+    """Return the arrays that define groups, with the names that `mesh_of` expects."""
     groups = {}
     for name in data.keys():  # noqa: SIM118, the data of PyVista are not a mapping
         values = np.asarray(data[name])
@@ -196,7 +196,7 @@ def _flags(data: Any, prefix: str) -> dict[str, Any]:
 
 
 def _mesh_of(content: dict[str, Any], file_format: str, library: str) -> Mesh:
-    """Return the mesh with the given content, in which inverted cells are reoriented."""
+    """Return the mesh with the given content, with inverted cells reoriented. Messages name the `library`."""
     try:
         mesh, _ = mesh_of(content, file_format)
     except MeshError as error:

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobians of cells, and derivatives of shape functions arranged for them."""
+"""Jacobian matrices of cells, and gradients of shape functions."""
 
 import numpy as np
 

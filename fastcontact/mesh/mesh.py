@@ -18,13 +18,14 @@ from fastcontact.arrays import AnyArray, Array, Indices, Mask
 from fastcontact.errors import MeshError, Suggesting, unknown
 from fastcontact.mesh import elements
 
-# Suffixes of the names of groups that accompany another group: facets on the other side of a cut along the group, and the
-# point whose displacement is the rotation of a reference point.
+# Suffixes of the names of groups that belong to another group: the facets on the other side of a cut along the group, and
+# the point whose displacement is the rotation of a reference point.
 OPPOSITE = " opposite"
 ROTATION = " rotation"
 
 
 def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
+    """Return values as a read-only array, which is copied unless it is one already."""
     frozen = isinstance(values, np.ndarray) and values.base is None and not values.flags.writeable
     array = np.array(values, dtype=dtype, order="C", copy=None if frozen else True)
     array.setflags(write=False)
@@ -32,7 +33,7 @@ def _read_only(values: ArrayLike, dtype: Any) -> AnyArray:
 
 
 def _numbers(name: str, values: ArrayLike) -> AnyArray:
-    """Return `values` as an array of integers that fit in 32 bits; raise MeshError if they are not integers."""
+    """Return `values` as an array of numbers that are integers of 32 bits. Raises MeshError if they are not."""
     array = np.asarray(values)
     if array.size == 0:
         return array.astype(np.int32)
@@ -46,7 +47,7 @@ def _numbers(name: str, values: ArrayLike) -> AnyArray:
 
 
 def starts_of(blocks: Mapping[str, Sized]) -> dict[str, int]:
-    """Return the number of the first cell of each block by name, where cells are numbered consecutively over all blocks."""
+    """Return the number of the first cell of each block by name. Cells are numbered consecutively over all blocks."""
     return dict(zip(blocks, np.cumsum([0, *map(len, blocks.values())]).tolist(), strict=False))
 
 
@@ -91,10 +92,10 @@ class Mesh(Suggesting):
         points = _read_only(self.points, np.float64)
         if points.ndim != 2 or points.shape[1] not in (2, 3):
             raise MeshError(f"points must have shape (n_points, 2) or (n_points, 3), not {points.shape}")
-        bad = np.flatnonzero(~np.isfinite(points).all(axis=1))
-        if len(bad):
+        invalid = np.flatnonzero(~np.isfinite(points).all(axis=1))
+        if len(invalid):
             raise MeshError(
-                f"point {bad[0]} has coordinates {points[bad[0]]}: {len(bad)} points are not finite numbers"
+                f"point {invalid[0]} has coordinates {points[invalid[0]]}: {len(invalid)} points are not finite numbers"
             )
         cells = {name: self._checked_cells(name, block, len(points)) for name, block in self.cells.items()}
         cells = {name: block for name, block in cells.items() if len(block)}
@@ -108,15 +109,15 @@ class Mesh(Suggesting):
     @staticmethod
     def _checked_cells(name: str, block: ArrayLike, n_points: int) -> AnyArray:
         element = elements.get(name)
-        conn = _read_only(_numbers(f"cells of {name}", block), np.int32)
-        if conn.shape[:1] == (0,):
-            conn = conn.reshape(0, element.n_nodes)
-        if conn.ndim != 2 or conn.shape[1] != element.n_nodes:
-            raise MeshError(f"cells of {name} must have shape (n_cells, {element.n_nodes}), not {conn.shape}")
-        if conn.size and (conn.min() < 0 or conn.max() >= n_points):
-            wrong = min(conn.min(), 0) or conn.max()
-            raise MeshError(f"a cell of {name} refers to point {wrong}, but there are {n_points} points (0-based)")
-        return conn
+        nodes = _read_only(_numbers(f"cells of {name}", block), np.int32)
+        if nodes.shape[:1] == (0,):
+            nodes = nodes.reshape(0, element.n_nodes)
+        if nodes.ndim != 2 or nodes.shape[1] != element.n_nodes:
+            raise MeshError(f"cells of {name} must have shape (n_cells, {element.n_nodes}), not {nodes.shape}")
+        if nodes.size and (nodes.min() < 0 or nodes.max() >= n_points):
+            outside = min(nodes.min(), 0) or nodes.max()
+            raise MeshError(f"a cell of {name} refers to point {outside}, but there are {n_points} points (0-based)")
+        return nodes
 
     @staticmethod
     def _checked_groups(kind: str, groups: Mapping[str, ArrayLike], count: int) -> Mapping[str, AnyArray]:
@@ -124,8 +125,8 @@ class Mesh(Suggesting):
         for name, members in groups.items():
             numbers = np.unique(_numbers(f"{kind} group '{name}'", members).astype(np.int32))
             if len(numbers) and (numbers[0] < 0 or numbers[-1] >= count):
-                wrong = min(numbers[0], 0) or numbers[-1]
-                raise MeshError(f"{kind} group '{name}' contains {kind} {wrong}, but there are {count} (0-based)")
+                outside = min(numbers[0], 0) or numbers[-1]
+                raise MeshError(f"{kind} group '{name}' contains {kind} {outside}, but there are {count} (0-based)")
             numbers.setflags(write=False)
             checked[name] = numbers
         return MappingProxyType(checked)
@@ -196,13 +197,11 @@ class Mesh(Suggesting):
     def cells_of(self, group: str, dim: int | None = None) -> dict[str, AnyArray]:
         """Return the connectivity (n_cells, n_nodes) of a cell group by element type.
 
-        If `dim` is given, only cells of this dimension are returned. MeshError if there is no cell group of this name.
+        If `dim` is given, only cells of this dimension are returned. Raises MeshError if there is no cell group of this name.
         """
         if group in self.point_groups and group not in self.cell_groups:
-            near = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
-            remedy = (
-                f": name one such as {' or '.join(map(repr, near))}" if near else ", and the mesh has none of cells"
-            )
+            similar = difflib.get_close_matches(group, self.cell_groups, n=2, cutoff=0.3) or [*self.cell_groups][:6]
+            remedy = f": name one such as {' or '.join(map(repr, similar))}" if similar else ", and the mesh has none of cells"
             raise MeshError(
                 f"'{group}' is a group of points, but here one of cells is needed (lines, faces, solids){remedy}"
             )
@@ -214,8 +213,8 @@ class Mesh(Suggesting):
     def points_of(self, group: str) -> AnyArray:
         """Return the sorted point numbers (n,) of a point group or, if there is none of this name, of a cell group.
 
-        The points of a cell group are the nodes of its cells. MeshError if there is no group of this name; the message
-        lists similar names.
+        The points of a cell group are the nodes of its cells. Raises MeshError, whose message lists similar names, if there
+        is no group of this name.
         """
         if group in self.point_groups:
             return self.point_groups[group]
@@ -231,6 +230,7 @@ class Mesh(Suggesting):
         return {}
 
     def _no_group(self, kind: str, group: str, known: Iterable[str]) -> str:
+        """Return the message for a missing group; `known` are the names of the groups of its kind."""
         if not self.group_names:
             return f"the mesh has no groups, and thus no '{group}': add groups in the mesher, or with Mesh.with_groups"
         return unknown(kind, group, known)
@@ -238,7 +238,7 @@ class Mesh(Suggesting):
     def point(self, group: str) -> int:
         """Return the point number of a group with a single point.
 
-        MeshError if the group does not contain exactly one point.
+        Raises MeshError if the group does not contain exactly one point.
         """
         numbers = self.points_of(group)
         if len(numbers) != 1:
@@ -303,26 +303,26 @@ class Mesh(Suggesting):
         """
         if name in self.point_groups:
             raise MeshError(f"'{name}' is already a group of points: give the facets another name")
-        chosen = np.asarray(where(np.array(self.points)))
-        if chosen.shape != (self.n_points,) or chosen.dtype != bool:
+        selected = np.asarray(where(np.array(self.points)))
+        if selected.shape != (self.n_points,) or selected.dtype != bool:
             raise MeshError(
-                f"the function of facet group '{name}' returned {chosen.dtype} of shape {chosen.shape}: it must return True "
+                f"the function of facet group '{name}' returned {selected.dtype} of shape {selected.shape}: it must return True "
                 f"or False for each point, shape ({self.n_points},)"
             )
-        facets = _facets_with_nodes(self.solids, chosen, between, None if of is None else self._cells_inside(name, of))
+        facets = _facets_with_nodes(self.solids, selected, between, None if of is None else self._cells_in(name, of))
         if not facets:
-            inside = f" of '{of}'" if of else ""
+            of_group = f" of '{of}'" if of else ""
             raise MeshError(
-                f"facet group '{name}' would be empty: its function selects {int(chosen.sum())} points, but no facet{inside} "
-                f"{'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
+                f"facet group '{name}' would be empty: its function selects {int(selected.sum())} points, but no "
+                f"facet{of_group} {'between two cells' if between else 'on the outside'} has all its nodes among them; compare coordinates "
                 "with a tolerance, or define a group of points with with_groups"
             )
         return self.with_facets({name: facets})
 
-    def _cells_inside(self, name: str, group: str) -> dict[str, Mask]:
-        """Return for each solid cell (n_cells,) whether it belongs to a group, by element type.
+    def _cells_in(self, name: str, group: str) -> dict[str, Mask]:
+        """Return the mask (n_cells,) of the solid cells in a group, by element type.
 
-        MeshError if the group contains no solid cells; the message names the facet group `name`.
+        Raises MeshError, whose message contains the name of the facet group, if the group contains no solid cells.
         """
         if not self.cells_of(group, dim=self.dim):
             raise MeshError(
@@ -346,25 +346,24 @@ class Mesh(Suggesting):
                 cells[kind], rows[name][kind] = _added(cells.get(kind, block[:0]), block)
         starts = starts_of(cells)
 
-        def numbers(of: Mapping[str, AnyArray]) -> AnyArray:
-            return np.concatenate([starts[kind] + place for kind, place in of.items()] or [np.empty(0, np.intp)])
+        def numbers(rows_by_kind: Mapping[str, AnyArray]) -> AnyArray:
+            return np.concatenate([starts[kind] + r for kind, r in rows_by_kind.items()] or [np.empty(0, np.intp)])
 
-        renewed = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
-        return self.replace(cells=cells, cell_groups={**renewed, **{name: numbers(rows[name]) for name in rows}})
+        groups_before = {group: numbers(self.split(members)) for group, members in self.cell_groups.items()}
+        return self.replace(cells=cells, cell_groups={**groups_before, **{name: numbers(rows[name]) for name in rows}})
 
     def merged_groups(self, name: str, members: Iterable[str]) -> Mesh:
         """Return the mesh with a new cell group called `name`, which is the union of the cell groups `members`."""
-        cells = []
+        members = list(members)
         for member in members:
-            self.cells_of(member)
-            cells.append(self.cell_groups[member])
-        return self.with_groups(cells={name: np.concatenate(cells)})
+            self.cells_of(member)  # raises an error for an unknown group
+        return self.with_groups(cells={name: np.concatenate([self.cell_groups[member] for member in members])})
 
 
 def _facets_with_nodes(
-    solids: Mapping[str, AnyArray], chosen: Mask, between: bool, among: Mapping[str, Mask] | None = None
+    solids: Mapping[str, AnyArray], selected: Mask, between: bool, in_group: Mapping[str, Mask] | None = None
 ) -> dict[str, AnyArray]:
-    """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all chosen, by facet element.
+    """Return the facets (n_facets, n_nodes) of solid cells whose nodes are all selected, by element type of the facet.
 
     Each facet appears once, with the orientation of its first cell. This is outward for facets of a single cell.
 
@@ -372,40 +371,40 @@ def _facets_with_nodes(
     ----------
     solids : mapping of str to ndarray of int (n_cells, n_nodes)
         Connectivity by element type.
-    chosen : ndarray of bool (n_points,)
-        Whether each point is chosen.
+    selected : ndarray of bool (n_points,)
+        Whether each point is selected.
     between : bool
         If True, return the facets between two cells; if False, the facets of a single cell.
-    among : mapping of str to ndarray of bool (n_cells,), optional
+    in_group : mapping of str to ndarray of bool (n_cells,), optional
         Whether the facets of each cell are considered; by default those of all cells.
     """
     candidates: dict[str, list[AnyArray]] = {}
     flags: dict[str, list[Mask]] = {}
     for name, block in solids.items():
-        element, counted = elements.get(name), np.ones(len(block), bool) if among is None else among[name]
+        element, considered = elements.get(name), np.ones(len(block), bool) if in_group is None else in_group[name]
         for facet, kind in zip(element.facets, element.facet_elements, strict=True):
             nodes = block[:, list(facet)]
-            inside = chosen[nodes].all(axis=1)
-            candidates.setdefault(kind, []).append(nodes[inside])
-            flags.setdefault(kind, []).append(counted[inside])
+            rows = selected[nodes].all(axis=1)
+            candidates.setdefault(kind, []).append(nodes[rows])
+            flags.setdefault(kind, []).append(considered[rows])
     facets_by_kind, n_cells = {}, 2 if between else 1
     for kind, blocks in candidates.items():
-        facets, is_among = np.concatenate(blocks), np.concatenate(flags[kind])
+        facets, considered = np.concatenate(blocks), np.concatenate(flags[kind])
         _, first, group, count = np.unique(
             np.sort(facets, axis=1), axis=0, return_index=True, return_inverse=True, return_counts=True
         )
-        count_among = np.bincount(group.ravel(), is_among, len(count))
-        rows = np.sort(first[(count == n_cells) & (count_among == n_cells)])
+        count_in_group = np.bincount(group.ravel(), considered, len(count))
+        rows = np.sort(first[(count == n_cells) & (count_in_group == n_cells)])
         if len(rows):
             facets_by_kind[kind] = facets[rows]
     return facets_by_kind
 
 
 def _added(block: AnyArray, facets: AnyArray) -> tuple[AnyArray, Indices]:
-    """Return a block of facets with the missing facets appended, and the row of each of the `facets` in it."""
+    """Return a block of facets extended by those of the `facets` that it lacks, and the row of each of the `facets`."""
     both = np.concatenate([block, facets])
     _, first, facet = np.unique(np.sort(both, axis=1), axis=0, return_index=True, return_inverse=True)
     row = first[facet.ravel()]  # row of the first facet with the same nodes
     new = (row == np.arange(len(both))) & (np.arange(len(both)) >= len(block))
-    place = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
-    return np.concatenate([block, both[new]]), place[row[len(block) :]].astype(np.intp)
+    new_row = np.where(np.arange(len(both)) < len(block), np.arange(len(both)), len(block) + np.cumsum(new) - 1)
+    return np.concatenate([block, both[new]]), new_row[row[len(block) :]].astype(np.intp)

@@ -15,7 +15,7 @@ from fastcontact.arrays import Array
 Rule = tuple[Array, Array]
 
 
-@cache  # mortar contact calls it in every pairing in 2D
+@cache
 def gauss_line(n: int) -> Rule:
     """Return the Gauss-Legendre rule with `n` points on [-1, 1], exact to degree 2n - 1."""
     points, weights = np.polynomial.legendre.leggauss(n)
@@ -81,7 +81,7 @@ def triangle_16() -> Rule:
 
 
 def _symmetric(centre: list[float], threes: list[tuple[float, float]], sixes: list[tuple[float, float, float]]) -> Rule:
-    """Return the symmetric rule on the triangle with the given orbits.
+    """Return the symmetric rule on the triangle with the given orbits of one, three and six points.
 
     Each orbit is given by the weight of its points and by their independent barycentric coordinates: none for the centroid,
     one for orbits of three points, and two for orbits of six. The weights of all points add up to 1.
@@ -198,18 +198,18 @@ def _gauss_squared_complement(n: int) -> tuple[Array, Array]:
     k = np.arange(n)
     diagonal = -4.0 / ((2 * k + 2) * (2 * k + 4))
     k = k[1:]
-    off = 2 * k * (k + 2) / ((2 * k + 2) * np.sqrt((2 * k + 1) * (2 * k + 3)))
-    roots, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(off, 1) + np.diag(off, -1))
+    off_diagonal = 2 * k * (k + 2) / ((2 * k + 2) * np.sqrt((2 * k + 1) * (2 * k + 3)))
+    roots, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(off_diagonal, 1) + np.diag(off_diagonal, -1))
     return (1.0 + roots) / 2.0, vectors[0] ** 2 / 3.0
 
 
-def product_rule(cell: str, n: int, straight: int | None = None) -> Rule:
+def product_rule(cell: str, n: int, cartesian: int | None = None) -> Rule:
     """Return a product rule on the reference cell of the linear element `cell`, with `n` points in each direction.
 
-    If `straight` is given, it replaces `n` in the Cartesian directions of squares, cubes and prisms. Raises KeyError for an
+    If `cartesian` is given, it replaces `n` in the Cartesian directions of squares, cubes and prisms. Raises KeyError for an
     unknown element.
     """
-    m = n if straight is None else straight
+    m = n if cartesian is None else cartesian
     return {
         "line2": lambda: gauss_line(n),
         "tri3": lambda: collapsed_triangle(n),

@@ -13,10 +13,10 @@ from fastcontact.mesh import elements, quality_kernels
 from fastcontact.mesh.mesh import Mesh
 
 # Jacobians below this fraction of the square, in 3D of the cube, of the longest edge are attributed to round-off.
-_FLAT = 1e-12
-# Limits beyond which a cell is poor: ratio of smallest to largest Jacobian, largest angle [degrees], and ratio of the volume
-# to the cube of the longest edge.
-EVEN, WIDE, THICK = 0.05, 175.0, 1e-4
+_ROUND_OFF = 1e-12
+# Limits beyond which a cell is poor: the smallest ratio of the smallest to the largest Jacobian, the largest angle [degrees],
+# and the smallest ratio of the volume to the cube of the longest edge.
+LEAST_JACOBIAN_RATIO, LARGEST_ANGLE, LEAST_VOLUME_RATIO = 0.05, 175.0, 1e-4
 # Remedies for bad cells, as parts of messages.
 REMEDIES = {
     "degenerate": "remove it or merge its points differently",
@@ -109,13 +109,13 @@ def quality(mesh: Mesh) -> MeshQuality:
 def check_cells(mesh: Mesh) -> None:
     """Check that every solid cell has a positive Jacobian at its default quadrature points.
 
-    MeshError if a cell is degenerate, that is if its area or volume is zero up to round-off; if it is inverted, that is if a
-    Jacobian is negative; if it contains a node twice; or if two cells have the same nodes. The message states the number
-    and the position of the first such cell.
+    Raises MeshError if a cell is degenerate, that is if all its Jacobians are zero up to round-off; if it is inverted, that
+    is if another Jacobian is not positive; if it contains a node twice; or if two cells have the same nodes. The message
+    states the number and the position of the first such cell.
     """
     for name in mesh.solids:
         _check_nodes(mesh, name)
-        _check_twice(mesh, name)
+        _check_duplicates(mesh, name)
         measure, flat, inverted = _bad_cells(mesh, name)
         for fault, bad in (("degenerate", flat), ("inverted", inverted)):
             if bad.any():
@@ -132,41 +132,44 @@ def poorest_cell(mesh: Mesh) -> str:
     """
     for name in mesh.solids:
         measure, low, high, longest = _extremes(mesh, name)
-        even, flat = low / high, measure / longest**3
-        faults = [(even, even, EVEN, "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh")]
+        jacobian, volume = low / high, measure / longest**3
+        text = "its smallest Jacobian is {:.2g} of its largest; move its nodes or remesh"
+        faults = [(jacobian, jacobian, LEAST_JACOBIAN_RATIO, text)]
         if mesh.dim == 2:
             angle = np.degrees(corner_angles(_corners(mesh, name)).max(axis=1))
-            faults.append((-angle, angle, -WIDE, "it has an angle of {:.1f} degrees; move its nodes or remesh"))
+            text = "it has an angle of {:.1f} degrees; move its nodes or remesh"
+            faults.append((-angle, angle, -LARGEST_ANGLE, text))
         else:
-            faults.append((flat, flat, THICK, "its volume is only {:.1e} of its longest edge cubed; remesh there"))
-        for figure, shown, limit, text in faults:
-            row = int(np.argmin(figure))
-            if figure[row] < limit:
-                return f"{_described(mesh, name, row, measure[row])} is poor: {text.format(shown[row])}"
+            text = "its volume is only {:.1e} of its longest edge cubed; remesh there"
+            faults.append((volume, volume, LEAST_VOLUME_RATIO, text))
+        for criterion, value, limit, text in faults:
+            row = int(np.argmin(criterion))
+            if criterion[row] < limit:
+                return f"{_described(mesh, name, row, measure[row])} is poor: {text.format(value[row])}"
     return ""
 
 
 def _check_nodes(mesh: Mesh, name: str) -> None:
-    """Raise MeshError if a cell contains a node twice, because its stresses are then undefined."""
+    """Raise MeshError if a cell contains a node repeated, because its stresses are then undefined."""
     nodes = np.sort(mesh.cells[name], axis=1)
-    twice = nodes[:, 1:] == nodes[:, :-1]
-    bad = np.flatnonzero(twice.any(axis=1))
+    repeated = nodes[:, 1:] == nodes[:, :-1]
+    bad = np.flatnonzero(repeated.any(axis=1))
     if len(bad):
-        node = int(nodes[bad[0], :-1][twice[bad[0]]][0])
+        node = int(nodes[bad[0], :-1][repeated[bad[0]]][0])
         raise MeshError(
-            f"{_described(mesh, name, int(bad[0]))} has point {node} twice, one of {len(bad)} such cells: write it as the "
+            f"{_described(mesh, name, int(bad[0]))} has point {node} repeated, one of {len(bad)} such cells: write it as the "
             "element that it collapses to, a triangle, wedge, pyramid or tetrahedron"
         )
 
 
-def _check_twice(mesh: Mesh, name: str) -> None:
+def _check_duplicates(mesh: Mesh, name: str) -> None:
     """Raise MeshError if two cells of one element type have the same nodes, because their stiffness is counted twice."""
     nodes = mesh.cells[name].astype(np.int64)
-    # Most cells are distinguished by sums of their nodes; only cells with equal sums are compared node by node.
+    # Most cells are distinguished by sums over their nodes. Only cells with equal sums are compared node by node.
     key = nodes.sum(axis=1) * mesh.n_points + (nodes * nodes % 1_000_003).sum(axis=1)
     order = np.argsort(key, kind="stable")
-    alike = np.flatnonzero(key[order[1:]] == key[order[:-1]])
-    rows = np.unique(np.concatenate([order[alike], order[alike + 1]]))
+    equal = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    rows = np.unique(np.concatenate([order[equal], order[equal + 1]]))
     _, first, count = np.unique(np.sort(nodes[rows], axis=1), axis=0, return_index=True, return_counts=True)
     if (count > 1).any():
         row = int(rows[first[count > 1].min()])
@@ -177,7 +180,7 @@ def _check_twice(mesh: Mesh, name: str) -> None:
 
 
 def _described(mesh: Mesh, name: str, row: int, measure: float | None = None) -> str:
-    """Return a string with number, element type, position and, if `measure` is given, size of a cell, for messages."""
+    """Return a text with the number, the element type, the position and, if given, the `measure` of a cell, for messages."""
     centre = ", ".join(f"{x:.6g}" for x in _corners(mesh, name)[row].mean(axis=0))
     size = "" if measure is None else f", {'area' if mesh.dim == 2 else 'volume'} {measure:.3g}"
     return f"cell {mesh.offsets[name] + row} ({name} at ({centre}){size})"
@@ -190,27 +193,27 @@ def _corners(mesh: Mesh, name: str) -> Array:
 
 def corner_angles(corners: Array) -> Array:
     """Return the angles (n_cells, n_corners) [radian] of polygons with `corners` (n_cells, n_corners, dim) [length]."""
-    ahead = np.roll(corners, -1, axis=1) - corners
-    behind = np.roll(corners, 1, axis=1) - corners
-    cosine = (ahead * behind).sum(axis=2)
+    to_next = np.roll(corners, -1, axis=1) - corners
+    to_previous = np.roll(corners, 1, axis=1) - corners
+    cosine = (to_next * to_previous).sum(axis=2)
     if corners.shape[2] == 3:
-        return np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=2), cosine)
-    sine = ahead[..., 0] * behind[..., 1] - ahead[..., 1] * behind[..., 0]
-    # For either orientation of the cell the angles are interior angles, which exceed 180 degrees at re-entrant corners.
+        return np.arctan2(np.linalg.norm(np.cross(to_next, to_previous), axis=2), cosine)
+    sine = to_next[..., 0] * to_previous[..., 1] - to_next[..., 1] * to_previous[..., 0]
+    # The angles are interior angles for either orientation of the cell, and exceed 180 degrees at re-entrant corners.
     sine *= np.where(sine.sum(axis=1, keepdims=True) < 0, -1.0, 1.0)
     return np.arctan2(sine, cosine) % (2 * np.pi)
 
 
 def _bad_cells(mesh: Mesh, name: str) -> tuple[Array, Mask, Mask]:
-    """Return area or volume of each cell (n_cells,), whether this is zero up to round-off, and whether a cell is inverted."""
+    """Return the area or volume (n_cells,) of the cells of one type, and the masks of degenerate and of inverted cells."""
     measure, low, high, longest = _extremes(mesh, name)
-    rounding = _FLAT * longest**mesh.dim
-    flat = np.maximum(np.abs(low), np.abs(high)) <= rounding
-    return measure, flat, (low <= rounding) & ~flat
+    tolerance = _ROUND_OFF * longest**mesh.dim
+    degenerate = np.maximum(np.abs(low), np.abs(high)) <= tolerance
+    return measure, degenerate, (low <= tolerance) & ~degenerate
 
 
 def _extremes(mesh: Mesh, name: str) -> tuple[Array, Array, Array, Array]:
-    """Return area or volume, smallest Jacobian, largest Jacobian and longest edge of the cells of one type (n_cells,)."""
+    """Return the area or volume, the smallest and the largest Jacobian, and the longest edge of each cell (n_cells,)."""
     element = elements.get(name)
     _, gradients, weights = element.tables
     low, high, measure, longest = np.empty((4, len(mesh.cells[name])))

@@ -1,5 +1,5 @@
 # mypy: allow-untyped-defs, allow-incomplete-defs, no-check-untyped-defs
-"""Jacobian determinants of solid cells at quadrature points, and their longest edges, for the detection of poor cells."""
+"""Jacobian determinants at the quadrature points of solid cells, and the longest edges, for the detection of poor cells."""
 
 import numpy as np
 

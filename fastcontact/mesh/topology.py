@@ -24,14 +24,14 @@ from fastcontact.errors import MeshError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 
-Found = TypeVar("Found")
-Further = ParamSpec("Further")
-# Distance, relative to the size of the mesh, below which nodes are regarded as coincident, or as points of a line.
-IN_LINE = 1e-6
+Result = TypeVar("Result")
+Arguments = ParamSpec("Arguments")
+# Distance, relative to the size of the mesh, below which nodes are regarded as coincident or collinear.
+COLLINEAR = 1e-6
 
 
 def corner_measures(mesh: Mesh, name: str) -> Array:
-    """Return the signed area [length^2] or volume [length^3] (n_cells,) of linear cells with the corners of cells of a type.
+    """Return the signed area [length^2] or volume [length^3] (n_cells,) of the cells of one type, with straight edges.
 
     Faces with four corners are bilinear. The quadrature of the linear element is exact for this measure.
     """
@@ -47,22 +47,22 @@ def corner_measures(mesh: Mesh, name: str) -> Array:
 def oriented(mesh: Mesh) -> tuple[Mesh, int]:
     """Return the mesh with all solid cells oriented positively, and the number of reoriented cells.
 
-    The nodes of 2D cells are then ordered counter-clockwise, and the normals of the facets of 3D cells point outward.
+    The nodes of 2D cells are then ordered counter-clockwise, and the normals of the facets of 3D cells point outward. Raises
     MeshError if an inverted cell lies on the same side of a facet as its neighbour, because the mesh is folded there.
     """
-    cells, turned = dict(mesh.cells), 0
+    cells, count = dict(mesh.cells), 0
     for name in mesh.solids:
-        inside_out = corner_measures(mesh, name) < 0
-        if inside_out.any():
+        inverted = corner_measures(mesh, name) < 0
+        if inverted.any():
             block = mesh.cells[name].copy()
-            block[inside_out] = block[inside_out][:, elements.get(name).reversed]
+            block[inverted] = block[inverted][:, elements.get(name).reversed]
             cells[name] = block
-            turned += int(inside_out.sum())
-    if not turned:
+            count += int(inverted.sum())
+    if not count:
         return mesh, 0
     mesh = mesh.replace(cells=cells)
     _check_folds(mesh)
-    return mesh, turned
+    return mesh, count
 
 
 def _check_folds(mesh: Mesh) -> None:
@@ -78,32 +78,32 @@ def _check_folds(mesh: Mesh) -> None:
     rows, others = equal_rows(keys)
     if len(rows):
         first, second = sorted((int(owner[rows[0]]), int(owner[others[0]])))
-        where = ", ".join(f"{x:.6g}" for x in mesh.points[keys[rows[0]][:2]].mean(axis=0))
+        position = ", ".join(f"{x:.6g}" for x in mesh.points[keys[rows[0]][:2]].mean(axis=0))
         raise MeshError(
-            f"cells {first} and {second} lie on the same side of the facet between them, near ({where}), one of "
+            f"cells {first} and {second} lie on the same side of the facet between them, near ({position}), one of "
             f"{len(rows)} such pairs: the mesh is folded there; move its nodes or remesh"
         )
 
 
 def _direction(facets: Indices) -> Indices:
-    """Return three nodes (n, 3) of each facet which identify it with its orientation.
+    """Return three numbers (n, 3) that identify each facet and its orientation.
 
-    They are the node with the lowest number, the node after it and the node before it.
+    They are the node with the lowest number, the node after it and the node before it. For a line the third number is the
+    position of the lowest node.
     """
     first = facets.argmin(axis=1)
     rows, count = np.arange(len(facets)), facets.shape[1]
-    # The orientation of a line is the order of its two ends.
-    ahead, behind = (facets[rows, (first + k) % count] for k in (1, -1))
-    return np.column_stack([facets[rows, first], ahead, behind if count > 2 else first])
+    following, preceding = (facets[rows, (first + k) % count] for k in (1, -1))
+    return np.column_stack([facets[rows, first], following, preceding if count > 2 else first])
 
 
-def remembered(function: Callable[Concatenate[Mesh, Further], Found]) -> Callable[Concatenate[Mesh, Further], Found]:
-    """Decorate `function` such that its result is cached for each mesh, which is immutable, and further arguments."""
-    known: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Found]] = WeakKeyDictionary()
+def remembered(function: Callable[Concatenate[Mesh, Arguments], Result]) -> Callable[Concatenate[Mesh, Arguments], Result]:
+    """Decorate `function` such that its results are cached by mesh, which is immutable, and by the other arguments."""
+    results: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Result]] = WeakKeyDictionary()
 
     @wraps(function)
-    def remembered(mesh: Mesh, *args: Further.args, **kwargs: Further.kwargs) -> Found:
-        of_mesh, key = known.setdefault(mesh, {}), (*args, *kwargs.items())
+    def remembered(mesh: Mesh, *args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        of_mesh, key = results.setdefault(mesh, {}), (*args, *kwargs.items())
         if key not in of_mesh:
             of_mesh[key] = function(mesh, *args, **kwargs)
         return of_mesh[key]
@@ -128,9 +128,9 @@ def bodies(mesh: Mesh) -> tuple[int, Numbers]:
     row, column = np.concatenate(rows), np.concatenate(columns)
     graph = coo_array((np.ones(len(row), np.int8), (row, column)), shape=(mesh.n_points, mesh.n_points))
     _, label = connected_components(graph, directed=False)
-    labels, compact = np.unique(label[used], return_inverse=True)
+    labels, number = np.unique(label[used], return_inverse=True)
     body = np.full(mesh.n_points, -1, np.int32)
-    body[used] = compact
+    body[used] = number
     body.setflags(write=False)
     return len(labels), body
 
@@ -187,23 +187,23 @@ def _facets(mesh: Mesh) -> tuple[Mapping[str, Numbers], Numbers, Mapping[str, Nu
 
 
 def equal_rows(rows: Indices | Numbers) -> tuple[Indices, Indices]:
-    """Return the pairs (n_pairs,), (n_pairs,) of equal `rows` (n, k): m equal rows are in m - 1 pairs, which connect them."""
-    columns = np.ascontiguousarray(rows.T)  # rows of few numbers are slow to compare
+    """Return pairs (n_pairs,), (n_pairs,) of equal `rows` (n, k). For m equal rows there are m - 1 pairs, which connect them."""
+    columns = np.ascontiguousarray(rows.T)  # long columns are compared faster than short rows
     order = np.lexsort(columns)
     columns = columns[:, order]
     same = (columns[:, 1:] == columns[:, :-1]).all(axis=0)
     return order[:-1][same], order[1:][same]
 
 
-def same_facets(among: Numbers, facets: Numbers) -> Indices:
-    """Return for each of the `facets` (n, k) the row (n,) in `among` (m, k) of the facet with the same nodes.
+def same_facets(table: Numbers, facets: Numbers) -> Indices:
+    """Return the row (n,) in `table` (m, k) of the facet with the same nodes as each of the `facets` (n, k).
 
     The row is -1 if there is no such facet.
     """
-    near = np.flatnonzero(np.isin(among, facets).all(axis=1))
-    keys = np.sort(np.vstack([among[near], facets]), axis=1)
+    candidates = np.flatnonzero(np.isin(table, facets).all(axis=1))
+    keys = np.sort(np.vstack([table[candidates], facets]), axis=1)
     _, first, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return np.append(near, -1)[np.minimum(first[index.ravel()[len(near) :]], len(near))]
+    return np.append(candidates, -1)[np.minimum(first[index.ravel()[len(candidates) :]], len(candidates))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,7 +293,7 @@ class RigidParts:
     count : int
         Number of parts, which is the number of bodies if there are no hinges.
     part : ndarray of int (n_points,)
-        Number of the part of each point, the lowest if it belongs to several parts; -1 for points without a solid cell.
+        Number of the part of each point, the lowest one if it belongs to several; -1 for points without a solid cell.
     hinge_node, hinge_part : ndarray of int (k,)
         Pairs of a node at a hinge and a part to which it belongs, in ascending order of the nodes.
     """
@@ -323,27 +323,26 @@ def rigid_parts(mesh: Mesh) -> RigidParts:
     if len(first) == count:
         none = np.empty(0, np.intp)
         return RigidParts(count, body.astype(np.intp), none, none)
-    part, node, several = _shared_nodes(mesh, label.ravel())
+    part, node, part_of_node = _shared_nodes(mesh, label.ravel())
     while True:
-        first, second, at = _meetings(node, several)
-        rigid = _rigid(mesh.points, first, second, at)
+        first, second, common = _common_nodes(node, part_of_node)
+        rigid = _rigidly_connected(mesh.points, first, second, common)
         if not rigid.any():
             break
-        count = int(max(part.max(), several.max())) + 1
+        count = int(max(part.max(), part_of_node.max())) + 1
         ends = first[rigid], second[rigid]
         graph = coo_array((np.ones(len(ends[0]), np.int8), ends), shape=(count, count))
         _, merged = connected_components(graph, directed=False)
         part = np.where(part >= 0, merged[part], -1)
-        node, several = np.unique(np.stack([node, merged[several]]), axis=1)
-    left = np.isin(node, at)
-    return RigidParts(int(part.max()) + 1, part, node[left], several[left])
+        node, part_of_node = np.unique(np.stack([node, merged[part_of_node]]), axis=1)
+    hinges = np.isin(node, common)
+    return RigidParts(int(part.max()) + 1, part, node[hinges], part_of_node[hinges])
 
 
 def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return the lowest part (n_points,) of each point, and pairs (k,) of shared nodes and their parts.
+    """Return the lowest part (n_points,) of each point, and the pairs (k,) of a shared node and each of its parts.
 
-    `label` (n_solids,) contains the part of each solid cell. The part is -1 for points without a solid cell. A shared node
-    belongs to several parts and occurs in a pair with each of them.
+    `label` (n_solids,) contains the part of each solid cell. The part of points without a solid cell is -1.
     """
     part = np.full(mesh.n_points, -1, np.intp)
     shared = np.zeros(mesh.n_points, bool)
@@ -356,32 +355,35 @@ def _shared_nodes(mesh: Mesh, label: Indices) -> tuple[Indices, Indices, Indices
     rows = [
         (block[shared[block]], np.broadcast_to(owners[:, None], block.shape)[shared[block]]) for block, owners in owned
     ]
-    node, several = np.unique(np.concatenate([np.stack(pair) for pair in rows], axis=1), axis=1).astype(np.intp)
+    node, part_of_node = np.unique(np.concatenate([np.stack(pair) for pair in rows], axis=1), axis=1).astype(np.intp)
     _, lowest = np.unique(node, return_index=True)
-    part[node[lowest]] = several[lowest]
-    return part, node, several
+    part[node[lowest]] = part_of_node[lowest]
+    return part, node, part_of_node
 
 
-def _meetings(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return pairs of parts (m,) with a common node, and this node, from nodes in ascending order and their parts."""
-    meetings = [np.empty((3, 0), np.intp)]
+def _common_nodes(node: Indices, part: Indices) -> tuple[Indices, Indices, Indices]:
+    """Return two parts (m,), (m,) and a node (m,) that they share, for all such pairs of parts and nodes.
+
+    `node` and `part` are the pairs of a node and each of its parts, in ascending order of the nodes.
+    """
+    pairs = [np.empty((3, 0), np.intp)]
     shift = 1
     while len(same := np.flatnonzero(node[shift:] == node[:-shift])):
-        meetings.append(np.stack([part[same], part[same + shift], node[same]]))
+        pairs.append(np.stack([part[same], part[same + shift], node[same]]))
         shift += 1
-    first, second, at = np.concatenate(meetings, axis=1)
-    return first, second, at
+    first, second, common = np.concatenate(pairs, axis=1)
+    return first, second, common
 
 
-def _rigid(points: Array, first: Indices, second: Indices, at: Indices) -> Mask:
-    """Return for each pair (m,) of parts `first` and `second` with a common node whether they are rigidly connected."""
-    if not len(at):
+def _rigidly_connected(points: Array, first: Indices, second: Indices, common: Indices) -> Mask:
+    """Return for each pair (m,) of parts with a common node whether all their common nodes connect them rigidly."""
+    if not len(common):
         return np.empty(0, bool)
     _, pair, count = np.unique(np.stack([first, second]), axis=1, return_inverse=True, return_counts=True)
     pair, dim = pair.ravel(), points.shape[1]
-    mean = np.column_stack([np.bincount(pair, points[at, d]) for d in range(dim)]) / count[:, None]
-    away = points[at] - mean[pair]
-    moment = np.stack([[np.bincount(pair, away[:, i] * away[:, j]) for j in range(dim)] for i in range(dim)])
+    mean = np.column_stack([np.bincount(pair, points[common, d]) for d in range(dim)]) / count[:, None]
+    arms = points[common] - mean[pair]
+    moments = np.stack([[np.bincount(pair, arms[:, i] * arms[:, j]) for j in range(dim)] for i in range(dim)])
     # To prevent a relative rotation, the common nodes must extend in one direction in 2D, and in two directions in 3D.
-    spread = np.linalg.eigvalsh(np.moveaxis(moment, 2, 0))[:, 1]
-    return np.asarray((spread > (IN_LINE * np.ptp(points, axis=0).max()) ** 2)[pair])
+    second_moment = np.linalg.eigvalsh(np.moveaxis(moments, 2, 0))[:, 1]
+    return np.asarray((second_moment > (COLLINEAR * np.ptp(points, axis=0).max()) ** 2)[pair])

@@ -62,7 +62,7 @@ class ForceDrivenObstacles:
         return (self.shape[0] + number) * self.shape[1] + np.arange(self.shape[1])
 
     def positions(self, u: Array) -> dict[str, Array]:
-        """Return the displacement (dim,) of each obstacle from all displacements u (n_dofs,), by name of the pair [length]."""
+        """Return the displacement (dim,) of each obstacle by name of its pair, from displacements u (n_dofs,) [length]."""
         return {pair.name: u[self.dofs(number)] for number, pair in enumerate(self.pairs)}
 
     def number(self, name: str) -> int | None:

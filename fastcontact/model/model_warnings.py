@@ -182,10 +182,10 @@ def _coincident(model: Model) -> str:
     first = pairs[np.lexsort(mesh.points[pairs[:, 0]].T)[0]]
     point = ", ".join(f"{x:.6g}" for x in mesh.points[first[0]])
     largest = float(distance.max())
-    relation = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
+    where = "where another one is" if largest <= LENGTH_ROUND_OFF * size else f"within {largest:.3g} of another one"
     return (
-        f"{count} nodes lie {relation}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): "
-        "merge them in the mesher or with generate.transform.merge_points, or define the contact"
+        f"{count} nodes lie {where}, and no contact joins them (first: points {first[0]} and {first[1]} at ({point})): merge "
+        "them in the mesher or with generate.transform.merge_points, or define the contact"
     )
 
 
@@ -307,7 +307,7 @@ def _load_integral(model: Model, load: Load) -> Iterator[str]:
 
 
 def _integrals(mesh: Mesh, element: str, cells: Numbers, value: Value, name: str, finer: bool) -> Array:
-    """Return the integrals (n_cells,) of a load over cells, with 5 points in each direction or, if `finer`, with 9."""
+    """Return the integrals (n_cells,) of a load over cells, with 5 points in each direction or with 9 if `finer`."""
     reference = elements.get(element)
     xi, weights = quadrature.product_rule(reference.linear, 9 if finer else 5)
     J = np.einsum("qnk,cnd->cqdk", reference.gradient(xi), mesh.points[cells])

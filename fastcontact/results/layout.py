@@ -64,7 +64,7 @@ def cells_by_element(mesh: Mesh, values: AnyArray) -> dict[str, AnyArray]:
 
 
 def mean_in_cells(mesh: Mesh, step: StepResult) -> Array:
-    """Return for each cell the mean (n_solids, n_components) over its nodes of the nodal stress of its material [pressure]."""
+    """Return the nodal stress of the material of each cell, averaged over its nodes (n_solids, n_components) [pressure]."""
     separate_mesh, _, stress = separated(mesh, step)
     return np.concatenate([stress[block].mean(axis=1) for block in separate_mesh.solids.values()])
 
@@ -322,7 +322,7 @@ def check_step(mesh: Mesh, step: StepResult, cell_fields: Iterable[str]) -> None
 
 
 def check_contact(caption: str, contact: ContactResult, mesh: Mesh) -> None:
-    """Raise FileError, whose message begins with `caption`, if the arrays of a pair are inconsistent or do not fit the mesh."""
+    """Raise FileError, whose message begins with `caption`, if arrays of a pair are inconsistent or do not fit the mesh."""
     row = contact_row(mesh.dim, optional_columns(contact))
     for name in row.names or ():
         shape_given, shape = np.shape(getattr(contact, name)), (len(contact.points), *row[name].shape)

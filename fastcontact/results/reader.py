@@ -213,7 +213,7 @@ class Results(StepSequence):
         self.warnings: tuple[str, ...] = tuple(dict.fromkeys([*(run or {}).get("warnings", ()), *step_warnings]))
 
     def _run_record(self, group: Any) -> dict[str, Any] | None:
-        """Return the record of the end of the run. It is None during the run, after a crash, and if steps were added later."""
+        """Return the record of the end of the run; None during the run, after a crash, and if steps were added later."""
         if "runs" not in group:  # schema 1
             return _read_json(group["run"], self._raw) if "run" in group else None
         rows = group["runs"][-1:]

@@ -146,7 +146,7 @@ MISTAKES = [
     Mistake("a linear solver that is not installed", solver_without_package, fc.ModelError,
             r"linear solver '\w+' needs the package \w+: pip install 'fastcontact\[\w+\]'"),
     Mistake("a picture of no steps", lambda: contact_zones([], "pair"), fc.errors.FastcontactError,
-            r"there are no steps to plot"),
+            r"there are no steps to draw"),
     Mistake("stresses on the axis of a solid in space", solid_stress_on_axis, fc.errors.FastcontactError,
             r"stresses along the axis need a two-dimensional mesh: in three dimensions draw a section"),
     Mistake("a spring without second node", lambda: with_load("add_spring", group="UPPER_TOP_LEFT", axial=1.0), fc.ModelError,

@@ -139,7 +139,7 @@ def test_points_that_touch_may_not_have_two_temperatures_in_another_order(tmp_pa
 
 def test_no_points_have_no_values_of_two_bodies():
     field = mesh_fields.FileField(None, np.zeros((1, 3)), np.zeros((3, 2)))
-    mesh_fields._refuse_two(field, np.empty((0, 2)), 1.0, "the field")
+    mesh_fields._check_unique(field, np.empty((0, 2)), 1.0, "the field")
 
 
 def test_a_part_of_the_mesh_suffices_for_a_group(tmp_path):

@@ -1,6 +1,7 @@
-"""Reference elements. A new element is a new entry in the tuple ``ELEMENTS`` of the module of its shape.
+"""Reference elements.
 
-Every module of this package whose name has no leading underscore contains the elements of one shape.
+Each module without a leading underscore contains the elements of one shape in its tuple ``ELEMENTS``, to which new elements
+are added.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ BY_VTK = {element.vtk: element for element in ELEMENTS.values()}
 
 @cache
 def get(name: str) -> Element:
-    """Return the element called `name`; MeshError if there is none, with the most similar names."""
+    """Return the element called `name`. Raises MeshError, with similar names, if there is none."""
     try:
         return ELEMENTS[name]
     except KeyError:

@@ -1,7 +1,4 @@
-"""Reference elements with shape functions and default quadrature, and shape functions of families of elements.
-
-Reference coordinates are dimensionless.
-"""
+"""The class of reference elements, and the shape functions of families of elements."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ Function = Callable[[Array], Array]
 # Nodes, shape functions and their derivatives.
 Functions = tuple[Array, Function, Function]
 
-# Names of facets by the dimension of the cell and the number of nodes of the facet.
+# Element types of facets by the dimension of the cell and the number of nodes of the facet.
 _FACETS = {
     (2, 2): "line2", (2, 3): "line3",
     (3, 3): "tri3", (3, 6): "tri6", (3, 4): "quad4", (3, 8): "quad8", (3, 9): "quad9",
@@ -32,12 +29,12 @@ class Element:
     Parameters
     ----------
     name : str
-        Name in this package, e.g. ``"tri6"``.
+        Name in this package, for example ``"tri6"``.
     nodes : ndarray (n_nodes, dim)
-        Reference coordinates [-], in the order of VTK; corners first, then mid nodes in the order of `edges`, then
-        centre nodes of faces and of the cell.
+        Reference coordinates of the nodes in the order of VTK: the corners, the mid-side nodes in the order of `edges`, and
+        the centre nodes of faces and of the cell [-].
     edges : tuple of (int, int)
-        Corner pairs, one per edge; in 2D counter-clockwise.
+        Corners at the ends of each edge; in 2D the edges are counter-clockwise.
     facets : tuple of tuple of int
         Local nodes of each boundary facet, oriented so that its normal points outward.
     shape : callable
@@ -45,18 +42,18 @@ class Element:
     gradient : callable
         ``gradient(xi)`` maps (m, dim) to derivatives (m, n_nodes, dim) [-].
     quadrature : (ndarray (n_q, dim), ndarray (n_q,))
-        Default points and weights [-] for the stiffness: those of code_aster's element of the same shape.
+        Default quadrature points and weights of the stiffness [-].
     meshio, med : str
-        The name in meshio and the three-letter MED code.
+        Name in meshio, and three-letter code in MED.
     vtk : int
-        The VTK cell type.
+        Cell type in VTK.
     quadratic : str
-        Name of the element on the same corners with mid nodes.
+        Name of the serendipity element with the same corners; of a quadratic element its own name.
     dilatation : int, optional
-        Degree, 0 or 1, up to which the dilatation of nearly incompressible materials has the whole bulk modulus; None
-        if the gradients are constant, so that the dilatation cannot be reduced.
+        Degree, 0 or 1, of the polynomial onto which the dilatation of nearly incompressible materials is projected; None if
+        gradients are constant, so that no projection is needed.
     corner_element : Element, optional
-        The linear element on the same corners, None if it is linear itself.
+        The linear element with the same corners; None for a linear element.
     """
 
     name: str
@@ -75,12 +72,12 @@ class Element:
 
     @property
     def linear(self) -> str:
-        """Name of the element on the same corners without mid nodes."""
+        """Name of the linear element with the same corners."""
         return (self.corner_element or self).name
 
     @property
     def corner_shape(self) -> Function:
-        """Return the shape functions (m, n_corners) [-] of the linear element on the same corners."""
+        """Shape functions of the linear element with the same corners, from (m, dim) to values (m, n_corners) [-]."""
         return (self.corner_element or self).shape
 
     @cached_property
@@ -95,7 +92,7 @@ class Element:
 
     @property
     def facet_elements(self) -> tuple[str, ...]:
-        """Name of each facet's element; empty for lines."""
+        """Name of the element of each facet; empty for lines."""
         return tuple(_FACETS[self.dim, len(facet)] for facet in self.facets if self.dim > 1)
 
     @property
@@ -110,9 +107,9 @@ class Element:
 
     @cached_property
     def reversed(self) -> tuple[int, ...]:
-        """Node order of the inverted cell: its mirror image with two reference coordinates swapped.
+        """Order in which the nodes of a cell describe the same cell with the opposite orientation.
 
-        Two-dimensional cells keep their first node and run the other way round; lines swap their ends.
+        Two reference coordinates are swapped, or the coordinate of a line changes its sign.
         """
         mirrored = -self.nodes if self.dim == 1 else self.nodes[:, [1, 0, 2][: self.dim]]
         distance = np.abs(mirrored[:, None] - self.nodes[None]).max(axis=2)
@@ -120,7 +117,7 @@ class Element:
 
     @cached_property
     def tables(self) -> tuple[Array, Array, Array]:
-        """Shape values (n_q, n_nodes), derivatives (n_q, n_nodes, dim), weights (n_q,), at the default points [-]."""
+        """Shape functions (n_q, n_nodes), derivatives (n_q, n_nodes, dim) and weights (n_q,) at quadrature points [-]."""
         points, weights = self.quadrature
         return (
             np.ascontiguousarray(self.shape(points)),
@@ -130,11 +127,11 @@ class Element:
 
     @cached_property
     def extrapolation(self) -> Array:
-        """Matrix (n_nodes, n_q) [-] from values at the default quadrature points to values at the nodes.
+        """Matrix (n_nodes, n_q) that extrapolates values at the default quadrature points to the nodes [-].
 
-        The polynomial of the corners is fitted to the point values by least squares (exactly if there are as many points
-        as corners) and evaluated at all nodes; with fewer points than corners, the mean is used. SIEF_ELNO of code_aster
-        is computed in the same way.
+        The shape functions of the corners are fitted to the values by least squares, exactly if there are as many points as
+        corners, and evaluated at all nodes. With fewer points than corners the mean is used. SIEF_ELNO of code_aster is
+        computed in the same way.
         """
         points, _ = self.quadrature
         if len(points) < self.n_corners:
@@ -143,17 +140,16 @@ class Element:
 
 
 def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -> Element:
-    """Return the element with the edges of a linear one, and with its facets extended by mid and centre nodes.
+    """Return a quadratic element, whose facets are those of the `linear` element with their mid-side and centre nodes.
 
-    The `functions` (n_nodes, dim) [-] are its nodes, followed by its shape functions and their derivatives; `others` are
-    further arguments of `Element`.
+    `functions` are its nodes, its shape functions and their derivatives, and `others` are further arguments of `Element`.
     """
     nodes, shape, gradient = functions
     facets = []
     for facet in linear.facets:
         corners = nodes[list(facet)]
         middles = (corners + np.roll(corners, -1, axis=0)) / 2
-        on_facet = [np.flatnonzero((nodes == place).all(axis=1)) for place in (*middles, corners.mean(axis=0))]
+        on_facet = [np.flatnonzero((nodes == node).all(axis=1)) for node in (*middles, corners.mean(axis=0))]
         facets.append(tuple(dict.fromkeys((*facet, *np.concatenate(on_facet).tolist()))))
     return Element(
         name, nodes, linear.edges, tuple(facets), shape, gradient, quadratic=name, corner_element=linear, **others
@@ -161,16 +157,16 @@ def quadratic(name: str, linear: Element, functions: Functions, **others: Any) -
 
 
 def with_middles(linear: Element) -> Array:
-    """Return the nodes (n_nodes, dim) [-] of a linear element, and the middles of its edges."""
+    """Return the nodes (n_nodes, dim) of a linear element and the midpoints of its edges [-]."""
     return np.vstack([linear.nodes, linear.nodes[np.array(linear.edges)].sum(axis=1) / 2])
 
 
 def serendipity(box: Element) -> Functions:
-    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear square or cube with mid nodes.
+    """Return the nodes, shape functions and derivatives of the serendipity square or cube with mid-side nodes.
 
-    The function of a mid node at X is a product over the coordinates x, with the factor 1 - x^2 along its edge, where X is 0,
-    and (1 + x X) / 2 across the edge. The function of a corner is its linear function times the sum of all x X minus dim - 1
-    (Zienkiewicz and Taylor).
+    The function of a mid-side node with the coordinates X is the product of 1 - x^2 for the coordinate x derivatives its edge,
+    where X is 0, and of (1 + x X) / 2 for the others. The function of a corner is its linear function times the sum of all
+    x X minus dim - 1 (Zienkiewicz and Taylor).
     """
     nodes, dim = with_middles(box), box.dim
     corners, middles = np.split(nodes, [box.n_nodes])
@@ -184,20 +180,20 @@ def serendipity(box: Element) -> Functions:
         return np.column_stack([corner, factors(xi).prod(axis=2)])
 
     def gradient(xi: Array) -> Array:
-        beyond = (xi @ corners.T - (dim - 1))[:, :, None]
-        corner = box.gradient(xi) * beyond + box.shape(xi)[:, :, None] * corners
+        excess = (xi @ corners.T - (dim - 1))[:, :, None]
+        corner = box.gradient(xi) * excess + box.shape(xi)[:, :, None] * corners
         slopes = np.where(middles == 0, -2 * xi[:, None], middles / 2)
-        along = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
-        return np.concatenate([corner, np.stack(along, axis=2)], axis=1)
+        derivatives = [np.where(np.arange(dim) == k, slopes, factors(xi)).prod(axis=2) for k in range(dim)]
+        return np.concatenate([corner, np.stack(derivatives, axis=2)], axis=1)
 
     return nodes, shape, gradient
 
 
 def product(nodes: Array, first: Element, second: Element) -> Functions:
-    """Return the nodes, shape functions (m, n_nodes) [-] and derivatives (m, n_nodes, dim) [-] of a product of two elements.
+    """Return the `nodes` (n_nodes, dim), and the shape functions and derivatives of the product of two elements [-].
 
-    The function of each of the `nodes` (n_nodes, dim) [-] is a function of the first element in the first coordinates times
-    a function of the second element in the other coordinates, namely those of the nodes with these coordinates.
+    The function of a node is the product of two functions: that of the node of the first element with the first coordinates,
+    and that of the node of the second element with the other coordinates.
     """
     split = first.dim
     I = np.abs(nodes[:, None, :split] - first.nodes).sum(axis=2).argmin(axis=1)  # noqa: E741
@@ -216,7 +212,7 @@ def product(nodes: Array, first: Element, second: Element) -> Functions:
 
 
 def with_mid_nodes(simplex: Element) -> Functions:
-    """Return nodes (n_nodes, dim) [-], shape functions and derivatives of a linear simplex with mid nodes on its edges."""
+    """Return the nodes, shape functions and derivatives of the quadratic simplex with mid-side nodes."""
     first, second = np.array(simplex.edges).T
 
     def shape(xi: Array) -> Array:

@@ -1,8 +1,8 @@
 """Hexahedra on [-1, 1]^3.
 
-The nodes are the corners of the face z = -1, counter-clockwise, and of the face z = 1; mid nodes of the edges of the lower
-face, of the upper face, and of the vertical edges; centres of the faces -x, +x, -y, +y, -z, +z; the centre. Linear elements
-have 2 x 2 x 2, quadratic elements 3 x 3 x 3 integration points.
+The nodes are the corners of the face z = -1, counter-clockwise, and of the face z = 1; the mid-side nodes of the edges of the
+lower face, of the upper face, and of the vertical edges; the centres of the faces -x, +x, -y, +y, -z, +z; and the centre.
+Linear elements have 2 x 2 x 2 quadrature points, quadratic elements 3 x 3 x 3.
 """
 
 import numpy as np

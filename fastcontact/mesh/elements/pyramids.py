@@ -1,10 +1,10 @@
 """Pyramids with the base [-1, 1]^2 at z = 0 and the apex (0, 0, 1).
 
-The nodes are the corners of the base, the apex, and the mid nodes of the edges of the base and of the edges to the apex. The
-shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992): polynomials in z, a = x / (1 - z) and
-b = y / (1 - z). At the apex, where their gradient depends on the direction, the limit along the axis is used. The conical
-product rule of 27 points integrates the gradients of the quadratic element exactly, also on curved cells, so that patch tests
-are passed; code_aster uses 10 points.
+The nodes are the corners of the base, the apex, and the mid-side nodes of the edges of the base and of the edges to the apex.
+The shape functions are rational (Bedrosian, Int. J. Numer. Meth. Engng 35, 1992). They are polynomials in z, a = x / (1 - z)
+and b = y / (1 - z). At the apex, where their gradient depends on the direction, the limit along the axis is used. The conical
+product rule of 27 points integrates the gradients of the quadratic element exactly, also on curved cells, so that the patch
+test is passed. The rule of code_aster has 10 points.
 """
 
 import numpy as np
@@ -20,8 +20,8 @@ def collapsed(xi: Array) -> tuple[Array, Array, Array]:
     """Return a = x / (1 - z), b = y / (1 - z) and 1 - z, each (m, 1) [-], at `xi` (m, 3) [-]; a = b = 0 at the apex."""
     x, y, t = xi[:, 0:1], xi[:, 1:2], 1 - xi[:, 2:3]
     apex = np.abs(t) < 1e-14
-    below = np.where(apex, 1.0, t)
-    return np.where(apex, 0.0, x / below), np.where(apex, 0.0, y / below), t
+    height = np.where(apex, 1.0, t)
+    return np.where(apex, 0.0, x / height), np.where(apex, 0.0, y / height), t
 
 
 def shape(xi: Array) -> Array:
@@ -44,7 +44,7 @@ PYRAMID5 = Element(
     shape=shape, gradient=gradient, quadrature=pyramid_5(), meshio="pyramid", med="PY5", vtk=14, quadratic="pyramid13",
     dilatation=0,
 )  # fmt: skip
-# The sides of the base run along x at y = -1, along y at x = 1, along x at y = 1, along y at x = -1.
+# The edges of the base are parallel to x at y = -1, to y at x = 1, to x at y = 1 and to y at x = -1.
 SIDES = np.array([-1.0, 1.0, 1.0, -1.0])
 ALONG_X = np.array([True, False, True, False])
 
@@ -61,22 +61,22 @@ def gradient_13(xi: Array) -> Array:
     """Return the derivatives (m, 13, 3) [-] at `xi` (m, 3) [-]."""
     (a, b, t), z = collapsed(xi), xi[:, 2:3]
     N, dN = shape(xi)[:, :4, None], gradient(xi)[:, :4]
-    outward = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]
-    corner = dN * outward + N * np.column_stack([X, Y, np.zeros(4)])
+    factor = (xi[:, 0:1] * X + xi[:, 1:2] * Y - 1)[:, :, None]
+    corner = dN * factor + N * np.column_stack([X, Y, np.zeros(4)])
     apex = np.zeros((len(xi), 1, 3))
     apex[:, 0, 2] = 4 * z[:, 0] - 1
-    base = np.where(ALONG_X[:, None], _side(a, b, t, (0, 1)), _side(b, a, t, (1, 0)))
-    rising = 4 * (dN * z[:, :, None] + N * np.array([0.0, 0.0, 1.0]))
-    return np.concatenate([corner, apex, base, rising], axis=1)
+    base = np.where(ALONG_X[:, None], _base_edges(a, b, t, (0, 1)), _base_edges(b, a, t, (1, 0)))
+    apex_edges = 4 * (dN * z[:, :, None] + N * np.array([0.0, 0.0, 1.0]))
+    return np.concatenate([corner, apex, base, apex_edges], axis=1)
 
 
-def _side(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
-    """Return the derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for the four S of `SIDES`, with the `axes` of a, b."""
-    functions = np.empty((len(a), 4, 3))
-    functions[:, :, axes[0]] = -a * t * (1 + SIDES * b)
-    functions[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2
-    functions[:, :, 2] = (1 - a * a) * t * SIDES * b / 2 - t * (1 + SIDES * b)
-    return functions
+def _base_edges(a: Array, b: Array, t: Array, axes: tuple[int, int]) -> Array:
+    """Return the derivatives (m, 4, 3) of t^2 (1 - a^2) (1 + S b) / 2 for all S in SIDES; `axes` are those of a and b."""
+    derivatives = np.empty((len(a), 4, 3))
+    derivatives[:, :, axes[0]] = -a * t * (1 + SIDES * b)
+    derivatives[:, :, axes[1]] = t * (1 - a * a) * SIDES / 2
+    derivatives[:, :, 2] = (1 - a * a) * t * SIDES * b / 2 - t * (1 + SIDES * b)
+    return derivatives
 
 
 PYRAMID13 = quadratic(

@@ -1,7 +1,7 @@
 """Quadrangles on [-1, 1]^2.
 
-The nodes are the corners, counter-clockwise, the mid nodes of the edges 01, 12, 23, 30, and the centre. Linear elements have
-2 x 2, quadratic elements 3 x 3 integration points.
+The nodes are the corners, counter-clockwise, the mid-side nodes of the edges 01, 12, 23, 30, and the centre. Linear elements
+have 2 x 2 quadrature points, quadratic elements 3 x 3.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Tetrahedra with the corners (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1).
 
-The corners are followed by the mid nodes of the edges 01, 12, 20, 03, 13, 23. Linear elements have one, quadratic elements
-five integration points.
+The corners are followed by the mid-side nodes of the edges 01, 12, 20, 03, 13, 23. Linear elements have one quadrature point,
+quadratic elements five.
 """
 
 import numpy as np
@@ -11,7 +11,7 @@ from fastcontact.mesh.quadrature import tetrahedron_1, tetrahedron_5
 
 
 def shape(xi: Array) -> Array:
-    """Return the shape functions (m, 4) [-] at `xi` (m, 3) [-]: the barycentric coordinates."""
+    """Return the shape functions (m, 4) at `xi` (m, 3), which are the barycentric coordinates [-]."""
     return np.column_stack([1 - xi.sum(axis=1), xi])
 
 

@@ -1,7 +1,7 @@
 """Triangles with the corners (0, 0), (1, 0), (0, 1).
 
-The corners are followed by the mid nodes of the edges 01, 12, 20. Linear elements have one, quadratic elements six
-integration points; three points would fail at an axis of symmetry.
+The corners are followed by the mid-side nodes of the edges 01, 12, 20. Linear elements have one quadrature point, quadratic
+elements six, because three points do not suffice at an axis of symmetry.
 """
 
 import numpy as np

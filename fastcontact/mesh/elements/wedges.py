@@ -1,9 +1,9 @@
 """Wedges between the triangles (0, 0), (1, 0), (0, 1) at z = -1 and z = 1.
 
-The nodes are the corners of the lower and of the upper triangle; mid nodes of the edges of the lower and of the upper
-triangle, and of the vertical edges; centres of the faces 0143, 1254, 2035. Linear elements have six, quadratic elements 21
-integration points. The order is that of Gmsh, Abaqus and VTK 9.7; older documentation of VTK numbers the triangles in the
-opposite direction.
+The nodes are the corners of the lower and of the upper triangle; the mid-side nodes of the edges of the lower and of the
+upper triangle, and of the vertical edges; and the centres of the faces 0143, 1254, 2035. Linear elements have six quadrature
+points, quadratic elements 21. The order is that of Gmsh, Abaqus and VTK 9.7; older documentation of VTK numbers the triangles
+in the opposite direction.
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from fastcontact.mesh.quadrature import gauss_line, prism, triangle_3_sides, tri
 
 NODES, shape, gradient = product(np.column_stack([np.tile(TRI3.nodes, (2, 1)), np.repeat([-1.0, 1.0], 3)]), TRI3, LINE2)
 Z = NODES[:, 2]
-TWICE = np.tile(np.arange(3), 2)  # the functions of the triangle for both of them
+TWICE = np.tile(np.arange(3), 2)  # function of the triangle at each of the six corners
 
 WEDGE6 = Element(
     "wedge6", NODES, edges=((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), (2, 5)),
@@ -23,7 +23,7 @@ WEDGE6 = Element(
     quadrature=prism(triangle_3_sides(), gauss_line(2)), meshio="wedge", med="PE6", vtk=13, quadratic="wedge15",
     dilatation=0,
 )  # fmt: skip
-# Ends of the edges of the two triangles, and the side z = -1 or 1 of each.
+# Ends of the edges of the two triangles, and the coordinate z = -1 or 1 of each edge.
 A, B = np.array(WEDGE6.edges[:6]).T
 SIDE = Z[A]
 
@@ -32,8 +32,8 @@ def shape_15(xi: Array) -> Array:
     """Return the shape functions (m, 15) [-] at `xi` (m, 3) [-]."""
     L, z = TRI3.shape(xi[:, :2])[:, TWICE], xi[:, 2:]
     corner = shape(xi) * (2 * L - 2 + z * Z)
-    flat = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
-    return np.column_stack([corner, flat, L[:, :3] * (1 - z * z)])
+    horizontal = 2 * L[:, A] * L[:, B] * (1 + z * SIDE)
+    return np.column_stack([corner, horizontal, L[:, :3] * (1 - z * z)])
 
 
 def gradient_15(xi: Array) -> Array:
@@ -42,10 +42,10 @@ def gradient_15(xi: Array) -> Array:
     dL = TRI3.gradient(xi[:, :2])[:, TWICE]
     slope = np.concatenate([2 * dL, np.broadcast_to(Z[:, None], (*L.shape, 1))], axis=2)
     corner = gradient(xi) * (2 * L - 2 + z * Z)[:, :, None] + shape(xi)[:, :, None] * slope
-    across = 2 * (dL[:, A] * L[:, B, None] + L[:, A, None] * dL[:, B]) * (1 + z * SIDE)[:, :, None]
-    flat = np.concatenate([across, (2 * L[:, A] * L[:, B] * SIDE)[:, :, None]], axis=2)
-    upright = np.concatenate([dL[:, :3] * (1 - z * z)[:, :, None], (-2 * z * L[:, :3])[:, :, None]], axis=2)
-    return np.concatenate([corner, flat, upright], axis=1)
+    in_plane = 2 * (dL[:, A] * L[:, B, None] + L[:, A, None] * dL[:, B]) * (1 + z * SIDE)[:, :, None]
+    horizontal = np.concatenate([in_plane, (2 * L[:, A] * L[:, B] * SIDE)[:, :, None]], axis=2)
+    vertical = np.concatenate([dL[:, :3] * (1 - z * z)[:, :, None], (-2 * z * L[:, :3])[:, :, None]], axis=2)
+    return np.concatenate([corner, horizontal, vertical], axis=1)
 
 
 WEDGE15 = quadratic(

@@ -8,11 +8,11 @@ from pathlib import Path
 from fastcontact.errors import FileError
 from fastcontact.mesh.mesh import Mesh
 
-NUMBERS_A_LINE = 8
+NUMBERS_PER_LINE = 8
 
 
 def check_readable(path: Path) -> None:
-    """Raise FileError for files of which meshio would silently drop points or members of sets."""
+    """Raise FileError for files of which meshio would silently drop points or misread sets."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as error:
@@ -24,12 +24,12 @@ def check_readable(path: Path) -> None:
     if n_node_sections > 1:
         raise FileError(f"'{path}' has {n_node_sections} *NODE sections, of which meshio keeps one: join them")
     for option in ("ELSET", "NSET"):
-        named = [options[option].casefold() for keyword, options in sections if options.get(option)
+        names = [options[option].casefold() for keyword, options in sections if options.get(option)
                  and keyword in (option, "ELEMENT")]  # fmt: skip
-        twice = [name for name, count in Counter(named).items() if count > 1]
-        if twice:
+        repeated = [name for name, count in Counter(names).items() if count > 1]
+        if repeated:
             raise FileError(
-                f"'{path}' defines the {option} '{twice[0]}' in several places, of which meshio keeps one: "
+                f"'{path}' defines the {option} '{repeated[0]}' in several places, of which meshio keeps one: "
                 "define it once, or convert the mesh to .med"
             )
     with_set = [bool(options.get("ELSET")) for keyword, options in sections if keyword == "ELEMENT"]
@@ -41,13 +41,14 @@ def check_readable(path: Path) -> None:
 
 
 def _keyword(line: str) -> tuple[str, dict[str, str]]:
+    """Return the keyword of a line and its options, with upper-case names."""
     first, *rest = line.lstrip("*").split(",")
     pairs = (word.partition("=") for word in rest)
     return first.strip().upper(), {name.strip().upper(): value.strip() for name, _, value in pairs}
 
 
 def append_cell_sets(path: Path, mesh: Mesh) -> None:
-    """Append the groups of cells, each once; meshio writes one *ELSET for each element of a group."""
+    """Append the groups of cells to a file, because meshio would write one *ELSET for each element of a group."""
     for name in mesh.group_names:
         if any(character in name for character in ",=*\n") or name != name.strip():
             raise FileError(f"group name '{name}' contains a character that Abaqus files do not permit: rename it")
@@ -55,5 +56,5 @@ def append_cell_sets(path: Path, mesh: Mesh) -> None:
         for name, members in mesh.cell_groups.items():
             file.write(f"*ELSET, ELSET={name}\n")
             numbers = [str(number + 1) for number in members.tolist()]
-            for start in range(0, len(numbers), NUMBERS_A_LINE):
-                file.write(",".join(numbers[start : start + NUMBERS_A_LINE]) + "\n")
+            for start in range(0, len(numbers), NUMBERS_PER_LINE):
+                file.write(",".join(numbers[start : start + NUMBERS_PER_LINE]) + "\n")

@@ -7,13 +7,13 @@ from pathlib import Path
 
 from fastcontact.errors import FileError
 
-# Files begin with $MeshFormat and a line of version, kind and size; files of version 1 begin with their nodes.
+# Files begin with $MeshFormat and a line of version, file type and data size. Files of version 1 begin with their nodes.
 VERSION_1 = b"$NOD"
 # Gmsh writes 4.0 as "4", which meshio 5.3.5 mistakes for 4.1.
 VERSION_4, VERSION_4_0 = b"4", b"4.0"
-# In a line of $Entities: position of the number of physical groups, after the number of the entity and its box.
+# Position of the number of physical groups in a line of $Entities, after the number of the entity and its bounding box.
 GROUPS_OF_ENTITY = 7
-# Limit of the number of words of a cell, above that of the largest element.
+# Largest number of words into which the line of a cell is split, more than the largest element has.
 MOST_WORDS = 200
 
 
@@ -21,27 +21,27 @@ def readable(path: Path, folder: Path) -> Path:
     """Return a file that meshio reads: `path`, or a converted copy in a temporary `folder`."""
     with open(path, "rb") as file:
         first, second = (file.readline(256).strip() for _ in range(2))
-    newer = folder / "newer.msh"
+    converted = folder / "newer.msh"
     if first == VERSION_1:
-        _write_version_2(path, newer)
-        return newer
+        _write_version_2(path, converted)
+        return converted
     version = b"".join(second.split()[:1])
     if version in (VERSION_4, VERSION_4_0):
         _check_groups(path)
     if version == VERSION_4:
-        newer.write_bytes(path.read_bytes().replace(b"4 ", b"4.0 ", 1))
-        return newer
+        converted.write_bytes(path.read_bytes().replace(b"4 ", b"4.0 ", 1))
+        return converted
     return path
 
 
 def _check_groups(path: Path) -> None:
     """Raise FileError for a file of version 4.0 in which cells belong to several groups, of which meshio keeps one."""
-    inside = False
+    in_entities = False
     for line in path.read_text(encoding="ascii", errors="replace").splitlines():
         if line.startswith("$"):
-            inside = line.strip() == "$Entities"
-        words = line.split(None, GROUPS_OF_ENTITY + 1)  # one line may be the whole file
-        if inside and len(words) > GROUPS_OF_ENTITY and words[GROUPS_OF_ENTITY] not in ("0", "1"):
+            in_entities = line.strip() == "$Entities"
+        words = line.split(None, GROUPS_OF_ENTITY + 1)  # a damaged file may consist of a single line
+        if in_entities and len(words) > GROUPS_OF_ENTITY and words[GROUPS_OF_ENTITY] not in ("0", "1"):
             raise FileError(
                 f"'{path}' is of version 4.0, with cells in several physical groups, of which one would be read: open it in "
                 "Gmsh and save it as version 4.1"

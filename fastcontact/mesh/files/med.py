@@ -116,7 +116,7 @@ def _first_step(group: Any) -> Any:
 
 
 def _order(step: Any) -> tuple[int, int]:
-    """Return the numbers by which time steps are sorted."""
+    """Return the numbers of a time step and of its iteration, by which steps are sorted."""
     return int(attribute(step, "NDT")), int(attribute(step, "NOR"))
 
 
@@ -276,11 +276,11 @@ def add_field(
 ) -> None:
     """Add a nodal field (n_points, n_components) to an open file, at an instant given by its number and time."""
     number, time = instant
-    where = f"CHA/{name}"
-    if where not in file:
-        _set(file.create_group(where), MAI=mesh_name, TYP=FLOAT64, NCO=len(components), UNT="")
-        _set(file[where], NOM=_padded(components), UNI=_padded([""] * len(components)))
-    group = file[where].create_group(_step_key(number, NO_STEP))
+    path = f"CHA/{name}"
+    if path not in file:
+        _set(file.create_group(path), MAI=mesh_name, TYP=FLOAT64, NCO=len(components), UNT="")
+        _set(file[path], NOM=_padded(components), UNI=_padded([""] * len(components)))
+    group = file[path].create_group(_step_key(number, NO_STEP))
     _set(group, NDT=number, NOR=NO_STEP, PDT=float(time), RDT=NO_STEP, ROR=NO_STEP)
     support = group.create_group("NOE")
     _set(support, GAU="", PFL=NO_PROFILE)
@@ -344,25 +344,24 @@ def read_field(path: PathLike, field: str, at_points: bool) -> tuple[Array, Arra
         points, width = None if mesh is None else _read_points(step, mesh), int(attribute(group, "NCO"))
         fields, positions = [], []  # type: list[Array], list[Array]
         for support in sorted({support for entry in instants for support in _supports(entry, at_points)}):
-            where = points if points is None or at_points else _cell_centres(path, field, step, points, support)
-            sizes = (
-                [values(p, "CO").size // width for e in instants for p in e[support].values()] if where is None else []
-            )
-            n_values = max(sizes) if where is None else len(where)
+            if points is None:
+                n_values = max(values(p, "CO").size // width for e in instants for p in e[support].values())
+            else:
+                positions.append(points if at_points else _cell_centres(path, field, step, points, support))
+                n_values = len(positions[-1])
             check_size(f"field '{field}' of '{path}'", (len(instants), n_values, width), file)
             fields.append(np.stack([_read_instant(file, entry.get(support), n_values, width) for entry in instants]))
-            positions += [] if where is None else [where]
         times = np.array([attribute(entry, "PDT") for entry in instants], np.float64)
         return times, np.concatenate(fields, axis=1), np.concatenate(positions) if positions else None
 
 
 def _supports(entry: Any, at_points: bool) -> list[str]:
-    """Return the names of the groups with values of a field at the nodes, or at the cells of each kind."""
+    """Return the names of the HDF5 groups with values of a field at the nodes, or at the cells of each element type."""
     return [key for key in entry if (key == "NOE" if at_points else key.startswith("MAI."))]
 
 
 def _cell_centres(path: PathLike, field: str, step: Any, points: Array, support: str) -> Array:
-    """Return the means (n_cells, dim) of the nodes of each cell of a kind with values of a field [length]."""
+    """Return the means (n_cells, dim) of the nodes of the cells of an element type with values of a field [length]."""
     code = support.removeprefix("MAI.")
     if code not in elements.BY_MED or code not in step.get("MAI", {}):
         raise FileError(f"field '{field}' of '{path}' is on {code} cells, which its mesh does not have")
@@ -392,7 +391,7 @@ def _read_instant(file: Any, support: Any, n_values: int, n_components: int) -> 
 
 
 def checked_name(kind: str, name: str, size: int) -> bytes:
-    """Return a name encoded for MED; FileError if it is empty, too long, or cannot be read back unchanged."""
+    """Return a name encoded for MED. Raises FileError if it is empty, too long, or cannot be read back unchanged."""
     encoded = name.encode("utf-8")
     if not encoded or len(encoded) > size:
         raise FileError(f"{kind} name '{name}' has {len(encoded)} bytes, but MED allows 1 to {size}: rename it")
@@ -403,9 +402,9 @@ def checked_name(kind: str, name: str, size: int) -> bytes:
     return encoded
 
 
-def decoded(raw: bytes) -> str:
-    """Return the name in a field of fixed size, padded with blanks or zero bytes."""
-    name = raw.split(b"\0")[0].rstrip(b" ")
+def decoded(padded: bytes) -> str:
+    """Return the name in a field of fixed size that is padded with blanks or zero bytes."""
+    name = padded.split(b"\0")[0].rstrip(b" ")
     try:
         return name.decode("utf-8")
     except UnicodeDecodeError:
@@ -426,12 +425,12 @@ def read_families(folder: Any, level: int = 0) -> Families:
 def _names_in(family: Any) -> tuple[str, ...]:
     if "GRO" not in family:
         return ()
-    raw = values(family["GRO"], "NOM").tobytes()
-    # MED 2 stores one string for all names, later versions one row per name; the bytes differ only by a zero at the end.
-    count = -(-len(raw) // GROUP_NAME_SIZE)
+    padded_names = values(family["GRO"], "NOM").tobytes()
+    # MED 2 stores one string for all names, later versions one row per name. The bytes differ only by a zero at the end.
+    count = -(-len(padded_names) // GROUP_NAME_SIZE)
     if "NBR" in family["GRO"].attrs:
         count = min(count, int(attribute(family["GRO"], "NBR")))
-    fields = (raw[i * GROUP_NAME_SIZE : (i + 1) * GROUP_NAME_SIZE] for i in range(count))
+    fields = (padded_names[i * GROUP_NAME_SIZE : (i + 1) * GROUP_NAME_SIZE] for i in range(count))
     return tuple(name for name in map(decoded, fields) if name)
 
 
@@ -461,10 +460,10 @@ def families_of(groups: Mapping[str, AnyArray], count: int, sign: int) -> tuple[
     labels = np.zeros(count, np.intp)
     combinations: list[tuple[str, ...]] = [()]
     for name, rows in groups.items():
-        # Only members change family, so that the cost is proportional to the size of the groups, not to that of the mesh.
-        before, position = np.unique(labels[rows], return_inverse=True)
+        # Only the labels of members change, so that the cost is proportional to the size of the groups, not of the mesh.
+        earlier, position = np.unique(labels[rows], return_inverse=True)
         labels[rows] = len(combinations) + position
-        combinations += [(*combinations[label], name) for label in before]
+        combinations += [(*combinations[label], name) for label in earlier]
     used, compact = np.unique(np.append(labels, 0), return_inverse=True)
     families = {sign * number: combinations[label] for number, label in enumerate(used.tolist()) if number}
     empty = tuple(name for name, rows in groups.items() if not len(rows))

@@ -1,4 +1,4 @@
-"""Fields of files as arrays over the points or cells of a mesh, for example as material constants."""
+"""Fields that are read from files as arrays over the points or cells of a mesh, for example as material constants."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from fastcontact.errors import FastcontactError, FileError, MeshError, ModelErro
 from fastcontact.mesh.files import med, meshio_files
 from fastcontact.mesh.mesh import Mesh
 
-# Tolerance of the positions of points in a file and in a mesh, relative to its size.
-SAME_PLACE = 1e-6
+# Largest distance of coincident points of a file and of a mesh, relative to the size of the mesh.
+COINCIDENT = 1e-6
 OVER = ("cells", "points")
-# Tolerance of the times of a file, relative to the latest.
+# Largest difference of equal times, relative to the latest time of a file.
 SAME_TIME = 1e-9
 VTKHDF_SUFFIXES = (".vtkhdf", ".hdf")
 
@@ -49,17 +49,17 @@ def read_field(
     field : str
         Name of the field in the file.
     over : {"cells", "points"}
-        Whether the field is given on cells or at points.
+        Whether the field of the file has values for cells or for points.
     groups : str or sequence of str, optional
         Groups of solid cells for which the file has values; by default all.
     instant : float, optional
-        Time at which to read a field with several instants [-].
+        Time of the values if the field has several instants [-].
 
     Returns
     -------
     ndarray (n_cells, 1) or (n_points,)
-        Values [unit of the field] of the solid cells of the groups, or of all points; points outside the groups have
-        the mean.
+        Values of the solid cells of the groups, or of all points. Points outside the groups have the mean of the others
+        [unit of the field].
 
     Raises
     ------
@@ -75,22 +75,22 @@ def read_field(
     if over not in OVER:
         raise FileError(f"over must be {' or '.join(OVER)}, not '{over}'")
     name = f"field '{field}' of '{file}'"
-    cells, of_file = _cells(mesh, groups), read_file_field(file, field, over)
-    if instant is None and len(of_file.values) != 1:
-        raise FileError(f"{name} has {len(of_file.values)} instants: select one with instant")
-    row = 0 if instant is None else row_of(instant, of_file.times, name)
+    cells, stored = _cells(mesh, groups), read_file_field(file, field, over)
+    if instant is None and len(stored.values) != 1:
+        raise FileError(f"{name} has {len(stored.values)} instants: select one with instant")
+    row = 0 if instant is None else row_of(instant, stored.times, name)
     if over == "cells":
-        middles = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
-        numbers = np.arange(len(middles))
-        rows, _ = _nearest(of_file, middles, numbers, mesh, ("cell", "cells"), name)
-        return _known(of_file.values[:, rows], middles, numbers, "cell", name)[row][:, None]
-    wanted = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
-    values = at_points_of(of_file, mesh, wanted, name)[row]
-    return np.where(np.isfinite(values), values, values[wanted].mean())
+        centres = np.concatenate([mesh.points[block].mean(axis=1) for block in cells])
+        numbers = np.arange(len(centres))
+        rows, _ = _nearest(stored, centres, numbers, mesh, ("cell", "cells"), name)
+        return _complete(stored.values[:, rows], centres, numbers, "cell", name)[row][:, None]
+    points = np.unique(np.concatenate([block.ravel() for block in cells])).astype(np.intp)
+    values = at_points_of(stored, mesh, points, name)[row]
+    return np.where(np.isfinite(values), values, values[points].mean())
 
 
 def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
-    """Return the nodes of the solid cells of groups, by element type in the order of the mesh."""
+    """Return the solid cells (n_cells, n_nodes) of groups for each element type, in the order of the mesh."""
     if groups is None:
         return list(mesh.solids.values())
     names = [groups] if isinstance(groups, str) else list(groups)
@@ -104,85 +104,86 @@ def _cells(mesh: Mesh, groups: Sequence[str] | str | None) -> list[Numbers]:
 
 
 def row_of(instant: float, times: Array | None, name: str, error: type[FastcontactError] = FileError) -> int:
-    """Return the row of an instant among the `times` (n_instants,) of a field; raises `error` if there is none."""
+    """Return the index of an instant in the `times` (n_instants,) of a field. Raises `error` if there is no such instant."""
     if times is None:
         raise error(f"{name} has no times: omit instant")
     row = int(np.abs(times - instant).argmin())
     if abs(times[row] - instant) > SAME_TIME * np.abs(times).max():
-        among = f"the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
-        raise error(f"{name} has no instant {instant:g}, {among}")
+        raise error(
+            f"{name} has no instant {instant:g}, the nearest is {times[row]:g}, of {times[0]:g} to {times[-1]:g}"
+        )
     return row
 
 
-def at_points_of(field: FileField, mesh: Mesh, wanted: Indices, name: str) -> Array:
-    """Return the values (n_instants, n_points) of a field at the `wanted` (k,) points of a mesh, elsewhere NaN.
+def at_points_of(field: FileField, mesh: Mesh, points: Indices, name: str) -> Array:
+    """Return the values (n_instants, n_points) of a field at the given points (k,) of a mesh, and NaN at the others.
 
     If the file has the points of the mesh in the same order, values are assigned by number, otherwise by position.
 
     Raises
     ------
     MeshError
-        If a point has no value, or two of different size; `name` names the field.
+        If a point has no value, or two different values. The message contains the `name` of the field.
     """
-    rows = wanted
-    if field.places is None and field.values.shape[1] != mesh.n_points:
+    rows = points
+    if field.positions is None and field.values.shape[1] != mesh.n_points:
         raise MeshError(f"{name} has {field.values.shape[1]} points and no coordinates, the mesh has {mesh.n_points}")
-    if field.places is not None and not _same_points(field.places, mesh):
-        rows, reach = _nearest(field, mesh.points[wanted], wanted, mesh, ("point", "nodes"), name)
-        _refuse_two(field, mesh.points[wanted], reach, name)
+    if field.positions is not None and not _same_points(field.positions, mesh):
+        rows, tolerance = _nearest(field, mesh.points[points], points, mesh, ("point", "nodes"), name)
+        _check_unique(field, mesh.points[points], tolerance, name)
     values = np.full((len(field.values), mesh.n_points), np.nan)
-    values[:, wanted] = _known(field.values[:, rows], mesh.points[wanted], wanted, "point", name)
+    values[:, points] = _complete(field.values[:, rows], mesh.points[points], points, "point", name)
     return values
 
 
-def _in_space(places: Array) -> Array:
+def _in_space(positions: Array) -> Array:
     """Return positions (n, 2) or (n, 3) with three coordinates."""
-    return np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
+    return np.pad(positions, ((0, 0), (0, 3 - positions.shape[1])))
 
 
-def _same_points(places: Array, mesh: Mesh) -> bool:
+def _same_points(positions: Array, mesh: Mesh) -> bool:
     """Return whether the points of a file are those of a mesh in the same order."""
-    if len(places) != mesh.n_points:
+    if len(positions) != mesh.n_points:
         return False
-    off = np.abs(_in_space(places) - _in_space(mesh.points)).max(initial=0.0)
-    return bool(off <= SAME_PLACE * np.ptp(mesh.points, axis=0).max())
+    difference = np.abs(_in_space(positions) - _in_space(mesh.points)).max(initial=0.0)
+    return bool(difference <= COINCIDENT * np.ptp(mesh.points, axis=0).max())
 
 
 def _nearest(
-    field: FileField, places: Array, numbers: Indices, mesh: Mesh, nouns: tuple[str, str], name: str
+    field: FileField, positions: Array, numbers: Indices, mesh: Mesh, nouns: tuple[str, str], name: str
 ) -> tuple[Indices, float]:
-    """Return the rows (n,) of a field at positions (n, dim) of a mesh, and the tolerance of the distance [length].
+    """Return the rows (n,) of a field at positions (n, dim) in a mesh, and the tolerance of the distance [length].
 
-    `numbers` (n,) are the numbers of the points or cells at the positions. In messages, `nouns` name these items, and those
-    on which the field is to be written.
+    `numbers` (n,) are those of the points or cells at the positions. In messages, `nouns` are the words for such an item, and
+    for the items on which the field should be written.
     """
-    assert field.places is not None
-    reach = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
-    distance, rows = nearest(_in_space(field.places), _in_space(places))
-    off = np.flatnonzero(~(distance <= reach))
-    if len(off):
+    assert field.positions is not None
+    tolerance = COINCIDENT * float(np.ptp(mesh.points, axis=0).max())
+    distance, rows = nearest(_in_space(field.positions), _in_space(positions))
+    far = np.flatnonzero(~(distance <= tolerance))
+    if len(far):
         raise MeshError(
-            f"{name} has no {nouns[0]} where {len(off)} {nouns[0]}s of the mesh are (first: {nouns[0]} {numbers[off[0]]} "
-            f"{places[off[0]]}, {distance[off[0]]:.3g} from the nearest): write it on the {nouns[1]} of this mesh"
+            f"{name} has no {nouns[0]} where {len(far)} {nouns[0]}s of the mesh are (first: {nouns[0]} {numbers[far[0]]} "
+            f"{positions[far[0]]}, {distance[far[0]]:.3g} from the nearest): write it on the {nouns[1]} of this mesh"
         )
-    return rows, reach
+    return rows, tolerance
 
 
-def _known(values: Array, places: Array, numbers: Indices, noun: str, name: str) -> Array:
-    """Return values (n_instants, n) at positions (n, dim); MeshError if one is missing."""
+def _complete(values: Array, positions: Array, numbers: Indices, noun: str, name: str) -> Array:
+    """Return values (n_instants, n) at positions (n, dim). Raises MeshError if a value is missing."""
     missing = np.flatnonzero(~np.isfinite(values).all(axis=0))
     if len(missing):
-        first = f"{noun} {numbers[missing[0]]} {places[missing[0]]}"
+        first = f"{noun} {numbers[missing[0]]} {positions[missing[0]]}"
         raise MeshError(f"{name} has no value at {len(missing)} {noun}s (first: {first})")
     return values
 
 
-def _refuse_two(field: FileField, wanted: Array, reach: float, name: str) -> None:
-    """Raise MeshError if coincident points of the file have different values."""
-    assert field.places is not None
-    near, at = pairs_within(_in_space(field.places), _in_space(wanted), np.full(len(wanted), reach))
-    ends = np.searchsorted(at, np.arange(len(wanted) + 1))
-    for point, first, end in zip(wanted, ends[:-1], ends[1:], strict=True):
+def _check_unique(field: FileField, positions: Array, tolerance: float, name: str) -> None:
+    """Raise MeshError if the file has different values at coincident points at one of the positions (n, dim)."""
+    assert field.positions is not None
+    near, index = pairs_within(_in_space(field.positions), _in_space(positions), np.full(len(positions), tolerance))
+    ends = np.searchsorted(index, np.arange(len(positions) + 1))
+    for point, first, end in zip(positions, ends[:-1], ends[1:], strict=True):
         members = near[first:end]
         if len(members) > 1 and np.ptp(field.values[:, members], axis=1).max() > 0.0:
             raise MeshError(
@@ -197,16 +198,16 @@ class FileField(NamedTuple):
     Attributes
     ----------
     times : ndarray (n_instants,) or None
-        Times of its instants [-]; None if the file has none.
+        Times of the instants [-]; None if the file has no times.
     values : ndarray (n_instants, n)
-        Values, NaN where there is none [unit of the field].
-    places : ndarray (n, 2) or (n, 3), or None
-        Coordinates of the points, or means of the nodes of the cells, if the file has them [length].
+        Values, and NaN where the field has no value [unit of the field].
+    positions : ndarray (n, 2) or (n, 3), or None
+        Coordinates of the points, or means of the nodes of the cells [length]; None if the file has no coordinates.
     """
 
     times: Array | None
     values: Array
-    places: Array | None
+    positions: Array | None
 
 
 def read_file_field(path: PathLike, name: str, over: str) -> FileField:
@@ -217,11 +218,11 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
     file, at_points = Path(existing_file(path)), over == "points"
     suffix, times = file.suffix.lower(), None
     if suffix in med.MED_SUFFIXES:
-        times, field, places = med.read_field(file, name, at_points)
+        times, field, positions = med.read_field(file, name, at_points)
     elif suffix in VTKHDF_SUFFIXES:
-        times, field, places = _vtkhdf(file, name, at_points)
+        times, field, positions = _vtkhdf(file, name, at_points)
     else:
-        field, places = meshio_files.read_data(file, name, at_points)
+        field, positions = meshio_files.read_data(file, name, at_points)
         field = field[None]
     count = int(np.prod(field.shape[2:], dtype=np.int64))
     if field.ndim > 3 or count != 1:
@@ -229,34 +230,35 @@ def read_file_field(path: PathLike, name: str, over: str) -> FileField:
         raise FileError(f"field '{name}' of '{path}' has {count} components: {single}")
     if not len(field):
         raise FileError(f"field '{name}' of '{path}' has no instant")
-    return FileField(times, np.asarray(field, np.float64).reshape(field.shape[:2]), places)
+    return FileField(times, np.asarray(field, np.float64).reshape(field.shape[:2]), positions)
 
 
 def read_temperatures(
-    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, wanted: Indices, instant: float | None
+    mesh: Mesh, file: PathLike | Sequence[PathLike], field: str, points: Indices, instant: float | None
 ) -> tuple[Array, Array | None]:
-    """Return a field (n_instants, n_points) at the `wanted` (k,) of int points, elsewhere NaN, and its times (n_instants,).
+    """Return temperatures (n_instants, n_points) at the given points (k,), and NaN at the others, and their times.
 
-    Temperatures are in the unit of the file [temperature], times are load factors [-] or None.
+    Temperatures are in the unit of the file [temperature]. Times (n_instants,) are load factors [-]; they are None if the
+    file has no times, if several files are given, or with an `instant`.
 
     Raises
     ------
     FileError, MeshError, ModelError
-        If a file cannot be read or lacks the field, a wanted point has no value, or there is no such instant.
+        If a file cannot be read or lacks the field, one of the points has no value, or there is no such instant.
     """
     files = [file] if isinstance(file, (str, os.PathLike)) else list(file)
     if not files:
         raise ModelError("no file is given for the temperature")
     fields, times = [], []
     for path in files:
-        field_of_file = read_file_field(path, field, "points")
-        values = at_points_of(field_of_file, mesh, wanted, f"field '{field}' of '{path}'")
+        stored = read_file_field(path, field, "points")
+        values = at_points_of(stored, mesh, points, f"field '{field}' of '{path}'")
         if len(files) > 1 and len(values) > 1:
             raise ModelError(
                 f"'{path}' has {len(values)} instants: each of several files must have one, or give a single file"
             )
         fields.append(values)
-        times.append(field_of_file.times)
+        times.append(stored.times)
     values, time = np.concatenate(fields), times[0] if len(files) == 1 else None
     if instant is None:
         return values, time
@@ -265,18 +267,21 @@ def read_temperatures(
 
 
 def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyArray, Array]:
-    """Read a field of an unstructured grid in VTKHDF: at the points of all steps, or at the cells of one."""
-    needed = {"Points", "NumberOfPoints"} if at_points else {"Points", "Connectivity", "Offsets", "NumberOfCells"}
+    """Return the times, the values and the positions of a field of an unstructured grid in VTKHDF.
+
+    Fields at points are read at all steps, fields of cells only from files without steps.
+    """
+    required = {"Points", "NumberOfPoints"} if at_points else {"Points", "Connectivity", "Offsets", "NumberOfCells"}
     with opened(path) as file:
         grid = file.get("VTKHDF", {})
-        if not needed <= set(grid):
+        if not required <= set(grid):
             raise FileError(f"'{path}' contains no unstructured grid of VTK")
         fields = grid.get("PointData" if at_points else "CellData", {})
         if name not in fields:
             raise FileError(f"'{path}': {unknown('field' if at_points else 'field of cells', name, list(fields))}")
         field, points = values(fields, name), np.asarray(values(grid, "Points"), np.float64)
         if not at_points:
-            return None, field[None], _middles(path, name, grid, len(field), points)
+            return None, field[None], _cell_centres(path, name, grid, len(field), points)
         if "Steps" not in grid:
             return None, field[None], points
         n_points, n_steps = len(points), int(grid["Steps"].attrs["NSteps"])
@@ -286,18 +291,21 @@ def _vtkhdf(path: Path, name: str, at_points: bool) -> tuple[Array | None, AnyAr
             raise FileError(f"'{path}' has a mesh that changes or has several parts: write one mesh for all instants")
         check_size(f"field '{name}' of '{path}'", (n_steps, n_points), file)
         if len(first) and (first.min() < 0 or first.max() + n_points > len(field)):
-            raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write it anew")
+            raise FileError(f"field '{name}' of '{path}' has fewer numbers than its steps need: write the file again")
         steps = np.array([field[start : start + n_points] for start in first])
         return times, steps.reshape(len(first), n_points, *field.shape[1:]), points
 
 
-def _middles(path: Path, name: str, grid: Any, n_values: int, points: Array) -> Array:
-    """Return the middles (n_cells, 3) of the cells of a grid of one part, for a field with a value per cell [length]."""
+def _cell_centres(path: Path, name: str, grid: Any, n_values: int, points: Array) -> Array:
+    """Return the means (n_cells, 3) of the nodes of the cells of a grid of one part [length].
+
+    Raises FileError if field `name` does not have one value for each cell.
+    """
     nodes, starts = (np.asarray(values(grid, key), np.int64) for key in ("Connectivity", "Offsets"))
     counts = np.diff(starts)
     if len(values(grid, "NumberOfCells")) != 1 or n_values != len(counts):
         raise FileError(f"field '{name}' of '{path}' has several instants or parts: write the cells once")
-    bad = not len(counts) or counts.min() < 1 or starts[0] != 0 or starts[-1] != len(nodes)
-    if bad or nodes.min() < 0 or nodes.max() >= len(points):
-        raise FileError(f"a cell of '{path}' refers to a missing point: write it anew")
+    damaged = not len(counts) or counts.min() < 1 or starts[0] != 0 or starts[-1] != len(nodes)
+    if damaged or nodes.min() < 0 or nodes.max() >= len(points):
+        raise FileError(f"a cell of '{path}' refers to a missing point: write the file again")
     return np.asarray(np.add.reduceat(points[nodes], starts[:-1], axis=0) / counts[:, None])

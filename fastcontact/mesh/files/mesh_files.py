@@ -1,4 +1,4 @@
-"""Reading and writing of mesh files: MED and code_aster's text directly, all other formats with meshio."""
+"""Reading and writing of mesh files: MED and code_aster's text format directly, all other formats with meshio."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# code_aster's older text format, which can only be read.
+# Suffix of code_aster's text format, which can only be read.
 MAIL_SUFFIX = ".mail"
 
 
@@ -24,9 +24,9 @@ MAIL_SUFFIX = ".mail"
 class MeshReport:
     """Report on a mesh file: its format with the version, the name of the mesh, and the changes made while reading.
 
-    The nodes of `n_turned` solid cells, which were inverted (clockwise in 2D), were reordered. `dropped` contains the
-    numbers of omitted cells: ``"vertex"``, cells of one node, whose groups became groups of points, and ``"duplicate"``,
-    cells that Gmsh repeats for each of their groups.
+    `n_turned` is the number of inverted solid cells (clockwise in 2D) whose nodes were reordered. `dropped` contains the
+    numbers of omitted cells: ``"vertex"`` for cells of one node, whose groups became groups of points, and ``"duplicate"``
+    for cells that Gmsh repeats for each of their groups.
     """
 
     path: str
@@ -55,9 +55,9 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
     ----------
     path : path-like
     mesh_name : str, optional
-        Name of the mesh in a MED file with several.
+        Name of the mesh in a MED file with several meshes.
     orient : bool
-        Reorient inverted solid cells (clockwise in 2D); see `fastcontact.topology.oriented`.
+        Whether inverted solid cells (clockwise in 2D) are reoriented; see `fastcontact.topology.oriented`.
 
     Returns
     -------
@@ -78,7 +78,7 @@ def read_mesh(path: PathLike, *, mesh_name: str | None = None, orient: bool = Tr
 
 
 def read_mesh_report(path: PathLike, *, mesh_name: str | None = None, orient: bool = True) -> tuple[Mesh, MeshReport]:
-    """Read a mesh and return it with a report; parameters and errors as in `read_mesh`."""
+    """Return a mesh and a report on its file. Parameters and errors are those of `read_mesh`."""
     file = existing_file(path)
     if file.suffix.lower() in med.MED_SUFFIXES:
         content = med.read_med(file, mesh_name)

@@ -1,4 +1,4 @@
-"""Conversion of blocks of cells, and of the data read by meshio, to a Mesh: node orders, and groups in all forms."""
+"""Conversion of cells, and of data that meshio has read, to a `Mesh`, with the node orders and groups of all formats."""
 
 from __future__ import annotations
 
@@ -15,32 +15,32 @@ from fastcontact.mesh import elements
 from fastcontact.mesh.files.meshio_process import CELL_PREFIX, POINT_PREFIX, TAGS
 from fastcontact.mesh.mesh import Mesh
 
-# Gmsh's names for entities of dimension 0 to 3: a tag without a name becomes a group like "curve_7".
+# Gmsh's names for entities of dimension 0 to 3. A tag without a name becomes a group such as "curve_7".
 SHAPES = ("point", "curve", "surface", "volume")
-# Cells with another node order in meshio: node k here is node NODE_ORDER[format][element][k] of meshio, which mirrors the
-# linear wedge of VTK, as in old documentation of VTK but not in VTK 9.7, and does not reorder Gmsh's wedge of 18 nodes.
+# Cells with another node order in meshio: node k here is node NODE_ORDER[format][element][k] of meshio. meshio mirrors the
+# linear wedge of VTK, as in old documentation of VTK but not in VTK 9.7, and does not reorder Gmsh's 18-node wedge.
 Orders = Mapping[str, tuple[int, ...]]
 NODE_ORDER: dict[str, Orders] = {
     **{key: {"wedge6": elements.get("wedge6").reversed} for key in ("vtk", "vtu")},
     **{key: {"wedge18": (0, 1, 2, 3, 4, 5, 6, 9, 7, 12, 14, 13, 8, 10, 11, 15, 17, 16)} for key in ("gmsh", "gmsh22")},
 }
-# Errors caused by inconsistent arrays, which meshio reads without checks.
+# Exceptions due to inconsistent arrays, which meshio reads without checks.
 UNFIT = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 VERTEX = "vertex"
 # Largest number of unknown kinds of cells in a message, and of characters of each name.
-SHOWN = 12
+MOST_SHOWN = 12
 Groups = dict[str, AnyArray]
 
 
 def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, dict[str, int]]:
-    """Return a mesh with its groups, and the numbers of cells left out as vertices and as duplicates.
+    """Return a mesh with its groups, and the numbers of omitted cells, ``"vertex"`` and ``"duplicate"``.
 
     Parameters
     ----------
     content : mapping
         See `meshio_process.plain_content`.
     file_format : str
-        meshio's name of the original format.
+        Name of the format of the file in meshio.
 
     Raises
     ------
@@ -49,7 +49,7 @@ def mesh_of(content: Mapping[str, Any], file_format: str = "") -> tuple[Mesh, di
     """
     blocks = merged(_blocks(content, NODE_ORDER.get(file_format, {})))
     n_duplicates = sum(len(block.nodes) for block in blocks)
-    if file_format == "gmsh":  # version 2 of that format repeats a cell for each of its groups
+    if file_format == "gmsh":  # version 2 of this format repeats a cell for each of its groups
         blocks = [block if block.kind == VERTEX else without_duplicates(block) for block in blocks]
     n_duplicates -= sum(len(block.nodes) for block in blocks)
     mesh = build_mesh(content["points"], blocks, _point_groups(content), _cell_group_names(content, file_format))
@@ -92,12 +92,13 @@ def _block(content: Mapping[str, Any], index: int, kind: str, nodes: AnyArray, o
 
 
 def _add(groups: dict[str, AnyArray], more: Mapping[str, AnyArray]) -> None:
+    """Add the members of groups to `groups`, each once."""
     for name, rows in more.items():
         groups[name] = np.union1d(groups[name], rows) if name in groups else rows
 
 
 def _tagged(tags: AnyArray, dim: int, field_data: Mapping[str, Any]) -> dict[str, AnyArray]:
-    """Return the members of each tag, by its name for this dimension or a name derived from the tag."""
+    """Return the members of each nonzero tag, by the name of the tag for this dimension, or a name such as "curve_7"."""
     if tags.ndim != 1 or tags.dtype.kind not in "iu":
         return {}
     names = {(int(entry[0]), int(entry[1])): name for name, entry in field_data.items() if np.size(entry) == 2}
@@ -122,7 +123,7 @@ def _point_groups(content: Mapping[str, Any]) -> dict[str, AnyArray]:
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Cells of one kind, an element or ``"vertex"``: connectivity (n_cells, n_nodes), and the rows of it in each group."""
+    """Cells of one kind, an element type or ``"vertex"``: the nodes (n_cells, n_nodes), and the rows of each group."""
 
     kind: str
     nodes: AnyArray
@@ -132,13 +133,13 @@ class Block:
 def build_mesh(
     points: AnyArray, blocks: Iterable[Block], point_groups: Mapping[str, AnyArray], names: Iterable[str] = ()
 ) -> Mesh:
-    """Return one Mesh of all blocks, with `points` (n_points, 2 or 3) [length].
+    """Return a `Mesh` of all blocks, with `points` (n_points, 2 or 3) [length].
 
-    Blocks of the same kind are joined, groups of vertex cells become groups of points, `names` without any cell become
-    empty groups, and a flat mesh in 3D coordinates becomes a 2D one.
+    Blocks of the same kind are joined. Groups of vertex cells become groups of points, and `names` without cells become
+    empty groups. A flat mesh with three coordinates becomes a 2D mesh.
     """
     try:
-        places = np.asarray(points, np.float64)
+        coordinates = np.asarray(points, np.float64)
     except (TypeError, ValueError):
         raise MeshError("its coordinates are not numbers: check that the file is complete") from None
     joined = merged(blocks)
@@ -153,31 +154,29 @@ def build_mesh(
             cell_groups.pop(name, None)
     dim = max(elements.get(block.kind).dim for block in solid)
     cells = {block.kind: block.nodes for block in solid}
-    return Mesh(_without_flat_z(places, dim), cells, cell_groups, all_point_groups)
+    return Mesh(_without_flat_z(coordinates, dim), cells, cell_groups, all_point_groups)
 
 
 def check_kinds(foreign: Mapping[str, int], known: Iterable[str]) -> None:
-    """Raise MeshError if there are cells of any unknown kind in `foreign`, numbers of cells by kind."""
+    """Raise MeshError if there are cells of unknown kinds, whose numbers `foreign` contains by kind."""
     if foreign:
-        listed = [f"{count} cells of kind {kind[:SHOWN]}" for kind, count in list(foreign.items())[:SHOWN]]
-        more = [f"{len(foreign) - SHOWN} kinds more"] if len(foreign) > SHOWN else []
+        listed = [f"{count} cells of kind {kind[:MOST_SHOWN]}" for kind, count in list(foreign.items())[:MOST_SHOWN]]
+        more = [f"{len(foreign) - MOST_SHOWN} kinds more"] if len(foreign) > MOST_SHOWN else []
         raise MeshError(
             f"it has {', '.join([*listed, *more])}, which fastcontact does not know: use only {', '.join(sorted(known))}"
         )
 
 
 def merged(blocks: Iterable[Block]) -> list[Block]:
-    """Return one block of each kind, in the order in which the kinds first appear."""
+    """Return one block for each kind, in the order in which the kinds first appear."""
     by_kind: dict[str, list[Block]] = {}
     for block in blocks:
         by_kind.setdefault(block.kind, []).append(block)
-    return [
-        Block(kind, np.concatenate([part.nodes for part in parts]), _numbered(parts)) for kind, parts in by_kind.items()
-    ]
+    return [Block(kind, np.concatenate([b.nodes for b in same]), _numbered(same)) for kind, same in by_kind.items()]
 
 
 def without_duplicates(block: Block) -> Block:
-    """Return the block with duplicate cells, and their groups, merged."""
+    """Return a block in which duplicate cells are merged; each cell is in the groups of all its duplicates."""
     _, first, inverse = np.unique(np.sort(block.nodes, axis=1), axis=0, return_index=True, return_inverse=True)
     unique = np.sort(first)
     position = np.searchsorted(unique, first)[inverse.reshape(-1)]
@@ -186,7 +185,7 @@ def without_duplicates(block: Block) -> Block:
 
 
 def _numbered(blocks: list[Block]) -> Groups:
-    """Return the groups as numbers of cells in the sequence of all blocks."""
+    """Return the members of all groups as numbers of cells in the sequence of the blocks."""
     groups: dict[str, list[Indices]] = {}
     start = 0
     for block in blocks:
@@ -197,26 +196,26 @@ def _numbered(blocks: list[Block]) -> Groups:
 
 
 def _add_vertices(point_groups: Groups, block: Block, solid: list[Block]) -> list[str]:
-    """Convert groups of vertex cells to groups of points; return the names of those without other cells."""
-    turned = []
+    """Convert groups of vertex cells to groups of points, and return the names of the groups that have no other cells."""
+    converted = []
     for name, rows in block.groups.items():
         points = block.nodes[rows, 0]
-        carried = [other.nodes[other.groups[name]].ravel() for other in solid if name in other.groups]
-        if not carried:
+        nodes_of_cells = [other.nodes[other.groups[name]].ravel() for other in solid if name in other.groups]
+        if not nodes_of_cells:
             point_groups[name] = np.union1d(point_groups.get(name, points[:0]), points)
-            turned.append(name)
+            converted.append(name)
             continue
-        lost = np.setdiff1d(points, np.concatenate(carried))
+        lost = np.setdiff1d(points, np.concatenate(nodes_of_cells))
         if len(lost):
             warn(
                 f"group '{name}' mixes cells with single points: {len(lost)} points that its cells do "
                 "not have are left out; put them into a separate group"
             )
-    return turned
+    return converted
 
 
 def _without_flat_z(points: AnyArray, dim: int) -> AnyArray:
-    """Drop the third coordinate of a flat mesh."""
+    """Return points without their third coordinate if it is constant and the cells are not three-dimensional."""
     if points.ndim != 2 or points.shape[1] != 3 or dim == 3 or not len(points):
         return points
     size = np.ptp(points[:, :2], axis=0).max()

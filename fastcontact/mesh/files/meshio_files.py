@@ -1,4 +1,4 @@
-"""Reading and writing of mesh files in the formats of meshio: groups, node orders and losses."""
+"""Reading and writing of mesh files in the formats of meshio, with warnings about data that a format cannot store."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ from fastcontact.mesh.mesh import Mesh
 
 logger = logging.getLogger("fastcontact")
 
-# meshio's writers print to the standard streams; only one thread at a time may redirect them.
+# Writers of meshio print to the standard streams, which only one thread at a time may redirect.
 _STREAMS = threading.Lock()
 
 # Formats with named arrays, in which every group is an array.
 ARRAY_FORMATS = ("vtk", "vtu", "xdmf")
-# Formats whose writers are known to keep all cells; for the others the result is read back.
+# Formats whose writers are known to keep all cells. Files of other formats are read back.
 COMPLETE_FORMATS = ("vtk", "vtu", "gmsh22", "abaqus")
-# Formats that support points of two coordinates; the others get a zero, which reading drops.
+# Formats that support points with two coordinates. In other formats the third coordinate is zero, and dropped by reading.
 FLAT_FORMATS = ("gmsh22", "abaqus", "medit", "su2", "dolfin-xml")
 # Formats that are HDF5 files.
 HDF5_FORMATS = ("cgns", "h5m", "hmf", "exodus")
@@ -48,38 +48,39 @@ OTHER_FORMATS = "write .med, .vtu or .msh instead"
 
 
 def _refusal(action: str, path: Path, reason: str) -> FileError:
+    """Return the error for an `action` of meshio that failed."""
     reason = " ".join(reason.split())
     reason = reason if len(reason) <= LONGEST else f"{reason[:LONGEST]}..."
     remedy = "check the file, or convert it to .med" if action == "read" else OTHER_FORMATS
     return FileError(f"meshio cannot {action} '{path}' ({reason}): {remedy}")
 
 
-def _log(action: str, path: Path, said: str) -> None:
-    if said:
-        logger.info("meshio, to %s %s: %s", action, path, " ".join(said.split()))
+def _log(action: str, path: Path, output: str) -> None:
+    if output:
+        logger.info("meshio, to %s %s: %s", action, path, " ".join(output.split()))
 
 
 @contextlib.contextmanager
 def _contained(action: str, path: Path) -> Iterator[None]:
-    """Prevent meshio from printing and from ending the process; its output goes to the log or the error."""
-    said = io.StringIO()
+    """Prevent meshio from printing and from ending the process, and write its output to the log or the error."""
+    output = io.StringIO()
     try:
-        with _STREAMS, contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with _STREAMS, contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             yield
     except (Exception, SystemExit) as error:
-        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        reason = output.getvalue() if isinstance(error, SystemExit) else str(error)
         raise _refusal(action, path, reason or type(error).__name__) from error
-    _log(action, path, said.getvalue())
+    _log(action, path, output.getvalue())
 
 
 def _format(path: Path, writing: bool) -> str:
-    """Return meshio's name of the format of a file, by its suffix."""
+    """Return meshio's name of the format of a file, which its suffix determines."""
     suffixes = ["".join(path.suffixes[i:]).lower() for i in range(len(path.suffixes))]
     formats = library().extension_to_filetypes
     names = next((formats[suffix] for suffix in suffixes if suffix in formats), None)
     if names is None:
-        near = difflib.get_close_matches(path.suffix, formats, n=1, cutoff=0.7)
-        remedy = f"did you mean '{near[0]}'?" if near else f"use {', '.join(USUAL)} or another format of meshio"
+        similar = difflib.get_close_matches(path.suffix, formats, n=1, cutoff=0.7)
+        remedy = f"did you mean '{similar[0]}'?" if similar else f"use {', '.join(USUAL)} or another format of meshio"
         raise FileError(f"'{path}': unknown mesh file suffix '{path.suffix}': {remedy}")
     if "gmsh" not in names:
         return str(names[0])
@@ -93,8 +94,11 @@ def _format(path: Path, writing: bool) -> str:
 
 
 def _content(path: Path, readable: Path, file_format: str, field: str = "") -> dict[str, Any]:
-    """Return the content of a file, or of a `readable` copy of it; FileError if meshio cannot read it."""
-    _check_before(path, file_format)
+    """Return the content of a file, read from `readable`, which is the file or a converted copy of it.
+
+    Raises FileError if meshio cannot read the file.
+    """
+    _check_input(path, file_format)
     content = read_in_process(readable, file_format, field)
     if "error" in content:
         raise _refusal("read", path, content["error"])
@@ -102,9 +106,10 @@ def _content(path: Path, readable: Path, file_format: str, field: str = "") -> d
 
 
 def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArray]:
-    """Return the numbers (n, ...) [unit of the field] of a field at points or cells, and their places (n, dim) [length].
+    """Return the values (n, ...) of a field at points or cells [unit of the field], and their positions (n, dim) [length].
 
-    The place of a cell is its middle. FileError if meshio cannot read the file, or it has no such field.
+    The position of a cell is the mean of its nodes. Raises FileError if meshio cannot read the file, or the file has no such
+    field.
     """
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
@@ -115,28 +120,26 @@ def read_data(path: Path, field: str, at_points: bool) -> tuple[AnyArray, AnyArr
         raise FileError(f"'{path}': {unknown('field' if at_points else 'field of cells', field, names)}")
     values = [content["field"]] if at_points else content["cell_field"]
     nodes = [points] if at_points else [block for _, _, block in content["cells"]]
-    fits = [
-        part is not None and of is not None and len(part) == len(of) for part, of in zip(values, nodes, strict=True)
-    ]
-    if points is None or not all(fits) or not fits:
-        each = "point" if at_points else "cell"
-        raise FileError(f"field '{field}' of '{path}' has no number for each {each}: write it anew")
+    complete = [a is not None and b is not None and len(a) == len(b) for a, b in zip(values, nodes, strict=True)]
+    if points is None or not all(complete) or not complete:
+        item = "point" if at_points else "cell"
+        raise FileError(f"field '{field}' of '{path}' has no number for each {item}: write the file again")
     if at_points:
         return values[0], points
     if any(len(block) and (block.min() < 0 or block.max() >= len(points)) for block in nodes):
-        raise FileError(f"a cell of '{path}' refers to a missing point: write it anew")
+        raise FileError(f"a cell of '{path}' refers to a missing point: write the file again")
     return np.concatenate(values), np.concatenate([points[block].mean(axis=1) for block in nodes])
 
 
 def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
-    """Return a mesh with its groups, the format, and the numbers of cells left out as vertices and as duplicates."""
+    """Return a mesh with its groups, the format, and the numbers of omitted cells, see `meshio_content.mesh_of`."""
     file_format = _format(path, writing=False)
     if file_format == "gmsh":
         with tempfile.TemporaryDirectory() as folder:
             content = _content(path, gmsh_versions.readable(path, Path(folder)), file_format)
     else:
         content = _content(path, path, file_format)
-    _log("read", path, content["said"])
+    _log("read", path, content["output"])
     try:
         mesh, dropped = mesh_of(content, file_format)
     except MeshError as error:
@@ -146,8 +149,8 @@ def read(path: Path) -> tuple[Mesh, str, dict[str, int]]:
     return mesh, file_format, dropped
 
 
-def _check_before(path: Path, file_format: str) -> None:
-    """Raise FileError for files that make meshio read other files, or of which it would drop parts."""
+def _check_input(path: Path, file_format: str) -> None:
+    """Raise FileError for files with which meshio would read files in other folders, or of which it would drop parts."""
     import h5py
 
     if file_format == "abaqus":
@@ -160,7 +163,7 @@ def _check_before(path: Path, file_format: str) -> None:
 
 
 def files_of(path: Path) -> list[Path]:
-    """Return a mesh file and all files that are read with it; FileError if one of XDMF cannot be read."""
+    """Return a mesh file and all files that are read with it. Raises FileError if an XDMF file cannot be read."""
     if path.suffix.lower() in (".xdmf", ".xmf"):
         return [path, *(reference for reference, _ in _references(path))]
     other = {".node": ".ele", ".ele": ".node"}.get(path.suffix)  # TetGen's pair of files
@@ -181,7 +184,7 @@ def _references(path: Path) -> Iterator[tuple[Path, str]]:
 
 
 def _check_references(path: Path) -> None:
-    """Raise FileError for an XDMF file that refers to files in other folders, or to HDF5 files that do."""
+    """Raise FileError for an XDMF file that refers to files in other folders, also by links in HDF5 files."""
     folder = path.resolve().parent
     for reference, kind in _references(path):
         if folder not in (reference.resolve().parent, reference.resolve()):
@@ -193,13 +196,16 @@ def _check_references(path: Path) -> None:
 
 
 def write(path: Path, temporary: Path, mesh: Mesh) -> None:
-    """Write a mesh to `temporary` in the format of `path`'s suffix, or raise FileError if that would leave out cells."""
+    """Write a mesh to `temporary` in the format of the suffix of `path`.
+
+    Raises FileError if meshio cannot write the file or the format cannot store all points and cells.
+    """
     meshio = library()
     file_format = _format(path, writing=True)
     if file_format in ("tetgen", "svg"):
         raise FileError(f"'{path}': {file_format} is not a single-file mesh format; {OTHER_FORMATS}")
-    content = _parts(mesh, file_format)
-    # By default XDMF writes the numbers to a second file, which cannot be replaced together with the first.
+    content = _arguments(mesh, file_format)
+    # By default the numbers of XDMF are in a second file, which cannot be replaced atomically together with the first.
     options = {"data_format": "XML"} if file_format == "xdmf" else {}
     with _contained("write", path):
         meshio.write(temporary, meshio.Mesh(**content), file_format=file_format, **options)
@@ -209,8 +215,8 @@ def write(path: Path, temporary: Path, mesh: Mesh) -> None:
         _check_complete(path, temporary, file_format, mesh)
 
 
-def _parts(mesh: Mesh, file_format: str) -> dict[str, Any]:
-    """Return the arguments of meshio's Mesh, with groups in the form that the format supports."""
+def _arguments(mesh: Mesh, file_format: str) -> dict[str, Any]:
+    """Return the arguments of ``meshio.Mesh``, with groups in the form that the format supports."""
     width = mesh.dim if file_format in FLAT_FORMATS else 3
     points = np.pad(mesh.points, [(0, 0), (0, width - mesh.dim)])
     content: dict[str, Any] = {"points": points, "cells": _meshio_cells(mesh, NODE_ORDER.get(file_format, {}))}
@@ -234,7 +240,7 @@ def _meshio_cells(mesh: Mesh, order: Orders) -> list[tuple[str, AnyArray]]:
 
 
 def _with_arrays(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
-    """Return the parts with an array of 0 and 1 for each group."""
+    """Return the arguments with an array of 0 and 1 for each group."""
     cell_data = {}
     for name, members in mesh.cell_groups.items():
         flags = _flags(members, mesh.n_cells)
@@ -248,7 +254,7 @@ def _flags(members: AnyArray, count: int) -> Numbers:
 
 
 def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
-    """Return the parts with a physical tag for each cell, and a vertex cell for each point in a group."""
+    """Return the arguments with a physical tag for each cell, and a vertex cell for each point in a group."""
     dims = np.concatenate([np.full(len(block), elements.get(name).dim) for name, block in mesh.cells.items()])
     tags = np.zeros(mesh.n_cells, np.int32)
     field_data: dict[str, AnyArray] = {}
@@ -259,11 +265,13 @@ def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
             tags[members[dims[members] == dim]] = tag
             field_data[name] = np.array([tag, dim])
     n_kept = {name: int((tags[mesh.cell_groups[name]] == tag).sum()) for name, (tag, _) in field_data.items()}
-    cut = {name: len(rows) - n_kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > n_kept.get(name, 0)}
-    if cut:
+    lost = {
+        name: len(rows) - n_kept[name] for name, rows in mesh.cell_groups.items() if len(rows) > n_kept.get(name, 0)
+    }
+    if lost:
         warn(
-            f"Gmsh files of version 2.2 store one group per cell: {sum(cut.values())} memberships of the groups "
-            f"{', '.join(cut)} are left out; {KEEPS_ALL}"
+            f"Gmsh files of version 2.2 store one group per cell: {sum(lost.values())} memberships of the groups "
+            f"{', '.join(lost)} are left out; {KEEPS_ALL}"
         )
     blocks = np.split(tags, list(mesh.offsets.values())[1:])
     cells, blocks = _with_vertices(content["cells"], blocks, mesh.point_groups, field_data)
@@ -274,27 +282,30 @@ def _with_tags(content: dict[str, Any], mesh: Mesh) -> dict[str, Any]:
 def _with_vertices(
     cells: list[Any], blocks: list[Any], point_groups: Mapping[str, Any], field_data: dict[str, Any]
 ) -> tuple[list[Any], list[Any]]:
-    named = {name: members for name, members in point_groups.items() if len(members) and name not in field_data}
-    twice = [name for name in point_groups if name in field_data]
-    if twice:
+    """Return cells and tags with additional vertices for the groups of points, and add the names of these to `field_data`."""
+    groups = {name: members for name, members in point_groups.items() if len(members) and name not in field_data}
+    repeated = [name for name in point_groups if name in field_data]
+    if repeated:
         warn(
-            f"{len(twice)} groups of points have the name of a group of cells ({', '.join(twice)}), which "
+            f"{len(repeated)} groups of points have the name of a group of cells ({', '.join(repeated)}), which "
             f"Gmsh files cannot tell apart: they are left out; {KEEPS_ALL}"
         )
-    if not named:
+    if not groups:
         return cells, blocks
-    tags = {name: len(field_data) + 1 + i for i, name in enumerate(named)}
+    tags = {name: len(field_data) + 1 + i for i, name in enumerate(groups)}
     field_data.update({name: np.array([tag, 0]) for name, tag in tags.items()})
-    vertices = np.concatenate(list(named.values()))[:, None]
-    vertex_tags = np.concatenate([np.full(len(members), tags[name], np.int32) for name, members in named.items()])
+    vertices = np.concatenate(list(groups.values()))[:, None]
+    vertex_tags = np.concatenate([np.full(len(members), tags[name], np.int32) for name, members in groups.items()])
     return [*cells, (VERTEX, vertices)], [*blocks, vertex_tags]
 
 
 def _check_complete(path: Path, temporary: Path, file_format: str, mesh: Mesh) -> None:
-    """Read back the written file: several of meshio's writers drop or change cells without an error."""
+    """Read the written file and raise FileError if it differs, because some writers of meshio drop or change cells."""
     with _contained("read back", path):
         content = library().read(temporary, file_format=file_format)
-    wrong = [kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(content.get_cells_type(kind), block)]
-    if wrong or len(content.points) != mesh.n_points:
-        listed = f"the {', '.join(wrong)} cells" if wrong else "the points"
+    different = [
+        kind for kind, block in _meshio_cells(mesh, {}) if not np.array_equal(content.get_cells_type(kind), block)
+    ]
+    if different or len(content.points) != mesh.n_points:
+        listed = f"the {', '.join(different)} cells" if different else "the points"
         raise FileError(f"'{path}': meshio's {file_format} format does not keep {listed}; {OTHER_FORMATS}")

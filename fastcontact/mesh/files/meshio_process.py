@@ -1,8 +1,8 @@
 """Reading of mesh files with meshio in a child process, with limits of memory and computing time.
 
-meshio allocates whatever a file announces, and several of its readers do not terminate on a truncated file. In these cases
-only the child process ends, and the file is rejected with the reason. On Windows only the elapsed time is limited. Frozen
-applications and programs with embedded Python, which cannot start an interpreter, read without limits.
+meshio allocates memory for the numbers of items that a file states, and some of its readers do not terminate on a truncated
+file. In these cases only the child process ends, and the file is rejected with the reason. On Windows only the elapsed time
+is limited. Frozen applications and programs with embedded Python, which cannot start an interpreter, read without limits.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ import numpy as np
 from fastcontact._tools.packing import packed, unpacked
 from fastcontact.arrays import AnyArray
 
-# Limits of the child process, each a constant plus a term per byte of the file. meshio 5.3.5 takes up to 0.15 s and 9 MB per
-# megabyte (permas, vtu); the process itself takes 130 MB.
+# Limits of computing time [s] and of memory [bytes] of the child process: a constant, and a term per byte of the file. meshio
+# 5.3.5 takes up to 0.15 s and 9 MB per megabyte (permas, vtu); the process itself takes 130 MB.
 SECONDS, SECONDS_PER_BYTE = 5.0, 5e-6
 MEMORY, MEMORY_PER_BYTE = 1 << 30, 32
-# Limit of the child's answer [bytes]: a compressed file of a few kilobytes can contain any number of equal points.
+# Limit of the answer of the child process [bytes]. A compressed file of a few kilobytes can contain many equal points.
 RETURNED, RETURNED_PER_BYTE = 1 << 28, 32
-# Limit of the elapsed time over the limit of computing time, for busy machines.
+# Ratio of the limits of elapsed time and of computing time, for busy machines.
 WAITING = 10
 
 # Integer cell data that define groups, in the formats of Gmsh, Medit and others; 0 means no group.
@@ -38,9 +38,9 @@ CELL_PREFIX, POINT_PREFIX = "cell_group:", "point_group:"
 
 
 def library() -> Any:
-    """Return the package meshio, with two elements added that its table of dimensions lacks."""
+    """Return the package meshio, after adding two elements that its table of dimensions lacks."""
     import meshio
-    from meshio._mesh import topological_dimension  # a public name of meshio 5.3.5 that is only available here
+    from meshio._mesh import topological_dimension  # meshio 5.3.5 has this table only in a private module
 
     for name in ("pyramid13", "wedge15"):
         topological_dimension.setdefault(name, 3)
@@ -58,7 +58,7 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
     command = [sys.executable, "-P", "-m", __name__, str(path.resolve()), file_format, *limits, field]
     folders = os.pathsep.join(map(os.path.abspath, sys.path))
     try:
-        done = subprocess.run(
+        process = subprocess.run(
             command, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAITING * seconds, check=False,
             cwd=path.resolve().parent, env={**os.environ, "PYTHONPATH": folders, "OPENBLAS_NUM_THREADS": "1"},
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
@@ -67,40 +67,42 @@ def read_in_process(path: Path, file_format: str, field: str = "") -> dict[str, 
         return {"error": f"it was not read within {WAITING * seconds:.0f} s"}
     except OSError as error:
         return {"error": f"no process can be started: {error.strerror}"}
-    return _answer(done, seconds)
-
-
-def _answer(done: subprocess.CompletedProcess[bytes], seconds: float) -> dict[str, Any]:
-    """Return the answer of the child, or the reason why there is none."""
-    if done.returncode == -getattr(signal, "SIGXCPU", 0):
+    if process.returncode == -getattr(signal, "SIGXCPU", 0):
         return {"error": f"it was not read within {seconds:.0f} s of computing"}
-    if done.returncode < 0:
-        return {"error": f"the reading process was ended by {signal.Signals(-done.returncode).name}"}
+    if process.returncode < 0:
+        return {"error": f"the reading process was ended by {signal.Signals(-process.returncode).name}"}
     try:
-        return dict(unpacked(np.frombuffer(done.stdout, np.uint8)))
+        return dict(unpacked(np.frombuffer(process.stdout, np.uint8)))
     except (ValueError, LookupError, TypeError):
-        lines = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        lines = process.stderr.decode("utf-8", "replace").strip().splitlines()
         return {"error": f"the reading process failed: {lines[-1] if lines else 'no answer'}"}
 
 
 def plain_content(path: Path, file_format: str, field: str = "") -> dict[str, Any]:
-    """Read a file in a format, given by meshio's name, as plain data; meshio neither prints nor ends the process.
+    """Read a file in a format of meshio as a dict of lists and arrays. meshio neither prints nor ends the process.
 
-    The keys are ``points``, an array (n_points, 2 or 3) [length]; ``cells``, a list of kind, number of cells and connectivity
-    (n_cells, n_nodes); ``cell_data`` and ``point_data``, the arrays that define groups; ``cell_sets``, ``point_sets``,
-    ``field_data``; ``said``, the output of meshio. Non-numeric arrays are None. If meshio cannot read the file, there is only
-    ``error``, the reason. With the name of a `field` there are also ``fields``, the names of all fields at points, and
-    ``field``, its values, None without any; ``cell_fields`` and ``cell_field``, a list of arrays, are the same for cells.
+    The keys are
+
+    - ``points``: array (n_points, 2 or 3) [length];
+    - ``cells``: list of kind, number of cells and nodes (n_cells, n_nodes);
+    - ``cell_data`` and ``point_data``: the arrays that define groups;
+    - ``cell_sets``, ``point_sets`` and ``field_data``: those of meshio;
+    - ``output``: text that meshio has printed;
+    - ``fields`` and ``field``, if `field` is given: the names of all fields at points, and the values of this field;
+    - ``cell_fields`` and ``cell_field``, if `field` is given: the same for cells, with an array for each block;
+    - ``error``, alone: the reason why meshio cannot read the file.
+
+    Arrays that are not numeric, and fields that do not exist, are None.
     """
-    said = io.StringIO()
+    output = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(output):
             content = library().read(path, file_format=file_format)
-            return {**plain_parts(content), **(_fields(content, field) if field else {}), "said": said.getvalue()}
+            return {**plain_parts(content), **(_fields(content, field) if field else {}), "output": output.getvalue()}
     except MemoryError:
         return {"error": "it announces more data than the memory can hold"}
     except (Exception, SystemExit) as error:
-        return {"error": (said.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
+        return {"error": (output.getvalue() if isinstance(error, SystemExit) else str(error)) or type(error).__name__}
 
 
 def _fields(content: Any, field: str) -> dict[str, Any]:
@@ -115,7 +117,7 @@ def _fields(content: Any, field: str) -> dict[str, Any]:
 
 
 def plain_parts(content: Any) -> dict[str, Any]:
-    """Return a ``meshio.Mesh`` as plain data in the format of `plain_content`."""
+    """Return the mesh and the groups of a ``meshio.Mesh`` in the format of `plain_content`."""
     cell_data = {key: data for key, data in content.cell_data.items() if key in TAGS or key.startswith(CELL_PREFIX)}
     point_data = {key: data for key, data in content.point_data.items() if key in TAGS or key.startswith(POINT_PREFIX)}
     return {
@@ -130,7 +132,7 @@ def plain_parts(content: Any) -> dict[str, Any]:
 
 
 def _numbers(values: Any) -> AnyArray | None:
-    """Return an array of numbers; None if there is none, as for cells with different numbers of nodes."""
+    """Return values as a numeric array, or None if this is impossible, as for cells with different numbers of nodes."""
     try:
         array = np.asarray(values)
     except ValueError:

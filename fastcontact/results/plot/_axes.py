@@ -1,4 +1,4 @@
-"""Axes of plots."""
+"""Figures and axes of plots, with their labels, legends and colour bars."""
 
 from __future__ import annotations
 
@@ -28,19 +28,22 @@ UNITS: Mapping[str, str] = {"length": "mm", "force": "N", "pressure": "MPa"}
 UNKNOWN: Mapping[str, str] = {}
 
 
-def units_of(given: Units, result: ContactResult | StepResult) -> Mapping[str, str]:
-    """Return the names of units of the caller, by default those of the model; ModelError if they cannot be read."""
-    return named_units(given) or result.units
+def units_of(units: Units, result: ContactResult | StepResult) -> Mapping[str, str]:
+    """Return the names of `units`, by default those of the model. Raises ModelError if they are invalid."""
+    return named_units(units) or result.units
 
 
-def placed(points: Array, size: float) -> str:
-    """Return a position (dim,) [length] as text; coordinates up to a millionth of the `size` of the body become zero."""
-    kept = np.where(np.abs(points) <= 1e-6 * size, 0.0, points)
-    return f"({', '.join(f'{x:.4g}' for x in kept)})"
+def position_text(point: Array, size: float) -> str:
+    """Return a position (dim,) [length] as text. Coordinates below a millionth of the `size` of the body become zero."""
+    rounded = np.where(np.abs(point) <= 1e-6 * size, 0.0, point)
+    return f"({', '.join(f'{x:.4g}' for x in rounded)})"
 
 
 def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
-    """Return a contact pair at each step; FastcontactError if there are no steps or a step lacks the pair."""
+    """Return the result of a contact pair at each step.
+
+    Raises FastcontactError if there are no steps or a step lacks the pair.
+    """
     if not len(steps):
         raise FastcontactError("there are no steps to draw")
     for step in steps:
@@ -48,9 +51,9 @@ def contacts_of(steps: Sequence[StepResult], pair: str) -> list[ContactResult]:
     return [step.contact[pair] for step in steps]
 
 
-def mark(axes: Any, at: Array, label: str) -> None:
+def mark(axes: Any, point: Array, label: str) -> None:
     """Mark a position (dim,) in a plot."""
-    axes.plot(*([x] for x in at), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
+    axes.plot(*([x] for x in point), "o", mfc="none", mec="red", ms=9, mew=1.5, label=label, zorder=10)
 
 
 def png(figure: Any) -> bytes:
@@ -61,7 +64,7 @@ def png(figure: Any) -> bytes:
 
 
 class Panels(tuple[Any, ...]):
-    """The axes of a figure with several panels, which are displayed as the figure in notebooks."""
+    """The axes of a figure with several panels. Notebooks display them as the figure."""
 
     __slots__ = ()
 
@@ -70,7 +73,7 @@ class Panels(tuple[Any, ...]):
 
 
 def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None = None) -> Any:
-    """Return `ax` or, if it is None, the axes of a new figure; ``projection="3d"`` gives axes in space."""
+    """Return `ax` or, if it is None, the axes of a new figure of `size` [inch], with ``projection="3d"`` in space."""
     if ax is None:
         return new_panels(1, 1, size, subplot_kw={"projection": projection})[0, 0]
     if not (hasattr(ax, "plot") and hasattr(ax, "figure")):
@@ -81,7 +84,7 @@ def new_axes(ax: Axes | None, size: tuple[float, float], projection: str | None 
 
 
 def without_matplotlib(error: Exception) -> FastcontactError:
-    """Return the error for a failed import of Matplotlib, which is missing or does not know the backend."""
+    """Return the error for a failed import of Matplotlib, which is missing or was given an unknown backend."""
     if isinstance(error, ImportError):
         return FastcontactError("pictures need matplotlib: pip install 'fastcontact[plot]'")
     backend = os.environ.get("MPLBACKEND")
@@ -100,7 +103,7 @@ def new_panels(rows: int, columns: int, size: tuple[float, float], dpi: int = 15
     figure = Figure(figsize=size, layout="constrained", dpi=dpi)
     FigureCanvasAgg(figure)
     panels = figure.subplots(rows, columns, squeeze=False, **options)
-    for artist in (figure, *figure.axes):  # notebooks show any of them as the figure
+    for artist in (figure, *figure.axes):  # notebooks display the figure for each of these objects
         artist._repr_png_ = partial(png, figure)  # type: ignore[attr-defined]
     return panels
 
@@ -110,35 +113,39 @@ def outer_legend(ax: Any, columns: int) -> None:
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=columns, fontsize=8)
 
 
-def settled(axes: Any) -> Any:
-    """Draw axes in space, so that the size of their labels is known to the layout, and return them."""
+def laid_out(axes: Any) -> Any:
+    """Draw axes in space once, so that the layout of the figure includes the size of their labels, and return them."""
     axes.figure.draw_without_rendering()
     return axes
 
 
-LETTER = 0.09  # mean width of a letter of a label [inch]
+# Mean width of a letter of a label [inch].
+LETTER = 0.09
 
 
 def size_around(points: Array, least: float = 3.2) -> tuple[float, float]:
-    """Return width and height [inch] of a figure for a body, with space for colour bar, labels and title."""
+    """Return the width and the height of a figure for a body, with space for a colour bar, labels and a title [inch].
+
+    `points` (n, 2) are those of the body [length], and `least` is the smallest height.
+    """
     width, height = np.ptp(points, axis=0) / np.ptp(points, axis=0).max()
     return max(4.2 * float(width) + 1.9, 5.0), max(4.2 * float(height) + 2.0, least)
 
 
-def part_shown(middle: Array, half: float, points: Array) -> tuple[Array, Array]:
-    """Return the lower and upper corners of a square with a centre (2,) and a half width, clipped to points (n, 2)."""
-    low, high = points.min(axis=0) - 0.05 * half, points.max(axis=0) + 0.05 * half
-    return np.maximum(middle - half, low), np.minimum(middle + half, high)
+def zoomed(centre: Array, half_width: float, points: Array) -> tuple[Array, Array]:
+    """Return two corners of a square around `centre` (2,), clipped to the bounding box of `points` (n, 2) with a margin."""
+    low, high = points.min(axis=0) - 0.05 * half_width, points.max(axis=0) + 0.05 * half_width
+    return np.maximum(centre - half_width, low), np.minimum(centre + half_width, high)
 
 
-def framed(
-    axes: Any, drawn: Any, shown: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
+def labelled_axes(
+    axes: Any, artist: Any, shown: Field, heading: str, units: Mapping[str, str], labels: Sequence[str],
     points: Array | None = None, *, alone: bool = True,
 ) -> Any:  # fmt: skip
     """Add a colour bar, a title, a label for each direction and a legend to axes, and return the axes.
 
-    `points` (n, 2) [length] are the points of a body in the plane, and None for axes in space. `alone` is whether the figure
-    has no other axes.
+    `artist` has the colour scale of the field `shown`. `points` (n, 2) are those of a body in the plane, and None for axes in
+    space [length]. `alone` states whether the figure has no other axes.
     """
     caption, length, below = labelled(shown.caption, units, shown.quantity), 0.6, 0.02
     if points is not None:
@@ -148,7 +155,7 @@ def framed(
         half_inch = -0.5 / max(4.2 * float(height) / max(float(width), float(height)), 0.2)
         below = half_inch if alone else -0.09
         axes.set_aspect("equal")
-    axes.figure.colorbar(drawn, ax=axes, label=caption, shrink=length)
+    axes.figure.colorbar(artist, ax=axes, label=caption, shrink=length)
     axes.set_title(heading, fontsize="medium", pad=18 if points is None else None)
     axes.set(**{f"{axis}label": labelled(label, units, "length") for axis, label in zip("xyz", labels)})
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, below))

@@ -1,4 +1,4 @@
-"""Plot maps of pressure, shear traction and slip on a contact surface in 3D."""
+"""Maps of pressure, shear traction and slip on a contact surface in 3D."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from fastcontact.results.plot.solid import seen_along
 from fastcontact.results.step import ContactResult
 from fastcontact.results.units import labelled, valued
 
-# Margin of the plotted region around the closed part of the surface, relative to the half-width of the closed part.
+# Margin of the plotted region around the part of the surface that is in contact, relative to the half-width of that part.
 MARGIN = 0.15
-# Smallest relative height of a figure; the colour bars of flatter maps lie below the maps.
+# Smallest ratio of the heights of a figure and of a square one. The colour bars of flatter maps lie below the maps.
 FLAT = 0.55
 # Smallest magnitude of the mean unit normal for which a surface can be projected along this normal.
 LEAST_MEAN = 0.3
-# Captions, and quantities that determine the units, of the fields that can be plotted next to the pressure.
+# Captions and quantities, which determine units, of the fields that can be plotted next to the pressure.
 BESIDE = {
     "shear": ("shear traction", "pressure"),
     "slip": ("slip of the step", "length"),
-    "slip_total": ("slip so far", "length"),
+    "slip_total": ("total slip", "length"),
 }
 
 
@@ -90,7 +90,7 @@ def contact_map(
     if mesh.dim != 3:
         raise FastcontactError("maps of a contact are for meshes in three dimensions: draw the pressure profile")
     blocks = _facets(mesh, contact)
-    (basis, labels), units = _seen_along(contact, blocks), units_of(units, contact)
+    (basis, labels), units = _projection(contact, blocks), units_of(units, contact)
     flat = contact.coordinates @ basis.T
     if labels is None:
         flat -= contact.middle @ basis.T
@@ -98,21 +98,21 @@ def contact_map(
     check_known("field beside the pressure", beside, BESIDE, FastcontactError)
     caption, quantity, vectors = *BESIDE[beside], getattr(contact, beside)
     size = np.linalg.norm(vectors, axis=1)
-    both = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
-    panels = _panels(axes, both)
+    two_maps = bool(size.max(initial=0.0) > (1e-9 * contact.pressure_max if beside == "shear" else 0.0) >= 0.0)
+    panels = _panels(axes, two_maps)
     fields = [(contact.pressure, "contact pressure", "pressure"), (size, caption, quantity)]
     for ax, (values, caption, quantity) in zip(panels, fields, strict=False):
         ends = min(0.0, float(values.min(initial=0.0))), float(values.max(initial=0.0)) or 1.0
-        drawn = fill(ax, blocks, flat, values, "viridis", ends)
+        artist = fill(ax, blocks, flat, values, "viridis", ends)
         high = _limit(ax, flat, _carrying(contact, blocks) & ~np.array(everything))
         bar = {"location": "bottom", "shrink": 0.6} if high == FLAT else {"shrink": 0.75 * high}
-        ax.figure.colorbar(drawn, ax=ax, label=labelled(caption, units, quantity), **bar)
-        _nodes(ax, flat, contact, both)
+        ax.figure.colorbar(artist, ax=ax, label=labelled(caption, units, quantity), **bar)
+        _nodes(ax, flat, contact, two_maps)
         ax.set(xlabel=labelled(labels[0], units, "length"), ylabel=labelled(labels[1], units, "length"), aspect="equal")
         ax.set_title(f"{caption}\nlargest {valued(float(values.max(initial=0.0)), units, quantity)}", fontsize="medium")
-    if both:
-        far = size > 0.1 * size.max()  # arrows show the direction where the magnitude is not small
-        panels[1].quiver(*flat[far].T, *(vectors @ basis.T)[far].T, color="white", width=0.004, pivot="tail")
+    if two_maps:
+        large = size > 0.1 * size.max()  # the direction of small vectors is not shown
+        panels[1].quiver(*flat[large].T, *(vectors @ basis.T)[large].T, color="white", width=0.004, pivot="tail")
     if axes is None:
         panels[0].figure.set_figheight(1.6 + 3.0 * high)
     panels[0].figure.suptitle(title or f"Contact '{contact.name}'", fontsize="large")
@@ -121,31 +121,31 @@ def contact_map(
     return Panels(panels)
 
 
-def _panels(axes: Sequence[Any] | None, both: bool) -> list[Any]:
-    """Return one axes, or two if `both`; FastcontactError if too few are given."""
+def _panels(axes: Sequence[Any] | None, two_maps: bool) -> list[Any]:
+    """Return the axes of one or two maps, by default those of a new figure. Raises FastcontactError if there are too few."""
     if axes is not None:
-        axes_given = list(np.atleast_1d(np.array(axes, dtype=object)))
-        if len(axes_given) < 1 + both:
-            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(axes_given)} are given")
-        return axes_given[: 1 + both]
-    panels = list(new_panels(1, 1 + both, (9.6 if both else 5.6, 4.6))[0])
-    panels[0].figure.set_layout_engine("compressed")  # places the colour scale next to a narrow map
+        panels = list(np.atleast_1d(np.array(axes, dtype=object)))
+        if len(panels) < 1 + two_maps:
+            raise FastcontactError(f"this contact has shear: it takes two axes, and {len(panels)} are given")
+        return panels[: 1 + two_maps]
+    panels = list(new_panels(1, 1 + two_maps, (9.6 if two_maps else 5.6, 4.6))[0])
+    panels[0].figure.set_layout_engine("compressed")  # places the colour bar next to a narrow map
     return panels
 
 
 def _facets(mesh: Mesh, contact: ContactResult) -> dict[str, Indices]:
     """Return the facets (n, m) of the secondary surface by element type, as positions in the arrays of the contact."""
-    inside = contact.points.max(initial=-1) < mesh.n_points
+    in_mesh = contact.points.max(initial=-1) < mesh.n_points
     row = np.full(max(mesh.n_points, int(contact.points.max(initial=-1)) + 1), -1)
     row[contact.points] = np.arange(len(contact.points))
-    here = {name: row[facets] for name, facets in outer_facets(mesh).items()}
-    facets_of_kind = {name: facets[(facets >= 0).all(axis=1)] for name, facets in here.items()}
-    if not inside or not any(map(len, facets_of_kind.values())):
+    rows = {name: row[facets] for name, facets in outer_facets(mesh).items()}
+    blocks = {name: facets[(facets >= 0).all(axis=1)] for name, facets in rows.items()}
+    if not in_mesh or not any(map(len, blocks.values())):
         raise FastcontactError(f"contact '{contact.name}' is not on the surface of this mesh")
-    return facets_of_kind
+    return blocks
 
 
-def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Array, tuple[str, str] | None]:
+def _projection(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Array, tuple[str, str] | None]:
     """Return two axes (2, 3) normal to the mean normal, and their names if they are coordinate axes.
 
     The mean normal is weighted by the pressure of the facets; without pressure all facets have the same weight.
@@ -154,8 +154,8 @@ def _seen_along(contact: ContactResult, blocks: dict[str, Indices]) -> tuple[Arr
     for facets in blocks.values():
         flat = facets[:, flat_triangles(facets.shape[1])].reshape(-1, 3)
         a, b, c = np.moveaxis(contact.coordinates[flat], 1, 0)
-        carried = np.maximum(contact.pressure[flat].mean(axis=1), 0.0) if contact.pressure_max > 0.0 else 1.0
-        areas = np.cross(b - a, c - a) * np.reshape(carried, (-1, 1))
+        weight = np.maximum(contact.pressure[flat].mean(axis=1), 0.0) if contact.pressure_max > 0.0 else 1.0
+        areas = np.cross(b - a, c - a) * np.reshape(weight, (-1, 1))
         total, total_area = total + areas.sum(axis=0), total_area + float(np.linalg.norm(areas, axis=1).sum())
     if np.linalg.norm(total) < LEAST_MEAN * total_area:
         raise FastcontactError(

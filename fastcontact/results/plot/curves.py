@@ -1,4 +1,4 @@
-"""Curves of a contact: its pressure, the stresses below it, and its force, radius and zones over the load steps."""
+"""Plots of a contact: pressure profiles, stresses below the surface, and force, radius and zones over the load steps."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def pressure_profile(
     for style, (legend, curve) in zip(("-", "--", ":", "-."), curves.items(), strict=False):
         end = min(curve.radius, high)
         x = np.unique(np.concatenate([[low, high], np.linspace(max(-end, low), end, 400)]))
-        name = "$p_0$" if np.isfinite(curve.radius) else "$p$"  # the pressure is uniform
+        name = "$p_0$" if np.isfinite(curve.radius) else "$p$"  # with an infinite radius the pressure is uniform
         label = f"{legend}: {name} = {valued(curve.pressure_max, units, 'pressure')}"
         ax.plot(x, curve.pressure(np.abs(x)), style, color="black", lw=1.1, label=label)
     peak = f"$p_{{max}}$ = {valued(contact.pressure_max, units, 'pressure')}"
@@ -108,8 +108,8 @@ def pressure_profile(
         ax.plot(position[shown], -stress[order][shown], "x", color="tab:red", ms=5, label=label)
     _mark_edges(ax, contact, position, units, colour)
     start = "axis" if contact.measured_from_axis else "middle of the contact"
-    along = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
-    ax.set(xlabel=labelled(f"{along} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
+    distance = "distance along the surface" if flat and not contact.measured_from_axis else "distance"
+    ax.set(xlabel=labelled(f"{distance} from the {start}", units, "length"), xlim=(min(limits), max(limits)))
     ax.set(ylabel=labelled("contact pressure", units, "pressure"))
     ax.set(title=title or ax.get_title() or f"Contact '{contact.name}'")
     ax.set_ylim(min(0.0, 1.05 * float(pressure.min(initial=0.0))), 1.05 * ax.dataLim.y1 or None)
@@ -120,22 +120,27 @@ def pressure_profile(
 
 
 def _curves(theory: Any, others: Mapping[str, Any]) -> dict[str, PressureCurve]:
-    """Return the pressure curves of the theories, by their labels in the legend."""
-    for theory_given in (theory, *others.values()):
-        if theory_given is not None and not is_dataclass(theory_given) and pressure_curve(theory_given) is None:
+    """Return the pressure curves of the theories, by their labels in the legend.
+
+    Results of `analytic` without a pressure are left out.
+    """
+    curves = {}
+    for legend, candidate in (("", theory), *others.items()):
+        curve = pressure_curve(candidate)
+        if curve is not None:
+            curves[legend or curve.name] = curve
+        elif candidate is not None and not is_dataclass(candidate):
             raise FastcontactError(
-                f"a theory needs a pressure, such as the results of fastcontact.analytic have, but {theory_given!r} has none"
+                f"a theory needs a pressure, such as the results of fastcontact.analytic have, but {candidate!r} has none"
             )
-    curves = {legend: pressure_curve(other) for legend, other in others.items()}
-    curve = pressure_curve(theory)
-    return {**({curve.name: curve} if curve is not None else {}), **{k: c for k, c in curves.items() if c is not None}}
+    return curves
 
 
 def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) -> tuple[float, float]:
     """Return the limits of the abscissa, which exceed the extent of the contact and of the theories by about one third.
 
-    The limits are at most slightly beyond the last node or theory. Both sides of the middle are included if the surface has
-    nodes on both sides.
+    They exceed the farthest node and theory by at most 2 %. Both sides of the middle are included if the surface has nodes on
+    both sides.
     """
     closed = np.abs(contact.place[contact.active]).max(initial=0.0)
     radii = [value for value in (*contact.radius, *(c.radius for c in curves.values())) if np.isfinite(value)]
@@ -149,7 +154,7 @@ def _shown_range(contact: ContactResult, curves: Mapping[str, PressureCurve]) ->
 
 
 def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mapping[str, str], colour: str) -> None:
-    """Shade the range between the bounds of the contact radius, in plane models as arc lengths, at each contact end."""
+    """Shade the range between the bounds of the contact radius at each end, in plane models as arc lengths."""
     inside, outside = half_width(contact.place, contact.active)
     if not (np.isfinite(inside) and np.isfinite(outside)):
         return
@@ -159,9 +164,9 @@ def _mark_edges(ax: Axes, contact: ContactResult, position: Array, units: Mappin
         centre = 0.5 * float(closed.min() + closed.max()) if len(closed) else 0.0
     label = f"edges: {centre - inside:.4g} and {valued(centre + inside, units, 'length')}"
     if abs(centre) <= 0.01 * outside:
-        # The bounds of the radius may be closer to each other than two nodes, because constraints may lie between nodes.
-        # Nodes beyond the contact are excluded: on a curved surface, they may be equally near to the middle along the
-        # tangent.
+        # The difference of the bounds may be smaller than the distance of two nodes, because constraints may lie between
+        # nodes. Nodes beyond the contact are excluded, because on a curved surface their distance from the middle along the
+        # tangent may be the same as that of nodes in contact.
         place = np.abs(contact.place)
         near = np.flatnonzero(place <= outside)[np.argsort(place[place <= outside])]
         inside, outside = np.interp(contact.radius, np.abs(contact.across)[near], place[near])
@@ -232,8 +237,8 @@ def axis_stress(
     >>> ax = fc.plot.axis_stress(mesh, steps[-1], "joint")
     """
     depth, side, stress = stresses_on_axis(mesh, step, pair)
-    upright = abs(_axis(step, pair)[1][1]) > 0.5
-    bodies = ("upper body", "lower body") if upright else ("right body", "left body")
+    vertical = abs(_axis(step, pair)[1][1]) > 0.5
+    bodies = ("upper body", "lower body") if vertical else ("right body", "left body")
     axes, units = new_axes(ax, (6.4, 4.8)), units_of(units, step)
     reach = PLOTTED_DEPTH * np.nan_to_num(contacts_of([step], pair)[0].radius[0]) or float(depth.max())
     shown = depth <= reach
@@ -241,17 +246,19 @@ def axis_stress(
         "von Mises": von_mises(stress)
     }
     for number, name in enumerate(bodies):
-        here = shown & (side == 1 - 2 * number)
+        nodes = shown & (side == 1 - 2 * number)
         for (caption, value), colour, marker in zip(values.items(), COLOURS, "osD", strict=True):
-            if here.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
+            if nodes.any():  # symbols of the second body are hollow, so that they do not hide those of the first body
                 face, label = ("none" if number else colour), f"{caption}, {name}"
-                axes.plot(depth[here], value[here], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label)
-    fine = np.linspace(0.0, reach, 400)
+                axes.plot(
+                    depth[nodes], value[nodes], marker, color=colour, mfc=face, ms=3.5 * (1 + number), label=label
+                )
+    depths = np.linspace(0.0, reach, 400)
     for style, (label, theory) in zip(("-", "--", ":"), (theories or {}).items(), strict=False):
-        exact = theory.stress_on_axis(fine)
+        exact = theory.stress_on_axis(depths)
         curves = [*(exact[:, component] for component in COMPONENTS.values()), von_mises(exact)]
         for colour, curve in zip(COLOURS, curves, strict=True):
-            axes.plot(fine, curve, style, color=colour, lw=1.0)
+            axes.plot(depths, curve, style, color=colour, lw=1.0)
         axes.plot([], [], f"k{style}", lw=1.0, label=label)
     title = title or f"Stresses on the axis, {step.instant}"
     axes.set(xlabel=labelled("depth below the surface", units, "length"), ylabel=labelled("stress", units, "pressure"))
@@ -272,11 +279,11 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
             "stresses along the axis need a two-dimensional mesh: in three dimensions draw a section, or plot step.stress at "
             "the nodes on the axis"
         )
-    pole, direction = _axis(step, pair)
+    origin, direction = _axis(step, pair)
     tolerance = 1e-9 * np.ptp(mesh.points, axis=0).max()
     used = np.unique(np.concatenate([block.ravel() for block in mesh.solids.values()]))
-    height = (mesh.points[used] - pole) @ direction
-    offset = (mesh.points[used] - pole) @ np.array([direction[1], -direction[0]])
+    height = (mesh.points[used] - origin) @ direction
+    offset = (mesh.points[used] - origin) @ np.array([direction[1], -direction[0]])
     # The direction of an oblique axis is the normal of a facet, whose error may be a few thousandths of a radian.
     slope_tolerance = 0.0 if np.abs(direction).max() == 1.0 else 2e-3
     on_axis = np.abs(offset) <= tolerance + slope_tolerance * np.abs(height)
@@ -286,10 +293,10 @@ def stresses_on_axis(mesh: Mesh, step: StepResult, pair: str) -> tuple[Array, In
             f"the mesh has no nodes on the axis of contact '{pair}', along which stresses could be plotted"
         )
     # Both bodies have a node at the intersection with the surface. The positions of its cells show to which body it belongs.
-    body_side = _sides(mesh, nodes, pole, direction)
+    body_side = _sides(mesh, nodes, origin, direction)
     side = np.where(np.abs(height) > tolerance, np.sign(height), body_side).astype(np.int64)
     order = np.lexsort((np.abs(height), side))
-    return np.abs(height)[order], side[order], _turned(step.stress[nodes], direction)[order]
+    return np.abs(height)[order], side[order], _rotated(step.stress[nodes], direction)[order]
 
 
 def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
@@ -299,24 +306,24 @@ def _axis(step: StepResult, pair: str) -> tuple[Array, Array]:
     normal = contact.normal[nearest]
     if contact.measured_from_axis or not np.linalg.norm(normal) > 0.5:
         return np.array([0.0, contact.coordinates[nearest, 1]]), np.array([0.0, 1.0])
-    along = int(np.argmax(np.abs(normal)))
-    direction = np.eye(2)[along] if abs(normal[along]) > 0.999 else normal * np.sign(normal[along])
+    axis = int(np.argmax(np.abs(normal)))
+    direction = np.eye(2)[axis] if abs(normal[axis]) > 0.999 else normal * np.sign(normal[axis])
     return contact.coordinates[nearest], direction
 
 
-def _turned(stress: Array, direction: Array) -> Array:
-    """Return the stress (n, 4) [pressure] in axes normal to and along a direction (2,) [-]."""
+def _rotated(stress: Array, direction: Array) -> Array:
+    """Return the stress (n, 4) in rotated axes, of which x is normal to and y along a direction (2,) [pressure]."""
     along, across = direction, np.array([direction[1], -direction[0]])
     tensor = stress[:, [0, 3, 3, 1]].reshape(-1, 2, 2)
     xx, yy, xy = (np.einsum("i,nij,j->n", a, tensor, b) for a, b in ((across, across), (along, along), (across, along)))
     return np.column_stack([xx, yy, stress[:, 2], xy])
 
 
-def _sides(mesh: Mesh, nodes: AnyArray, pole: Array, direction: Array) -> Array:
+def _sides(mesh: Mesh, nodes: AnyArray, origin: Array, direction: Array) -> Array:
     """Return the side (n,), 1 or -1, on which the cells of each node lie; see `stresses_on_axis`."""
     total = np.zeros(mesh.n_points)
     for block in mesh.solids.values():
-        np.add.at(total, block, ((mesh.points[block].mean(axis=1) - pole) @ direction)[:, None])
+        np.add.at(total, block, ((mesh.points[block].mean(axis=1) - origin) @ direction)[:, None])
     return np.asarray(np.sign(total[nodes]))
 
 
@@ -390,43 +397,43 @@ def history(
     cancels = any(c.active.any() for c in contacts) and all(c.cancels for c in contacts if c.active.any())
     forces = [c.normal_force if cancels else float(np.linalg.norm(c.force)) for c in contacts]
     upper.plot(x, forces, "o", ms=4, label="computed")
-    _brackets(lower, x, np.array([c.radius for c in contacts]))
+    _plot_bounds(lower, x, np.array([c.radius for c in contacts]))
     if law is not None and approach is not None:
         name = f"{NAMES.get(type(law), 'theory')}, equal approach"
-        fine = x.max() * np.linspace(0.0, 1.0, 200)[1:] ** 2
-        curves = [law.at_approach(d) for d in fine]
-        upper.plot([0.0, *fine], [0.0, *(share * c.force for c in curves)], "k-", lw=1, label=name)
-        lower.plot([0.0, *fine], [0.0, *(c.radius for c in curves)], "k-", lw=1, label=name)
+        approaches = x.max() * np.linspace(0.0, 1.0, 200)[1:] ** 2
+        theory = [law.at_approach(d) for d in approaches]
+        upper.plot([0.0, *approaches], [0.0, *(share * t.force for t in theory)], "k-", lw=1, label=name)
+        lower.plot([0.0, *approaches], [0.0, *(t.radius for t in theory)], "k-", lw=1, label=name)
     if any(c.per_thickness for c in contacts):
         units = units_of_results(units, "plane_strain")
     upper.set(ylabel=labelled("sum of the normal forces" if cancels else "contact force", units, "force"))
     upper.set_title(title or f"Contact '{pair}' against the load", fontsize="medium")
-    along = labelled("approach", units, "length") if approach else "load factor"
-    size = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
-    lower.set(xlabel=along, ylabel=labelled(size, units, "length"))
+    abscissa = labelled("approach", units, "length") if approach else "load factor"
+    extent = "contact radius" if contacts[-1].extent == "radius" else "half-width of the contact"
+    lower.set(xlabel=abscissa, ylabel=labelled(extent, units, "length"))
     for ax in axes:
         ax.grid(alpha=0.3)
         entries = len(ax.get_legend_handles_labels()[0])
         if entries:
             ax.legend(fontsize=9, loc="upper left")
         top = float(ax.dataLim.y1)
-        room = 0.12 * (entries + 0.3) if entries else 0.05  # space for the legend above the curves
-        ax.set_ylim(0.0, (1.0 + room) * top if 0.0 < top < np.inf else None)
+        margin = 0.12 * (entries + 0.3) if entries else 0.05  # space for the legend above the curves
+        ax.set_ylim(0.0, (1.0 + margin) * top if 0.0 < top < np.inf else None)
         ax.set_xlim(left=min(0.0, float(x.min())))
     return axes
 
 
-def _brackets(ax: Any, x: Array, bracket: Array) -> None:
-    """Draw a bar between the bounds of the radius at each step, or a tick if there is no upper bound."""
-    low, high = bracket.T
-    known = np.isfinite(low)
-    both = known & np.isfinite(high)
-    name = "computed: outermost closed place to first open one"
+def _plot_bounds(ax: Any, x: Array, bounds: Array) -> None:
+    """Draw a bar between the bounds (n, 2) of the radius at each step, or a tick if there is no upper bound."""
+    low, high = bounds.T
+    both = np.isfinite(low) & np.isfinite(high)
+    all_closed = np.isfinite(low) & ~both
     if both.any():
-        ax.vlines(x[both], low[both], high[both], lw=4, alpha=0.5, color="tab:blue", label=name)
+        label = "computed: outermost closed node to first open one"
+        ax.vlines(x[both], low[both], high[both], lw=4, alpha=0.5, color="tab:blue", label=label)
         ax.plot([x[both], x[both]], [low[both], high[both]], "_", ms=6, color="tab:blue")
-    if (known & ~both).any():
-        ax.plot(x[known & ~both], low[known & ~both], "_", ms=9, color="tab:blue", label="computed: all nodes closed")
+    if all_closed.any():
+        ax.plot(x[all_closed], low[all_closed], "_", ms=9, color="tab:blue", label="computed: all nodes closed")
 
 
 @typed(FastcontactError)
@@ -466,20 +473,18 @@ def contact_zones(
     >>> steps = fc.solve(model, 2)
     >>> ax = fc.plot.contact_zones(steps, "joint")
     """
-    if not steps:
-        raise FastcontactError("there are no steps to plot")
-    axes = new_axes(ax, (6.4, 4.8))
-    contacts, units = contacts_of(steps, pair), units_of(units, steps[-1])
+    contacts, axes = contacts_of(steps, pair), new_axes(ax, (6.4, 4.8))
+    units = units_of(units, steps[-1])
     x = np.concatenate([np.full(len(c.points), step.load_factor) for step, c in zip(steps, contacts, strict=True)])
     y = np.concatenate([c.place for c in contacts])
     closed = np.concatenate([c.active for c in contacts])
     sliding = closed & ~np.concatenate([c.sticking for c in contacts])
-    held = "sticking" if sliding.any() or any(c.shear.any() for c in contacts) else "closed"
-    for name, here in (("open", ~closed), (held, closed & ~sliding), ("sliding", sliding)):
-        if here.any():
-            axes.plot(x[here], y[here], "o" if name != "open" else ".", ms=4, color=STATES[name], label=name)
-    every = -(-len(contacts) // MOST_COUNTS)
-    for step, contact in list(zip(steps, contacts, strict=True))[(len(contacts) - 1) % every :: every]:
+    closed_state = "sticking" if sliding.any() or any(c.shear.any() for c in contacts) else "closed"
+    for state, nodes in (("open", ~closed), (closed_state, closed & ~sliding), ("sliding", sliding)):
+        if nodes.any():
+            axes.plot(x[nodes], y[nodes], "o" if state != "open" else ".", ms=4, color=STATES[state], label=state)
+    stride = -(-len(contacts) // MOST_COUNTS)
+    for step, contact in list(zip(steps, contacts, strict=True))[(len(contacts) - 1) % stride :: stride]:
         anchor = {"xycoords": ("data", "axes fraction"), "ha": "center", "va": "bottom"}
         axes.annotate(str(int(contact.active.sum())), (step.load_factor, 1.0), fontsize=8, **anchor)
     reach, farthest = 1.5 * np.abs(y[closed]).max(initial=0.0), np.abs(y).max(initial=0.0)

@@ -33,7 +33,7 @@ class Field:
     caption : str
         Name for labels.
     quantity : str
-        Kind of unit, ``"pressure"`` or ``"length"``; empty for other fields.
+        Quantity that determines the unit, ``"pressure"`` or ``"length"``; empty for other fields.
     """
 
     mesh: Mesh
@@ -57,14 +57,14 @@ class Field:
 
     @property
     def signed(self) -> bool:
-        """Whether the values have both signs and the smaller extreme is more than a tenth of the larger in magnitude."""
+        """Whether the values have both signs, and the magnitude of the smaller extreme exceeds a tenth of the larger one."""
         low, high = float(self.values.min()), float(self.values.max())
         return low < 0.0 < high and min(-low, high) > 0.1 * max(-low, high)
 
-    def described(self, value: float, units: Mapping[str, str], where: str = "") -> str:
-        """Return a label for an extreme value of the field."""
+    def described(self, value: float, units: Mapping[str, str], region: str = "") -> str:
+        """Return a label for an extreme value of the field, or of a `region` such as ``" on the section"``."""
         kind = "maximum" if value >= 0.0 else "minimum"
-        return f"{kind}{where} {valued(float(value), units, self.quantity, 5)}"
+        return f"{kind}{region} {valued(float(value), units, self.quantity, 5)}"
 
     @property
     def colours(self) -> str:
@@ -73,7 +73,7 @@ class Field:
 
 
 def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
-    """Return a field of a step by its name; FastcontactError if there is no field with this name."""
+    """Return a field of a step by its name. Raises FastcontactError if there is no field with this name."""
     fluxes = [flux for key, flux in step.cell_fields.items() if key.startswith("heat_flux_")]
     heat = [*["temperature"] * (step.temperature is not None), *["heat_flux"] * bool(fluxes)]
     check_known("field", name, [*names(mesh), *step.cell_fields, *heat], FastcontactError)
@@ -85,28 +85,28 @@ def field_of(mesh: Mesh, step: StepResult, name: str) -> Field:
     caption, quantity = name, ""
     if name in DISPLACEMENTS:
         caption, quantity = name.replace(".", " along "), "length"
-        along = AXES.index(name[-1]) if "." in name else None
-        values = np.linalg.norm(step.displacement, axis=1) if along is None else step.displacement[:, along]
+        axis = AXES.index(name[-1]) if "." in name else None
+        values = np.linalg.norm(step.displacement, axis=1) if axis is None else step.displacement[:, axis]
     elif name in SLIPS:
         caption, quantity = SLIPS[name], "length"
         values = np.linalg.norm(contact_slip(mesh, step, name.removeprefix("contact_")), axis=1)
     elif name == "temperature" and step.temperature is not None:
         values = step.temperature
     elif name == "heat_flux":
-        caption, values = "heat flux", _of_cells(mesh, np.linalg.norm(fluxes, axis=0))
+        caption, values = "heat flux", _nodal_mean(mesh, np.linalg.norm(fluxes, axis=0))
     else:
-        caption, values = CELLS.get(name, name), _of_cells(mesh, step.cell_fields[name])
+        caption, values = CELLS.get(name, name), _nodal_mean(mesh, step.cell_fields[name])
     return Field(mesh, np.arange(mesh.n_points, dtype=np.int32), values, caption, quantity)
 
 
 def names(mesh: Mesh) -> list[str]:
     """Return the names of the fields that each step on a mesh has."""
-    in_space = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
-    return [name for name in (*OF_STRESS, *DISPLACEMENTS, *SLIPS) if name not in in_space]
+    missing = ("stress.yz", "stress.xz", "displacement.z") if mesh.dim == 2 else ()
+    return [name for name in (*OF_STRESS, *DISPLACEMENTS, *SLIPS) if name not in missing]
 
 
-def _of_cells(mesh: Mesh, values: Array) -> Array:
-    """Return the mean (n_points,) of the values (n_solids,) of the solid cells around each point."""
+def _nodal_mean(mesh: Mesh, values: Array) -> Array:
+    """Return the mean (n_points,) of the `values` (n_solids,) of the solid cells that share each point."""
     total, count, by_element = np.zeros(mesh.n_points), np.zeros(mesh.n_points), cells_by_element(mesh, values)
     for name, block in mesh.solids.items():
         np.add.at(total, block, by_element[name][:, None])

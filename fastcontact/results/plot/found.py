@@ -1,4 +1,4 @@
-"""Plot the two sides of each contact pair that was found in a mesh."""
+"""Plots of the two sides of each contact pair that was detected in a mesh."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fastcontact._tools.argument_types import typed
 from fastcontact.contact.found_contacts import FoundContacts
 from fastcontact.errors import FastcontactError
 from fastcontact.mesh.topology import outer_facets
-from fastcontact.results.plot._axes import LETTER, Axes, new_axes, settled, size_around
+from fastcontact.results.plot._axes import LETTER, Axes, laid_out, new_axes, size_around
 from fastcontact.results.plot.patches import outlines, triangles_of
 from fastcontact.results.plot.solid import show_box
 
@@ -47,23 +47,23 @@ def contacts(
         legend = LETTER * max((len(f"{pair.name}, secondary") for pair in found_contacts), default=0)
         width = max(width, 4.2 * float(np.ptp(mesh.points[:, 0]) / np.ptp(mesh.points, axis=0).max()) + 1.1 + legend)
     axes = new_axes(ax, (width, height), "3d" if mesh.dim == 3 else None)
-    draw = _draw_2d if mesh.dim == 2 else _draw_3d
-    draw(axes, found_contacts)
     if mesh.dim == 2:
+        _draw_2d(axes, found_contacts)
         axes.set_aspect("equal", anchor="W")
         axes.autoscale_view()
     else:
+        _draw_3d(axes, found_contacts)
         show_box(axes, mesh.points.min(axis=0), mesh.points.max(axis=0), view)
     axes.set(**{f"{axis}label": axis for axis in "xyz"[: mesh.dim]})
     axes.set_title("1 contact" if len(found_contacts) == 1 else f"{len(found_contacts)} contacts")
     if len(found_contacts):
         anchor = (1.02, 1.0) if mesh.dim == 2 else (0.0, 1.0)
         axes.legend(loc="upper left", bbox_to_anchor=anchor, fontsize="small")
-    return axes if mesh.dim == 2 or ax is not None else settled(axes)
+    return axes if mesh.dim == 2 or ax is not None else laid_out(axes)
 
 
 def _sides(found_contacts: FoundContacts) -> list[tuple[str, str, Any, float]]:
-    """Return the group, the label, the colour and the opacity of each side."""
+    """Return the group, the label, the colour and the opacity of each side of each pair."""
     from matplotlib import colormaps
 
     colours = colormaps["tab10"].colors  # type: ignore[attr-defined]
@@ -85,9 +85,9 @@ def _draw_2d(axes: Any, found_contacts: FoundContacts) -> None:
     for group, label, colour, opacity in _sides(found_contacts):
         # Each line is drawn from end to end, through its mid-side node if it is quadratic.
         lines = [mesh.points[b[:, [0, 2, 1] if b.shape[1] == 3 else [0, 1]]] for b in mesh.cells_of(group, 1).values()]
-        strokes = [line for block in lines for line in block]
+        polylines = [line for block in lines for line in block]
         width = 4.0 if opacity < 1.0 else 1.5
-        axes.add_collection(LineCollection(strokes, colors=[colour], alpha=opacity, lw=width, label=label))
+        axes.add_collection(LineCollection(polylines, colors=[colour], alpha=opacity, lw=width, label=label))
 
 
 def _draw_3d(axes: Any, found_contacts: FoundContacts) -> None:
@@ -97,5 +97,7 @@ def _draw_3d(axes: Any, found_contacts: FoundContacts) -> None:
     for facets in outer_facets(mesh).values():
         axes.add_collection3d(Poly3DCollection(triangles_of(mesh.points, facets), facecolors="0.6", alpha=0.12))
     for group, label, colour, opacity in _sides(found_contacts):
-        shapes = [triangles_of(mesh.points, block) for block in mesh.cells_of(group, 2).values()]
-        axes.add_collection3d(Poly3DCollection(np.concatenate(shapes), facecolors=[colour], alpha=opacity, label=label))
+        triangles = [triangles_of(mesh.points, block) for block in mesh.cells_of(group, 2).values()]
+        axes.add_collection3d(
+            Poly3DCollection(np.concatenate(triangles), facecolors=[colour], alpha=opacity, label=label)
+        )

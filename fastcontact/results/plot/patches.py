@@ -1,4 +1,4 @@
-"""Cells in the plane, filled with the colours of a field and outlined, with the curved sides of quadratic cells."""
+"""Cells in the plane: colours of a field and outlines, with the curved sides of quadratic cells."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fastcontact.mesh import elements
 # Number of subdivisions of each side of a cell, which show curved sides and nonlinear fields.
 CUTS = 4
 # Largest number of cells that are subdivided. With more cells, subdivisions would not be visible.
-FEW = 5000
+MOST_SUBDIVIDED = 5000
 
 
 def fill(
@@ -42,22 +42,25 @@ def fill(
     matplotlib artist
         Artist for a colour bar.
     """
-    few = sum(map(len, blocks.values())) <= FEW
-    places, heights, triangles, start = [], [], [], 0
+    subdivided = sum(map(len, blocks.values())) <= MOST_SUBDIVIDED
+    positions, interpolated, triangles, start = [], [], [], 0
     for name, cells in blocks.items():
         shape, pieces = np.eye(cells.shape[1]), flat_triangles(cells.shape[1])
-        if few and name != "tri3":
+        if subdivided and name != "tri3":
             kind = elements.get(name)
             xi, pieces = lattice(kind.n_corners == 3, CUTS)
             shape = kind.shape(xi if kind.n_corners == 3 else 2.0 * xi - 1.0)
-        places.append(np.einsum("ps,nsd->npd", shape, points[cells]).reshape(-1, 2))
-        heights.append((values[cells] @ shape.T).ravel())
+        positions.append(np.einsum("ps,nsd->npd", shape, points[cells]).reshape(-1, 2))
+        interpolated.append((values[cells] @ shape.T).ravel())
         triangles.append((start + len(shape) * np.arange(len(cells))[:, None, None] + pieces).reshape(-1, 3))
         start += len(shape) * len(cells)
-    return shaded(ax, np.concatenate(places), np.concatenate(triangles), np.concatenate(heights), colours, ends)
+    all_values = np.concatenate(interpolated)
+    return fill_triangles(ax, np.concatenate(positions), np.concatenate(triangles), all_values, colours, ends)
 
 
-def shaded(ax: Any, points: Array, triangles: AnyArray, values: Array, colours: str, ends: tuple[float, float]) -> Any:
+def fill_triangles(
+    ax: Any, points: Array, triangles: AnyArray, values: Array, colours: str, ends: tuple[float, float]
+) -> Any:
     """Fill triangles (m, 3) between `points` (n, 2) with linearly interpolated `values` (n,); see `fill`."""
     from matplotlib.tri import Triangulation
 
@@ -75,16 +78,13 @@ def outlines(name: str, corners: Array) -> Array:
 
 
 def lattice(triangle: bool, n: int) -> tuple[Array, AnyArray]:
-    """Divide the unit triangle or square into triangles, with `n` intervals on each side.
-
-    Returns the points (k, 2) [-] and the points of the triangles (m, 3).
-    """
+    """Return points (k, 2) [-] and triangles (m, 3) that divide the unit triangle or square, `n` intervals on each side."""
     points = [(i, j) for i in range(n + 1) for j in range(n + 1) if not triangle or i + j <= n]
     number = {point: k for k, point in enumerate(points)}
     squares = [((i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)) for i in range(n) for j in range(n)]
     pieces = [(a, b, c) for a, b, c, _ in squares] + [(b, d, c) for _, b, c, d in squares]
-    inside = [[number[point] for point in piece] for piece in pieces if number.keys() >= {*piece}]
-    return np.array(points, float) / n, np.array(inside)
+    triangles = [[number[point] for point in piece] for piece in pieces if number.keys() >= {*piece}]
+    return np.array(points, float) / n, np.array(triangles)
 
 
 def triangles_of(points: Array, facets: AnyArray) -> Array:

@@ -1,4 +1,4 @@
-"""Plot the deformed mesh, and plane sections through 3D bodies, coloured by a field; also interactively and as animations."""
+"""Plots, interactive views and animations of the deformed mesh coloured by a field, and plane sections through 3D bodies."""
 
 from __future__ import annotations
 
@@ -22,22 +22,23 @@ from fastcontact.errors import FastcontactError
 from fastcontact.mesh import elements
 from fastcontact.mesh.mesh import Mesh
 from fastcontact.results.plot import _axes
-from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, placed, units_of
+from fastcontact.results.plot._axes import UNKNOWN, Axes, Units, new_axes, position_text, units_of
 from fastcontact.results.plot.fields import Field, field_of
-from fastcontact.results.plot.patches import fill, outlines, shaded
+from fastcontact.results.plot.patches import fill, fill_triangles, outlines
 from fastcontact.results.plot.solid import MOST_EDGES, draw_solid, is_seen, seen_along, show_box, view_of_extreme
 from fastcontact.results.step import StepResult
 
-LARGEST = 1e30  # largest coordinate that can be plotted without overflow in products of coordinates
-VIBRATION = (
-    0.1  # largest displacement of vibration modes, over the size of the mesh, at which they are drawn by default
-)
+# Largest coordinate that can be plotted without overflow in products of coordinates.
+LARGEST = 1e30
+# Largest displacement with which vibration modes are drawn by default, relative to the size of the mesh.
+VIBRATION = 0.1
 
 
 def scale_of(scale: float | None, mesh: Mesh, steps: Sequence[StepResult]) -> float:
-    """Return the factor on the displacements [-]: `scale` or, by default, 1 or that of vibration modes.
+    """Return the factor on the displacements [-], which is `scale` if it is given.
 
-    The amplitude of a mode is arbitrary; by default the largest displacement is a tenth of the size of the mesh.
+    The default is 1. The amplitude of vibration modes is arbitrary, and by default their largest displacement is a tenth of
+    the size of the mesh.
     """
     largest = max(float(np.abs(step.displacement).max(initial=0.0)) for step in steps)
     if scale is not None or largest == 0.0 or "parameter" not in steps[0].iterations:
@@ -46,11 +47,11 @@ def scale_of(scale: float | None, mesh: Mesh, steps: Sequence[StepResult]) -> fl
 
 
 def scaled(points: Array, scale: float, displacement: Array) -> Array:
-    """Return the displaced points (n, dim) [length]; FastcontactError if `scale` makes them too large to be plotted."""
+    """Return the displaced points (n, dim) [length]. Raises FastcontactError if they are too large to be plotted."""
     with np.errstate(all="ignore"):
         position = points + scale * displacement
-        drawn = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
-    if not drawn:
+        valid = np.isfinite(scale) and (np.abs(position) < LARGEST).all()
+    if not valid:
         raise FastcontactError(f"scale = {scale:g} must be a finite number, and not so large that nothing can be drawn")
     return position
 
@@ -136,28 +137,29 @@ def deformed_shape(
     if mesh.dim == 3:
         axes = new_axes(ax, (6.4, 6.9), "3d")
         view = view or view_of_extreme(shown, points)
-        drawn = draw_solid(axes, shown, points, edges, view, limits or shown.range)
+        artist = draw_solid(axes, shown, points, edges, view, limits or shown.range)
         _mark(axes, shown, points, mesh, units, hidden=not is_seen(shown, points, view))
-        _axes.framed(axes, drawn, shown, heading, units, "xyz")
-        return axes if ax is not None else _axes.settled(axes)
-    extent = np.concatenate([points, points * [-1.0, 1.0]]) if mirrored else points
-    extent = extent if zoom is None else np.array(_axes.part_shown(points[shown.extreme], zoom, extent))
+        _axes.labelled_axes(axes, artist, shown, heading, units, "xyz")
+        return axes if ax is not None else _axes.laid_out(axes)
+    images = [points, points * [-1.0, 1.0]] if mirrored else [points]
+    extent = np.concatenate(images)
+    extent = extent if zoom is None else np.array(_axes.zoomed(points[shown.extreme], zoom, extent))
     axes = new_axes(ax, _axes.size_around(extent))
-    for turned in (points, points * [-1.0, 1.0]) if mirrored else (points,):
-        drawn = _draw(axes, shown, turned, edges, limits or shown.range, extent)
+    for image in images:
+        artist = _draw(axes, shown, image, edges, limits or shown.range, extent)
     if zoom is not None:
         axes.set(xlim=extent[:, 0], ylim=extent[:, 1])
     _mark(axes, shown, points, mesh, units)
-    return _axes.framed(axes, drawn, shown, heading, units, "xy", extent, alone=ax is None)
+    return _axes.labelled_axes(axes, artist, shown, heading, units, "xy", extent, alone=ax is None)
 
 
 def _mark(axes: Any, shown: Field, points: Array, mesh: Mesh, units: Mapping[str, str], hidden: bool = False) -> None:
     """Mark the extreme value; its label contains the position in the deformed and in the reference configuration."""
-    before = mesh.points[shown.node[shown.extreme]]
-    at, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
-    here, there = placed(at, size), placed(before, size)
-    label = f"{shown.described(shown.values[shown.extreme], units)} at {here}{', hidden' * hidden}"
-    _axes.mark(axes, at, label + (f"\nundeformed at {there}" if here != there else ""))
+    point, size = points[shown.extreme], float(np.ptp(points, axis=0).max())
+    deformed = position_text(point, size)
+    undeformed = position_text(mesh.points[shown.node[shown.extreme]], size)
+    label = f"{shown.described(shown.values[shown.extreme], units)} at {deformed}{', hidden' * hidden}"
+    _axes.mark(axes, point, label + (f"\nundeformed at {undeformed}" if deformed != undeformed else ""))
 
 
 def _draw(
@@ -165,26 +167,23 @@ def _draw(
 ) -> Any:  # fmt: skip
     """Draw the cells of a 2D mesh at the positions `nodes` (n_points, 2), and return the artist with the colour scale.
 
-    `colours` contains the limits of the colour scale. By default edges are drawn if there are few cells in the bounding box
-    of the points `box` (n, 2).
+    `colours` contains the limits of the colour scale. By default edges are drawn if at most MOST_EDGES cells lie in the
+    bounding box of the points `box` (n, 2).
     """
     from matplotlib.collections import PolyCollection
 
-    drawn = fill(ax, shown.mesh.solids, nodes, shown.values, shown.colours, colours)
+    artist = fill(ax, shown.mesh.solids, nodes, shown.values, shown.colours, colours)
     loops = [outlines(name, nodes[cells]) for name, cells in shown.mesh.solids.items()]
     low, high = box.min(axis=0), box.max(axis=0)
     inside = [((loop.max(axis=1) >= low) & (loop.min(axis=1) <= high)).all(axis=1) for loop in loops]
-    if edges if edges is not None else sum(int(kept.sum()) for kept in inside) <= MOST_EDGES:
+    if edges if edges is not None else sum(int(mask.sum()) for mask in inside) <= MOST_EDGES:
         for loop in loops:
             ax.add_collection(PolyCollection(list(loop), facecolors="none", edgecolors="black", lw=0.15, alpha=0.6))
-    return drawn
+    return artist
 
 
 # Distance by which a plane that only touches a body is moved into the body, relative to the size of the body.
 INSIDE = 1e-7
-# Corners of a tetrahedron on one side of the plane, by the number whose binary digits state which corners lie there.
-_FIRST = {k: [i for i in range(4) if k >> i & 1] for k in range(16)}
-_REST = {k: [i for i in range(4) if not k >> i & 1] for k in range(16)}
 
 
 @typed(FastcontactError)
@@ -246,64 +245,69 @@ def section(
     """
     from matplotlib.collections import LineCollection
 
-    at, direction = _plane(mesh, point, normal)
+    origin, direction = _plane(mesh, point, normal)
     shown, units = field_of(mesh, step, field), units_of(units, step)
-    triangles, lines = _touching(shown, step, at, direction)
+    triangles, lines = _intersection(shown, step, origin, direction)
     scale = scale_of(scale, mesh, [step])
     basis, labels = seen_along(direction, 1.0 - 1e-12)
     corners = scaled(triangles[..., :3], scale, triangles[..., 3:6])
-    flat, values = corners @ basis.T - (0.0 if labels else at @ basis.T), triangles[..., 6]
+    offset = 0.0 if labels else origin @ basis.T
+    flat, values = corners @ basis.T - offset, triangles[..., 6]
     best = np.unravel_index(int(np.argmax(np.abs(values))), values.shape)
     points = flat.reshape(-1, 2)
-    points = points if zoom is None else np.array(_axes.part_shown(flat[best], zoom, points))
+    points = points if zoom is None else np.array(_axes.zoomed(flat[best], zoom, points))
     axes = new_axes(ax, _axes.size_around(points))
     limits = shown.range if shown.signed else (float(values.min()), float(values.max()))
     corner_rows = np.arange(values.size).reshape(-1, 3)
-    drawn = shaded(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
-    strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - (0.0 if labels else at @ basis.T)
+    artist = fill_triangles(axes, flat.reshape(-1, 2), corner_rows, values.ravel(), shown.colours, limits)
+    strokes = scaled(lines[..., :3], scale, lines[..., 3:6]) @ basis.T - offset
     if edges if edges is not None else len(strokes) <= 4 * MOST_EDGES:
         axes.add_collection(LineCollection(list(strokes), colors="black", linewidths=0.2, alpha=0.6))
-    before = triangles[best][:3] - ((triangles[best][:3] - at) @ direction) * direction
+    undeformed = triangles[best][:3] - ((triangles[best][:3] - origin) @ direction) * direction
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    label = f"{shown.described(values[best], units, ' on the section')}\nundeformed at {placed(before, size)}"
+    label = (
+        f"{shown.described(values[best], units, ' on the section')}\nundeformed at {position_text(undeformed, size)}"
+    )
     _axes.mark(axes, flat[best], label)
     if zoom is not None:
         axes.set(xlim=points[:, 0], ylim=points[:, 1])
-    plane = f"section through {placed(at, float(np.ptp(mesh.points, axis=0).max()))}, normal {placed(direction, 1.0)}"
+    through = position_text(origin, float(np.ptp(mesh.points, axis=0).max()))
+    plane = f"section through {through}, normal {position_text(direction, 1.0)}"
     state = f"{step.instant}, displacements x {scale:g}"
     labels = labels or ("along the section", "across it")
-    return _axes.framed(axes, drawn, shown, title or f"{plane}\n{state}", units, labels, points, alone=ax is None)
+    heading = title or f"{plane}\n{state}"
+    return _axes.labelled_axes(axes, artist, shown, heading, units, labels, points, alone=ax is None)
 
 
 def _plane(mesh: Mesh, point: Sequence[float], normal: Sequence[float]) -> tuple[Array, Array]:
-    """Return the point (3,) [length] and the unit normal (3,) [-] of a plane; FastcontactError if they are invalid."""
+    """Return the point (3,) [length] and the unit normal (3,) [-] of a plane. Raises FastcontactError if one is invalid."""
     if mesh.dim != 3:
         raise FastcontactError("sections are for meshes in three dimensions: draw the deformed shape of this one")
-    at, direction = np.array(point, float), np.array(normal, float)
-    both = at.shape == direction.shape == (3,) and bool(np.isfinite([at, direction]).all())
-    if not both or not np.linalg.norm(direction) > 0.0:
+    origin, direction = np.array(point, float), np.array(normal, float)
+    valid = origin.shape == direction.shape == (3,) and bool(np.isfinite([origin, direction]).all())
+    if not valid or not np.linalg.norm(direction) > 0.0:
         raise FastcontactError(
             f"a section takes a point and a normal of 3 numbers, not {list(point)} and {list(normal)}"
         )
-    return at, direction / np.linalg.norm(direction)
+    return origin, direction / np.linalg.norm(direction)
 
 
-def _touching(shown: Field, step: StepResult, at: Array, direction: Array) -> tuple[Array, Array]:
+def _intersection(shown: Field, step: StepResult, origin: Array, direction: Array) -> tuple[Array, Array]:
     """Return the section as triangles (n, 3, 7) and lines (m, 2, 7), with position, displacement and value at each corner.
 
-    A plane that coincides with a surface is moved slightly into the body. FastcontactError if the plane does not intersect
-    the mesh.
+    A plane that coincides with a surface is moved slightly into the body. Raises FastcontactError if the plane does not
+    intersect the mesh.
     """
     size = float(np.ptp(shown.mesh.points, axis=0).max())
     data = np.column_stack([shown.mesh.points, step.displacement[shown.node], shown.values])
-    for move in (INSIDE, -INSIDE):
-        triangles, lines = _cut_cells(shown.mesh, data, data[:, :3] @ direction - at @ direction - move * size)
+    for shift in (INSIDE, -INSIDE):
+        triangles, lines = _cut_cells(shown.mesh, data, data[:, :3] @ direction - origin @ direction - shift * size)
         if len(triangles):
             return triangles, lines
     low, high = shown.mesh.points.min(axis=0), shown.mesh.points.max(axis=0)
     raise FastcontactError(
-        f"the plane through {placed(at, size)} with normal {placed(direction, 1.0)} does not meet the mesh, which lies "
-        f"between {placed(low, size)} and {placed(high, size)}"
+        f"the plane through {position_text(origin, size)} with normal {position_text(direction, 1.0)} does not meet the mesh, which lies "
+        f"between {position_text(low, size)} and {position_text(high, size)}"
     )
 
 
@@ -315,14 +319,14 @@ def _cut_cells(mesh: Mesh, data: Array, height: Array) -> tuple[Array, Array]:
     pieces, strokes = [np.empty((0, 3, 7))], [np.empty((0, 2, 7))]
     for name, block in mesh.solids.items():
         kind = elements.get(name)
-        kept = block[(height[block].min(axis=1) < 0.0) & (height[block].max(axis=1) >= 0.0)]
-        if not len(kept):
+        cells = block[(height[block].min(axis=1) < 0.0) & (height[block].max(axis=1) >= 0.0)]
+        if not len(cells):
             continue
-        middle = kind.shape(kind.nodes[: kind.n_corners].mean(axis=0)[None])[0]
-        centre, centre_height = np.einsum("n,end->ed", middle, data[kept]), height[kept] @ middle
+        N = kind.shape(kind.nodes[: kind.n_corners].mean(axis=0)[None])[0]
+        centre, centre_height = np.einsum("n,end->ed", N, data[cells]), height[cells] @ N
         for facet in kind.facets:
             for triangle in np.array(facet)[flat_triangles(len(facet))]:
-                corners = kept[:, triangle]
+                corners = cells[:, triangle]
                 corner_data = np.concatenate([data[corners], centre[:, None]], axis=1)
                 heights = np.column_stack([height[corners], centre_height])
                 cut, stroke = _cut_tetrahedra(corner_data, heights)
@@ -338,28 +342,27 @@ def _cut_tetrahedra(data: Array, height: Array) -> tuple[Array, Array]:
     (m, 4) contains the heights of the corners above the plane.
     """
     above = height >= 0.0
-    pattern = above @ np.array([1, 2, 4, 8])
+    pattern = above @ np.array([1, 2, 4, 8])  # the binary digits state which corners lie above the plane
     pieces, strokes = [np.empty((0, 3, data.shape[2]))], [np.empty((0, 2, data.shape[2]))]
-    for kind in range(1, 15):
-        here = pattern == kind
-        if not here.any():
+    for number in range(1, 15):
+        rows = pattern == number
+        if not rows.any():
             continue
-        up, down = _FIRST[kind], _REST[kind]
-        pairs = [(i, j) for i in up for j in down]
-        if len(pairs) == 4:  # the intersection is a quadrangle
-            pairs = [pairs[0], pairs[1], pairs[3], pairs[2]]
-        points = np.stack([_between(data[here], height[here], i, j) for i, j in pairs], axis=1)
+        edges = [(i, j) for i in range(4) for j in range(4) if number >> i & 1 and not number >> j & 1]
+        if len(edges) == 4:  # the intersection is a quadrangle
+            edges = [edges[0], edges[1], edges[3], edges[2]]
+        points = np.stack([_zero_crossing(data[rows], height[rows], i, j) for i, j in edges], axis=1)
         pieces.append(points[:, :3])
-        if len(pairs) == 4:
+        if len(edges) == 4:
             pieces.append(points[:, [0, 2, 3]])
-        on_face = [k for k, (i, j) in enumerate(pairs) if i < 3 and j < 3]
+        on_face = [k for k, (i, j) in enumerate(edges) if i < 3 and j < 3]
         if len(on_face) == 2:
             strokes.append(points[:, on_face])
     return np.concatenate(pieces), np.concatenate(strokes)
 
 
-def _between(data: Array, height: Array, i: int, j: int) -> Array:
-    """Return the data (n, k) interpolated linearly between two corners to the point of zero height."""
+def _zero_crossing(data: Array, height: Array, i: int, j: int) -> Array:
+    """Return the data (n, k) at the point of zero height between corners i and j, by linear interpolation."""
     t = (height[:, i] / (height[:, i] - height[:, j]))[:, None]
     return np.asarray((1.0 - t) * data[:, i] + t * data[:, j])
 
@@ -434,11 +437,11 @@ class MovingPicture:
 
     def _repr_html_(self) -> str:
         """Return the animation embedded in HTML."""
-        inside = base64.b64encode(self.path.read_bytes()).decode()
+        content = base64.b64encode(self.path.read_bytes()).decode()
         kind = self.path.suffix[1:].lower()
         if kind == "gif":
-            return f"<img src='data:image/gif;base64,{inside}'>"
-        return f"<video controls loop src='data:video/{kind};base64,{inside}'></video>"
+            return f"<img src='data:image/gif;base64,{content}'>"
+        return f"<video controls loop src='data:video/{kind};base64,{content}'></video>"
 
 
 @typed(FastcontactError)
@@ -502,8 +505,9 @@ def animate(
     if pictures_per_second < 1:
         raise FastcontactError(f"pictures_per_second = {pictures_per_second}: one or more a second can be shown")
     target, scale = checked_target(path), scale_of(scale, mesh, steps)
-    doubled = [2.0 if mirrored else 1.0, 1.0]
-    size, projection = (_axes.size_around(mesh.points * doubled, 3.8), None) if mesh.dim == 2 else ((6.4, 6.0), "3d")
+    size, projection = (6.4, 6.0), "3d"
+    if mesh.dim == 2:
+        size, projection = _axes.size_around(mesh.points * [2.0 if mirrored else 1.0, 1.0], 3.8), None
     figure = new_axes(None, size, projection).figure
     writer = writer_of(target, pictures_per_second)
     colours, box = _over_all(mesh, steps, field, scale, mirrored)
@@ -516,22 +520,17 @@ def animate(
                 mesh, step, field=field, scale=scale, mirrored=mirrored, limits=colours, title=heading, units=units,
                 view=view, ax=axes,
             )  # fmt: skip
-            _show(axes, box, view)
+            if mesh.dim == 3:
+                show_box(axes, *box, view)
+                _axes.laid_out(axes)
+            else:
+                axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})
             writer.grab_frame()
     return MovingPicture(target)
 
 
-def _show(axes: Any, box: tuple[Array, Array], view: tuple[float, float]) -> None:
-    """Set the limits of the axes to the common limits of all frames."""
-    if len(box[0]) == 3:
-        show_box(axes, *box, view)
-        _axes.settled(axes)
-    else:
-        axes.set(**{f"{axis}lim": ends for axis, *ends in zip("xy", *box, strict=True)})
-
-
 def writer_of(path: Path, pictures_per_second: int) -> Any:
-    """Return the writer of an animation; FastcontactError if the suffix is unknown or ffmpeg is missing."""
+    """Return the Matplotlib writer of an animation. Raises FastcontactError if the suffix is unknown or ffmpeg is missing."""
     from matplotlib.animation import FFMpegWriter, PillowWriter
 
     suffix = path.suffix.lower()
@@ -541,7 +540,7 @@ def writer_of(path: Path, pictures_per_second: int) -> Any:
         return PillowWriter(fps=pictures_per_second)
     if not FFMpegWriter.isAvailable():
         raise FastcontactError(f"'{path}' needs the program ffmpeg, which is not installed: write a .gif instead")
-    # Most codecs require an even number of dots in both directions.
+    # Most codecs require an even number of pixels in both directions.
     return FFMpegWriter(
         fps=pictures_per_second, extra_args=["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p"]
     )

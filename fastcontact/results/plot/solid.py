@@ -14,12 +14,12 @@ from fastcontact.mesh.topology import outer_facets
 from fastcontact.results.plot.fields import Field
 from fastcontact.results.plot.patches import lattice
 
-# Distance behind a triangle, relative to the total size, up to which a point is taken to lie on the triangle.
-ON_IT = 1e-4
+# Distance behind a triangle, relative to the total size, up to which a point is regarded as a point of the triangle.
+ON_TRIANGLE = 1e-4
 
 
 class Screen:
-    """Triangles sorted by their position on the screen.
+    """Triangles sorted by the squares of the screen that they overlap, to test whether they hide points.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Screen:
         self.corners, self.origin = flat[..., :2], flat[..., :2].reshape(-1, 2).min(axis=0)
         self.depth = flat[..., 2]
         size = np.ptp(flat.reshape(-1, 3), axis=0).max()
-        self.tolerance = ON_IT * size
+        self.tolerance = ON_TRIANGLE * size
         self.n_bins = int(np.clip(np.sqrt(len(flat)), 1, 256))
         self.bin = 1.0001 * max(np.ptp(flat[..., :2].reshape(-1, 2), axis=0).max(), 1e-300) / self.n_bins
         self._sort()
@@ -43,28 +43,28 @@ class Screen:
     def _sort(self) -> None:
         """List the triangles of each square of the screen, in the order of the squares."""
         low, high = self._square(self.corners.min(axis=1)), self._square(self.corners.max(axis=1))
-        across, up = (high - low + 1).T
-        count = across * up
-        number, within = _counted(count)
-        column, row = within % across[number], within // across[number]
+        n_columns, n_rows = (high - low + 1).T
+        number, within = _counted(n_columns * n_rows)
+        column, row = within % n_columns[number], within // n_columns[number]
         square = (low[number, 0] + column) * self.n_bins + low[number, 1] + row
         order = np.argsort(square, kind="stable")
         self.members = number[order]
         self.starts = np.searchsorted(square[order], np.arange(self.n_bins**2 + 1))
 
     def _square(self, points: Array) -> Indices:
+        """Return the column and the row (n, 2) of the squares that contain screen points (n, 2)."""
         return np.clip(((points - self.origin) / self.bin).astype(np.int64), 0, self.n_bins - 1)
 
-    def hidden(self, places: Array) -> Mask:
+    def hidden(self, positions: Array) -> Mask:
         """Return whether each position (..., 3) [length] is hidden behind a triangle."""
-        flat = places.reshape(-1, 3) @ self.axes.T
+        flat = positions.reshape(-1, 3) @ self.axes.T
         column, row = self._square(flat[:, :2]).T
         square = column * self.n_bins + row
         first, count = self.starts[square], self.starts[square + 1] - self.starts[square]
         index, within = _counted(count)
         triangle = self.members[first[index] + within]
         behind = self._behind(flat[index], triangle)
-        return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(places.shape[:-1]))
+        return np.asarray(np.bincount(index[behind], minlength=len(flat)).astype(bool).reshape(positions.shape[:-1]))
 
     def _behind(self, flat: Array, triangle: Indices) -> Mask:
         """Return whether each point (n, 3) in screen coordinates [length] lies behind its triangle (n,)."""
@@ -83,7 +83,7 @@ def _counted(count: Indices) -> tuple[Indices, Indices]:
 
 
 def across(eye: Array) -> Array:
-    """Return three orthonormal vectors (3, 3) [-]: two normal to the line of sight, and the vector to the viewer."""
+    """Return three orthonormal vectors (3, 3) [-]: two normal to the line of sight, and `eye`, the vector to the viewer."""
     helper = np.eye(3)[int(np.argmin(np.abs(eye)))]
     first = np.cross(helper, eye)
     first /= np.linalg.norm(first)
@@ -109,31 +109,32 @@ def _cross(a: Array, b: Array) -> Array:
 
 # Largest number of cells or facets whose edges are drawn by default. More edges would blacken the plot.
 MOST_EDGES = 5000
-# Number of subdivisions of the sides of each flat triangle between the nodes, which show nonlinear fields.
+# Number of subdivisions of the sides of each flat triangle of a linear facet, which show nonlinear fields.
 CUTS = 2
-# Number of recursive subdivisions of partly hidden triangles into four.
-FINEST = 4
+# Largest number of recursive subdivisions of partly hidden triangles into four.
+SUBDIVISIONS = 4
 # Size of solids relative to the axes, which leaves space for labels.
 ROOM = 0.9
 # Largest ratio of the longer visible extent of a box to its diagonal. Slender boxes are drawn smaller.
 WIDEST = 0.8
 # Elevations and azimuths of the viewer [degree], from above and from below at each of the four corners.
 VIEWS = [(height, direction) for height in (25.0, -25.0) for direction in (-60.0, 30.0, 120.0, -150.0)]
-# Number of ticks on an axis that is as long as the diagonal of the box in the plot, and distance from the ends of the y axis,
-# relative to its length, within which its tick labels would overlap those of other axes.
-TICKS, NEAR_END = 14, 0.1
-# Distances of numbers and names from the axes in 3D, in the unit of matplotlib for a box of size 1, and the least size for
-# which they are computed.
+# Number of ticks on an axis that is as long as the diagonal of the box in the plot.
+TICKS = 14
+# Part of the y axis at each end without ticks, whose labels would overlap those of other axes, relative to its length.
+NEAR_END = 0.1
+# Distances of tick labels and axis labels from the axes in 3D, in the unit of Matplotlib for a box of size 1, and the
+# smallest size for which they are computed.
 NUMBERS, NAMES, SHORTEST = 6.0, 17.0, 0.05
 
 
 def draw_solid(
     ax: Any, shown: Field, points: Array, edges: bool | None, view: tuple[float, float], colours: tuple[float, float]
 ) -> Any:
-    """Draw the visible part of the outer surface and return the mappable for a colour bar.
+    """Draw the visible part of the outer surface, and return the mappable for a colour bar.
 
     `points` (n_points, 3) are the positions of the points [length], and `colours` are the values of the first and the last
-    colour. `edges` is whether the outlines of facets are drawn; by default they are drawn for up to MOST_EDGES facets. `view`
+    colour. `edges` states whether the outlines of facets are drawn; by default they are for up to MOST_EDGES facets. `view`
     contains the elevation and the azimuth of the viewer [degree].
     """
     from matplotlib import colormaps
@@ -144,23 +145,23 @@ def draw_solid(
     facing, screen = _facing(shown, points, towards(view))
     pieces, values, strokes = [], [], []
     for name, corners, field, flat in facing:
-        weights = _cut(CUTS if elements.get(name).order == 1 else 1)
+        weights = _subdivision(CUTS if elements.get(name).order == 1 else 1)
         triangles = np.einsum("pcw,ftwd->ftpcd", weights, corners[:, flat]).reshape(-1, 3, 3)
         corner_values = np.einsum("pcw,ftw->ftpc", weights, field[:, flat]).reshape(-1, 3)
-        seen, of_piece = _seen(triangles, corner_values, screen)
-        pieces.append(seen)
-        values.append(of_piece.mean(axis=1))
-        strokes.append(_seen_strokes(_outline(name, corners), screen))
+        visible, visible_values = _visible(triangles, corner_values, screen)
+        pieces.append(visible)
+        values.append(visible_values.mean(axis=1))
+        strokes.append(_visible_strokes(_outline(name, corners), screen))
     norm = Normalize(*colours)
     faces = colormaps[shown.colours](norm(np.concatenate(values)))
     polygons = list(np.concatenate(pieces))
     lines = faces.copy()  # lines in the colour of the face close hairline gaps between faces
     if edges if edges is not None else sum(len(corners) for _, corners, _, _ in facing) <= MOST_EDGES:
         # Nearer objects are drawn later. Moving strokes towards the viewer does not change their parallel projection.
-        drawn = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * towards(view)
-        polygons += list(drawn)
-        faces = np.vstack([faces, np.zeros((len(drawn), 4))])
-        lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(drawn), 1))])
+        moved = np.concatenate(strokes) + 4.0 * np.ptp(points, axis=0).max() * towards(view)
+        polygons += list(moved)
+        faces = np.vstack([faces, np.zeros((len(moved), 4))])
+        lines = np.vstack([lines, np.tile([0.0, 0.0, 0.0, 0.6], (len(moved), 1))])
     ax.add_collection3d(Poly3DCollection(polygons, facecolors=faces, edgecolors=lines, linewidths=0.3))
     show_box(ax, points.min(axis=0), points.max(axis=0), view)
     return ScalarMappable(norm, shown.colours)
@@ -177,36 +178,36 @@ def show_box(ax: Any, low: Array, high: Array, view: tuple[float, float]) -> Non
     ax.view_init(elev=view[0], azim=view[1])
     size, eye = np.maximum(high - low, 1e-9 * np.ptp([low, high])), towards(view)
     diagonal = float(np.linalg.norm(size))
-    level = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
-    widest = float((np.abs([level, np.cross(eye, level)]) @ size).max()) / diagonal
-    fraction = size * np.sqrt(1.0 - eye**2) / diagonal
-    for name, begin, end, along in zip("xyz", low, high, fraction):
-        count = int(np.clip(TICKS * along, 3 if name == "y" else 1, 9))
+    horizontal = np.array([-np.sin(np.radians(view[1])), np.cos(np.radians(view[1])), 0.0])
+    widest = float((np.abs([horizontal, np.cross(eye, horizontal)]) @ size).max()) / diagonal
+    lengths = size * np.sqrt(1.0 - eye**2) / diagonal  # of the axes in the plot
+    for name, begin, end, length in zip("xyz", low, high, lengths):
+        count = int(np.clip(TICKS * length, 3 if name == "y" else 1, 9))
         ticks = MaxNLocator(count, steps=[1, 2, 5, 10]).tick_values(begin, end)
         margin = (NEAR_END if name == "y" else -1e-9) * (end - begin)
         ticks = ticks[(ticks >= begin + margin) & (ticks <= end - margin)]
         getattr(ax, f"set_{name}lim")(begin, end)
-        getattr(ax, f"set_{name}ticks")(ticks[-1:] if TICKS * along < 1.5 else ticks)
-    _keep_apart(ax, size / diagonal, eye, level)
+        getattr(ax, f"set_{name}ticks")(ticks[-1:] if TICKS * length < 1.5 else ticks)
+    _place_labels(ax, size / diagonal, eye, horizontal)
     ax.set_box_aspect(size, zoom=ROOM * min(1.0, WIDEST / widest))
 
 
-def _keep_apart(ax: Any, size: Array, eye: Array, level: Array) -> None:
-    """Place numbers and names of 3D axes at the same distance on the screen for bodies of all proportions.
+def _place_labels(ax: Any, size: Array, eye: Array, horizontal: Array) -> None:
+    """Place tick labels and labels of 3D axes at the same distance on the screen for bodies of all proportions.
 
     Matplotlib moves them away from an axis by distances proportional to the `size` (3,) [-] of the box along the other two.
-    `eye` and `level` (3,) are the unit vectors towards the eye and along the horizontal direction of the screen.
+    `eye` and `horizontal` (3,) are the unit vectors towards the viewer and along the horizontal direction of the screen.
     """
-    screen = np.array([level, np.cross(eye, level)])
-    near, across = np.sign(eye) * [1.0, 1.0, -1.0] * size, np.sign(level) * size
-    for name, outward in zip("xyz", (near * [0, 1, 1], near * [1, 0, 1], across)):
+    screen = np.array([horizontal, np.cross(eye, horizontal)])
+    near, sideways = np.sign(eye) * [1.0, 1.0, -1.0] * size, np.sign(horizontal) * size
+    for name, outward in zip("xyz", (near * [0, 1, 1], near * [1, 0, 1], sideways)):
         reach = max(float(np.linalg.norm(screen @ outward)), SHORTEST)
-        ax.tick_params(axis=name, pad=NUMBERS / reach - 8.0)  # 8 and 21 are offsets of matplotlib
+        ax.tick_params(axis=name, pad=NUMBERS / reach - 8.0)  # 8 and 21 are offsets of Matplotlib
         getattr(ax, f"{name}axis").labelpad = NAMES / reach - 21.0
 
 
 def is_seen(shown: Field, points: Array, view: tuple[float, float]) -> bool:
-    """Return whether the extreme value of a field is visible from `view` if the points are at `points` (n_points, 3)."""
+    """Return whether the extreme value of a field at the positions `points` (n_points, 3) is visible from `view`."""
     _, screen = _facing(shown, points, towards(view))
     return not bool(screen.hidden(points[[shown.extreme]])[0])
 
@@ -223,9 +224,10 @@ def towards(view: tuple[float, float]) -> Array:
 
 
 def _facing(shown: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Array, Array, Indices]], Screen]:
-    """Return the facets that face the viewer and the screen with their triangles.
+    """Return the facets that face the viewer, and the screen with their triangles.
 
-    The facets are given as the name, the corners, the values and the flat triangles of each facet type.
+    For each element type of facets there are its name, the positions and values at the nodes of the facets, and the local
+    nodes of the flat triangles of a facet.
     """
     cut = len(shown.node) != shown.node.max(initial=-1) + 1
     facing = []
@@ -238,48 +240,48 @@ def _facing(shown: Field, points: Array, eye: Array) -> tuple[list[tuple[str, Ar
     return facing, Screen(np.concatenate(triangles), eye)
 
 
-def _seen(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
+def _visible(triangles: Array, values: Array, screen: Screen) -> tuple[Array, Array]:
     """Return the visible parts of triangles (n, 3, 3) and the values (n, 3) at their corners.
 
     Partly hidden triangles are divided recursively into four. The smallest triangles are kept if their centre is visible.
     """
     visible: list[tuple[Array, Array]] = []
-    for left in range(FINEST, -1, -1):
-        middle = triangles.mean(axis=1, keepdims=True)
-        tests = np.concatenate([middle, middle + 0.98 * (triangles - middle)], axis=1)
+    for left in range(SUBDIVISIONS, -1, -1):
+        centre = triangles.mean(axis=1, keepdims=True)
+        tests = np.concatenate([centre, centre + 0.98 * (triangles - centre)], axis=1)
         hidden = screen.hidden(tests)
-        seen = ~hidden[:, 0] if left == 0 else ~hidden.any(axis=1)
-        visible.append((triangles[seen], values[seen]))
-        rest = ~seen & ~hidden.all(axis=1)
+        shown = ~hidden[:, 0] if left == 0 else ~hidden.any(axis=1)
+        visible.append((triangles[shown], values[shown]))
+        rest = ~shown & ~hidden.all(axis=1)
         if left == 0 or not rest.any():
             break
-        weights = _cut(2)
+        weights = _subdivision(2)
         triangles = np.einsum("pcw,nwd->npcd", weights, triangles[rest]).reshape(-1, 3, 3)
         values = np.einsum("pcw,nw->npc", weights, values[rest]).reshape(-1, 3)
     return np.concatenate([block for block, _ in visible]), np.concatenate([block for _, block in visible])
 
 
-def _seen_strokes(strokes: Array, screen: Screen) -> Array:
+def _visible_strokes(strokes: Array, screen: Screen) -> Array:
     """Return the visible parts of strokes (n, 2, 3); partly hidden strokes are divided into sixteen pieces."""
     ends = np.linspace(0.0, 1.0, 17)[:, None]
     points = strokes[:, None, 0] + ends * (strokes[:, None, 1] - strokes[:, None, 0])
     segments = np.stack([points[:, :-1], points[:, 1:]], axis=2)
     hidden = screen.hidden(segments.mean(axis=2))
-    fully = ~hidden.any(axis=1)
-    partly = ~fully & ~hidden.all(axis=1)
-    return np.concatenate([strokes[fully], segments[partly][~hidden[partly]]])
+    visible = ~hidden.any(axis=1)
+    partly = ~visible & ~hidden.all(axis=1)
+    return np.concatenate([strokes[visible], segments[partly][~hidden[partly]]])
 
 
 def _without_cuts(mesh: Mesh, node: Numbers) -> dict[str, Numbers]:
     """Return the outer facets except those along internal cuts, where two facets have the same nodes."""
     blocks = {}
     for name, facets in outer_facets(mesh).items():
-        _, back, count = np.unique(np.sort(node[facets], axis=1), axis=0, return_inverse=True, return_counts=True)
-        blocks[name] = facets[count[back.ravel()] == 1]
+        _, inverse, count = np.unique(np.sort(node[facets], axis=1), axis=0, return_inverse=True, return_counts=True)
+        blocks[name] = facets[count[inverse.ravel()] == 1]
     return {name: facets for name, facets in blocks.items() if len(facets)}
 
 
-def _cut(n: int) -> Array:
+def _subdivision(n: int) -> Array:
     """Return barycentric weights (n * n, 3, 3) [-] of the corners of n * n equal pieces of a triangle."""
     points, pieces = lattice(True, n)
     return np.column_stack([1.0 - points.sum(axis=1), points])[pieces]
@@ -288,7 +290,7 @@ def _cut(n: int) -> Array:
 def _outline(name: str, corners: Array) -> Array:
     """Return the sides of facets as strokes (n, 2, 3) [length] between neighbouring nodes."""
     element = elements.get(name)
-    ends = [(a, b) for a, b in element.edges]
+    ends = list(element.edges)
     if element.order == 2:
         middles = range(element.n_corners, element.n_corners + len(ends))
         ends = [side for (a, b), middle in zip(ends, middles) for side in ((a, middle), (middle, b))]

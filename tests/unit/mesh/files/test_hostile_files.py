@@ -279,7 +279,7 @@ def test_cells_of_several_sizes_are_no_array(tmp_path, monkeypatch):
     found = SimpleNamespace(points=[["a"]], cells=cells, **nothing)
     monkeypatch.setattr(meshio_process, "library", lambda: SimpleNamespace(read=lambda *_, **__: found))
     content = meshio_process.plain_content(tmp_path / "mesh.vtu", "vtu")
-    assert content == {"points": None, "cells": [["polygon", 2, None]], **nothing, "said": ""}
+    assert content == {"points": None, "cells": [["polygon", 2, None]], **nothing, "output": ""}
 
 
 def test_a_mesh_without_optional_attributes(tmp_path):
